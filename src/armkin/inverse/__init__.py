@@ -14,6 +14,8 @@ run/          how targets go through: one alone, chunks of a batch, threads
 held.py        joints that are held: the arm of the others, and its targets
 followed.py    answers of the other joints along the redundant one
 arm_angle.py   those curves in closed form, of a shoulder, an elbow and a wrist
+arcs.py        the same traced through all joints, of other joints without a closed form
+traced.py      and their families
 pieces.py      pieces of such curves: intervals of the redundant joint
 families.py    one joint more than the target asks for: intervals of the redundant joint
 position_first.py  four or five joints asked for a pose: the position exact, the rotation as near as it goes

@@ -17,13 +17,15 @@ from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions, Status
+from armkin.inverse.arcs import PLANES
 from armkin.inverse.arm_angle import Turning, arm_angle
-from armkin.inverse.followed import Followed, Follower, Ik
+from armkin.inverse.followed import SAMPLES, Followed, Follower, Ik
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import PROBE, SAME
 from armkin.inverse.pieces import Curves, Pieces, motion
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import read_near, read_targets, shaped
+from armkin.inverse.traced import Traced
 from armkin.keep_out.clearance import clear
 from armkin.model import units
 from armkin.model.arm import actual
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 
 AT_ONCE = 24_000  # targets of the other joints solved together
 CIRCLES = 64  # targets whose arm angles are worked on together
+TRACED = 8  # and whose curves are traced together
 FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free
 
 
@@ -57,12 +60,13 @@ def families(
     known, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
     stands = (newton.missing(true, task, each, goal) <= most) & ~outside(true, each).any(axis=1)
     rows = _Rows(true, turned.joint, each, stands)
-    some = CIRCLES if of else max(AT_ONCE // free.samples, 1)
+    some = CIRCLES if of else AT_ONCE // SAMPLES if turned.labelled else TRACED
     for k in range(0, len(goal), some):
         if of:
             rows.add(k, Turning.along(of, goal[k : k + some], each[k : k + some]))
         else:
-            rows.add(k, Followed.along(Follower(ik, true, turned, goal[k : k + some], each[k : k + some])))
+            find = Follower(ik, true, turned, goal[k : k + some], each[k : k + some])
+            rows.add(k, Followed.along(find) if turned.labelled else Traced.along(find))
     q, interval, legal, branch = rows.stacked()
     valid = branch >= 0
     B = valid.shape[1]
@@ -94,7 +98,12 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     """The method of an arm with a redundant joint, why, and whether it guarantees all families."""
     joint = arm.joint_names[free.joint]
     closed = bool(free.joint) and arm_angle(actual(arm)) is not None
-    how = "in closed form by the arm angle" if closed else f"{free.geometry.name}, at {free.samples} values of it"
+    if closed:
+        how = "in closed form by the arm angle"
+    elif free.labelled:
+        how = f"{free.geometry.name}, at {SAMPLES} values of it"
+    else:
+        how = f"{free.geometry.name}, at {PLANES} values of it, and traced between them"
     return (
         f"families of {joint}",
         f"{joint} is redundant: ik lists the intervals of its values; the others: {how}",

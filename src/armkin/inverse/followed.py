@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions
-from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
-from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, CONVERGING, REACH, SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, REACH, SOLUTION
 from armkin.inverse.pieces import Pieces, best_samples, motion, runs
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved
@@ -26,11 +24,10 @@ if TYPE_CHECKING:
 
 Ik = Callable[..., Solutions]
 AT_A_TIME = 2_000  # targets of a formula: they stay in the cache
+SAMPLES = 720  # of a turn of the redundant joint
 FINER = 24  # times as many values where none had an answer
 HALVINGS = 24  # of half a degree: 3e-8 degrees
 STEPS = 34  # of the golden section
-POLISH = 8  # Newton steps to a posture that continues another one
-ASTRAY = 0.5  # [rad] and how far it is from that at most
 
 
 class Postures(NamedTuple):
@@ -50,11 +47,6 @@ class Follower(NamedTuple):
     target: Array
     near: Array
 
-    @property
-    def labelled(self) -> bool:
-        """Whether a branch keeps its index along the turn, as that of a closed form does."""
-        return self.free.geometry.ordered and self.free.geometry.pairs is not None
-
     def at(self, rows: NDArray[np.intp], t: Array) -> Postures:
         """All branches of targets (M,) at values t (M,), each in the column of its index."""
         return self._legal(rows, self.found(rows, t))
@@ -62,11 +54,11 @@ class Follower(NamedTuple):
     def found(self, rows: NDArray[np.intp], t: Array) -> Array:
         """Branches (M, B, n), nan where there is none."""
         goal = moved(self.arm, self.free, self.target[rows], t)
-        if self.labelled and self.free.geometry.doubts is None:
+        if self.free.labelled and self.free.geometry.doubts is None:
             return self._by_formula(goal, t)
         s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
         M, B, r = len(t), s.q.shape[1], self.free.joint
-        number = s.branch if self.labelled else np.where(s.valid, np.arange(B), -1)
+        number = s.branch if self.free.labelled else np.where(s.valid, np.arange(B), -1)
         out = np.full((M, B + 1, self.arm.n), np.nan)
         place = np.arange(M)[:, None], np.where(number < 0, B, number)
         out[*place, :r], out[*place, r], out[*place, r + 1 :] = s.q[:, :, :r], t[:, None], s.q[:, :, r:]
@@ -100,45 +92,17 @@ class Follower(NamedTuple):
         return Postures(q, valid, legal & valid)
 
     def along(self, t: Array) -> Postures:
-        """Of every target at all of t (K,), linked along it: q (N, K, B, n)."""
+        """Of every target at all of t (K,): q (N, K, B, n)."""
         N, K = len(self.target), len(t)
         found = self.at(np.repeat(np.arange(N), K), np.tile(t, N))
         B = found.valid.shape[1]
         q, valid, legal = found.q.reshape(N, K, B, -1), found.valid.reshape(N, K, B), found.legal.reshape(N, K, B)
-        if self.labelled:
-            return Postures(q, valid, legal)
-        kept = [i for i in range(self.arm.n) if i != self.free.joint]
-        for k in range(N):
-            goal = moved(self.arm, self.free, np.repeat(self.target[k : k + 1], K, axis=0), t)
-            number = follow(self.free.rest, self.free.task, q[k][:, :, kept], goal)
-            q[k] = in_columns(q[k], number)
-            legal[k] = in_columns(legal[k][:, :, None].astype(float), number)[:, :, 0] == 1.0
-        return Postures(q, ~np.isnan(q[..., 0]), legal)
+        return Postures(q, valid, legal)
 
-    def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array, like: Array) -> Postures:
-        """One branch each (M,): that of its index, or, of an elimination, what continues postures like (M, n)."""
-        q = self.found(rows, t)[np.arange(len(rows)), branch] if self.labelled else self._continued(rows, t, like)
-        one = self._legal(rows, q[:, None])
+    def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Postures:
+        """One branch each (M,)."""
+        one = self._legal(rows, self.found(rows, t)[np.arange(len(rows)), branch][:, None])
         return Postures(one.q[:, 0], one.valid[:, 0], one.legal[:, 0])
-
-    def _continued(self, rows: NDArray[np.intp], t: Array, like: Array) -> Array:
-        """Postures (M, n) near postures like (M, n), nan where there is none."""
-        kept = [j for j in range(self.arm.n) if j != self.free.joint]
-        goal = moved(self.arm, self.free, self.target[rows], t)
-        six, missing = newton.newton(self.free.rest, self.free.task, like[:, kept], goal, POLISH)
-        far = np.abs(wrapped(six - like[:, kept])).max(axis=1)
-        q = np.empty((len(t), self.arm.n))
-        q[:, kept], q[:, self.free.joint] = six, t
-        q[(missing > CONVERGING) | (far > ASTRAY)] = np.nan
-        return q
-
-
-def in_columns(q: Array, number: NDArray[np.integer]) -> Array:
-    """Rows (M, B, n) in the columns of their numbers (M, B), nan where there is none; -1: left away."""
-    M, B, n = q.shape
-    out = np.full((M, B + 1, n), np.nan)
-    out[np.arange(M)[:, None], np.where(number < 0, B, number)] = q
-    return out[:, :B]
 
 
 class Followed(NamedTuple):
@@ -152,14 +116,11 @@ class Followed(NamedTuple):
     @classmethod
     def along(cls, find: Follower, finer: int = 1) -> Followed:
         """Of some targets; one without an answer is asked again: all of a nearly stretched arm lie within a degree."""
-        K = find.free.samples * finer
+        K = SAMPLES * finer
         t = np.asarray(-np.pi + (np.arange(K) + 0.5) * (2 * np.pi / K), np.float64)
         found = find.along(t)
         pieces, short = _pieces(find, t, found), _all_short(find, found)
-        if not find.labelled:  # an elimination's answers near singular postures are less exact
-            start = newton.correct(find.arm, find.free.task, pieces.start, find.target[pieces.row])[0]
-            pieces = pieces._replace(start=start)
-        if finer == 1 and find.labelled:
+        if finer == 1:
             near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
             for k in np.flatnonzero(~found.valid.any(axis=(1, 2)) & near_enough):
                 alone = cls.along(find._replace(target=find.target[[k]], near=find.near[[k]]), FINER)
@@ -181,7 +142,7 @@ class Followed(NamedTuple):
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Curves.at`."""
-        there = self.find.one(pieces.row, pieces.branch, parameter, pieces.start)
+        there = self.find.one(pieces.row, pieces.branch, parameter)
         return there.q, there.legal
 
 
@@ -195,13 +156,11 @@ def _ends(find: Follower, t: Array, found: Postures, kinds: dict[bool, Bool]) ->
     of_legal = np.concatenate([np.full(len(place[0]), legal) for legal, place in places.items()])
     low = t[k]
     lo, hi = np.where(inside, low, low + h), np.where(inside, low + h, low)  # good at lo
-    like = np.where(inside[:, None], found.q[row, k, branch], found.q[row, (k + 1) % len(t), branch])
     for _ in range(HALVINGS if len(row) else 0):
         middle = 0.5 * (lo + hi)
-        there = find.one(row, branch, middle, like)
+        there = find.one(row, branch, middle)
         keep = np.where(of_legal, there.legal, there.valid)
         lo, hi = np.where(keep, middle, lo), np.where(keep, hi, middle)
-        like = np.where(keep[:, None], there.q, like)
     out = {}
     for legal, place in places.items():
         out[legal] = np.full(found.valid.shape, np.nan)
@@ -247,8 +206,6 @@ def _families_without(found: Postures) -> Bool:
 
 def _all_short(find: Follower, found: Postures) -> Bool:
     """Whether no joint moves by REACH along any family of a target (N,), from its samples."""
-    if not find.labelled:  # the pieces of a linked branch say nothing of the whole curve
-        return np.zeros(len(found.valid), bool)
     together = found.valid
     for shift in range(1, 2 + int(REACH / (2 * np.pi / found.valid.shape[1]))):
         together = together & np.roll(found.valid, -shift, axis=1)

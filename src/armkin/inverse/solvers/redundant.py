@@ -22,8 +22,6 @@ from armkin.model.rotation import inverse
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SAMPLES = 720, 120  # of a turn of the redundant joint, by a closed form and by the elimination
-
 
 class Redundancy(NamedTuple):
     """The redundant joint of an arm and task, and the arm of the others, that joint at zero."""
@@ -34,8 +32,9 @@ class Redundancy(NamedTuple):
     geometry: Geometry  # of the rest
 
     @property
-    def samples(self) -> int:
-        return SAMPLES[0 if self.geometry.pairs is not None else 1]
+    def labelled(self) -> bool:
+        """Whether a branch keeps its index along the turn, as that of a closed form does."""
+        return self.geometry.ordered and self.geometry.pairs is not None
 
 
 @lru_cache(maxsize=64)
