@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +79,27 @@ def test_the_general_elimination_answers_as_python_does(name: str, tmp_path: Pat
     arm = armkin.load(name)
     q = np.concatenate([_random(arm, 30), _typed(arm, 6), _tool_down(arm, 6) if arm.n == 6 else _typed(arm, 0)])
     assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
+
+
+_DOUBTS = """
+const doubts = [];
+for (const q of JSON.parse(readFileSync('asked.json', 'utf8')).q) {
+  ik(target(q), q);
+  doubts.push(candidates(goalNumbers, q, allJoints, allMisses));
+}
+console.log(JSON.stringify(doubts));
+"""
+
+
+def test_roots_that_solutions_share_are_taken_apart(tmp_path: Path) -> None:
+    """An xArm 6 with its tool straight down has two solutions a root: one pass tells them, without a doubt."""
+    arm = armkin.load("xarm6")
+    q = _tool_down(arm, 8)
+    assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
+    inside = "import { readFileSync } from 'node:fs';\n" + (tmp_path / "arm.mjs").read_text() + _DOUBTS
+    (tmp_path / "doubts.mjs").write_text(inside)
+    told = subprocess.run(["node", "doubts.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert json.loads(told.stdout) == [False] * len(q)
 
 
 @pytest.mark.parametrize(

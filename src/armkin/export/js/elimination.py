@@ -13,7 +13,7 @@ from armkin.export.c.elimination import BRANCHES, frame, moves_of, pencil_arrays
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.elimination.merge import _WEIGHTS
 from armkin.inverse.elimination.method import Elimination
-from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
+from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, EQUAL_ROOTS, SHAKES, TWIN_ROOTS, UPRIGHT
 from armkin.inverse.solvers import tool_axis
 from armkin.model.rotation import inverse
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 __all__ = ["BRANCHES", "METHOD", "candidates"]
-METHOD = ("eigenvalues", "frames", "roots", "elimination")
+METHOD = ("eigenvalues", "frames", "roots", "equal_roots", "elimination")
 
 
 def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
@@ -37,6 +37,9 @@ def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
         "length": repr(loop.length),
         "residual": repr((loop.length / arm.reach) ** 2),
         "beside": repr(BESIDE_SPECIAL),
+        "equalRoots": repr(EQUAL_ROOTS),
+        "twinRoots": repr(TWIN_ROOTS),
+        "upright": repr(UPRIGHT),
         "fromBase": _array(frame(inverse(loop.base))),
         "fromTool": _array(frame(inverse(loop.tool))),
         "links": _arrays([frame(link) for link in loop.links]),

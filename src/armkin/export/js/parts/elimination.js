@@ -110,11 +110,11 @@ function apart6(a, b) {
   return most;
 }
 
-/** Whether a root whose vector is no product stands for nothing: it is simple, and far from the pose.
- * @param {Float64Array} q @param {Float64Array} goal @param {Float64Array} re @param {Float64Array} im @param {number} i */
-function standsForNothing(q, goal, re, im, i) {
-  const size = 1 + re[i] ** 2 + im[i] ** 2;
-  for (let j = 0; j < re.length; j++) {
+/** Whether a candidate whose vector is no product stands for nothing: its root is simple, or all solutions of it are known, and
+ * it is far from the pose. @param {Seed} seed @param {Float64Array} goal @param {Float64Array} re @param {Float64Array} im */
+function standsForNothing({ q, root: i }, goal, re, im) {
+  const size = i < 0 ? 0 : 1 + re[i] ** 2 + im[i] ** 2;
+  for (let j = 0; j < re.length && i >= 0; j++) {
     const away = (re[i] - re[j]) ** 2 + (im[i] - im[j]) ** 2;
     if (j !== i && !(4 * away > 1e-6 * size * (1 + re[j] ** 2 + im[j] ** 2))) return false;
   }
@@ -169,13 +169,10 @@ function attempt(goal, kind, pass, found) {
   if (!eigenvalues(C, size, re, im)) return { open: true, touching };
   /** @type {{one: Root, hidden: number, own: boolean, stands: boolean, blurred: boolean, real: boolean}[]} */
   const here = [];
-  for (let i = 0; i < size; i++) {
-    const tilt = (2 * Math.abs(im[i])) / (1 + re[i] ** 2 + im[i] ** 2);
-    if (!(im[i] >= 0) || !(tilt < (careful ? 0.3 : 0.02))) continue;
-    const seed = jointsOf(pencil, E, back, ends, re[i]);
-    if (!seed) continue;
-    const q = seed.q;
-    if (seed.defect > 1e-5 && !(shake > 0) && most < 1e5 && standsForNothing(q, goal, re, im, i)) continue;
+  const part = (careful || pencil.wide) && !(pencil.slides[2] || pencil.slides[3] || pencil.slides[4]);
+  for (const seed of seedsOf(pencil, E, back, ends, re, im, careful ? 0.3 : 0.02, part)) {
+    const { q, tilt } = seed;
+    if (seed.defect > 1e-5 && !(shake > 0) && most < 1e5 && standsForNothing(seed, goal, re, im)) continue;
     const one = refine(q, goal, careful ? 12 : 4, careful);
     const good = one.residual < (careful ? 3e-9 : 1e-10);
     // a complex pair that steps brought near the pose may be a real one, seen through rounding

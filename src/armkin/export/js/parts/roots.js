@@ -109,21 +109,15 @@ function halfPowers(q) {
   return [Math.cos(1.5 * q), Math.sin(1.5 * q), Math.cos(0.5 * q), Math.sin(0.5 * q)];
 }
 
-/** The joint values for a root x of the pencil, and the squared sine between its vector and the product that a solution's is
- * (0 where slides move); null if it is a slide at infinity.
- * @param {Pencil} pencil @param {Float64Array} E @param {Float64Array} Y @param {Ends} ends @param {number} x
- * @returns {{q: Float64Array, defect: number} | null} */
-function jointsOf(pencil, E, Y, ends, x) {
-  const { r, w, slides, hidden, dialytic, products: p } = pencil;
+/** The equations at x, p x p, divided by x^2 if x is large. @param {Pencil} pencil @param {Float64Array} E @param {number} x */
+function systemAt(pencil, E, x) {
+  const { r, w, products: p } = pencil;
   const c = p + pencil.size;
-  const three = p / 4;
   const far = Math.abs(x) > 1;
-  const third = 3 - hidden - dialytic;
   const y = far ? 1 / x : x;
-  const scale = (far ? x : 1) / (1 + x * x);
   const A = new Float64Array(p * p);
   for (let i = 0; i < p; i++) {
-    const e = i * c; // the equations at x, divided by x^2 if x is large
+    const e = i * c;
     for (let j = 0; j < 2 * r; j++) A[p * i + j] = far ? E[e + j] + E[e + p + j] * y : E[e + j] * y + E[e + p + j];
     for (let j = 0; j < w; j++) {
       const two = E[e + 2 * r + j];
@@ -132,9 +126,14 @@ function jointsOf(pencil, E, Y, ends, x) {
       A[p * i + 2 * r + j] = far ? two + (one + none * y) * y : (two * y + one) * y + none;
     }
   }
-  const u = new Float64Array(p);
+  return A;
+}
+
+/** The products v of a root x and what the equations there take to zero. @param {Pencil} pencil @param {Float64Array} u @param {number} x */
+function vectorOf(pencil, u, x) {
+  const { r, w, products: p } = pencil;
+  const scale = (Math.abs(x) > 1 ? x : 1) / (1 + x * x);
   const v = new Float64Array(p);
-  nullVector(A, u);
   for (let i = 0; i < p; i++) {
     for (let j = 0; j < r; j++) {
       const K_re = /** @type {Float64Array} */ (pencil.K_re)[i * r + j];
@@ -143,6 +142,17 @@ function jointsOf(pencil, E, Y, ends, x) {
     }
     for (let j = 0; j < w; j++) v[i] += pencil.W[i * w + j] * u[2 * r + j];
   }
+  return v;
+}
+
+/** The joint values for a root x of the pencil and its products v, and the squared sine between v and the product that a
+ * solution's is (0 where slides move); null if it is a slide at infinity.
+ * @param {Pencil} pencil @param {Float64Array} v @param {Float64Array} Y @param {Ends} ends @param {number} x
+ * @returns {{q: Float64Array, defect: number} | null} */
+function jointsFrom(pencil, v, Y, ends, x) {
+  const { slides, hidden, dialytic } = pencil;
+  const three = pencil.products / 4;
+  const third = 3 - hidden - dialytic;
   // v is 4 x 3, 4 x 4 of a wide role: its longest row and column are the safest
   const rowSize = [0, 0, 0, 0];
   const columnSize = [0, 0, 0, 0];
