@@ -133,6 +133,7 @@ def test_branches_do_not_depend_on_the_blocks_they_are_solved_in(
     moves = {"moves": [{"point": [390, 80, 300]}, CIRCLE]}
     whole = armkin.path(three_dof, moves, start=three_dof.home)
     monkeypatch.setattr("armkin.motion.linked_branches._BLOCK", 64)
+    monkeypatch.setattr("armkin.motion.branch_columns._BLOCK", 64)
     monkeypatch.setattr("armkin.motion.path_plan._BLOCK", 100)
     parts = armkin.path(three_dof, moves, start=three_dof.home)
     assert parts.duration == pytest.approx(whole.duration, rel=1e-12)

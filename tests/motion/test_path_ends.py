@@ -13,7 +13,7 @@ from armkin.errors import NoSolutionError
 from armkin.model.arm import Arm
 from armkin.motion import boundary
 from armkin.motion.branch_chains import Chain
-from armkin.motion.linked_branches import _Linking
+from armkin.motion.branch_columns import Samples
 
 
 def moving(name: str) -> Arm:
@@ -94,7 +94,7 @@ def test_a_stretched_arm_stands_at_its_path_s_start() -> None:
         T[:, 2, 3] += s
         return T
 
-    found = _Linking(arm, up, None, 0.05, arm.home, 20.0)._solved(np.array([0.0, 20.0]))
+    found = Samples(arm, up, None, arm.home, 20.0).solved(np.array([0.0, 20.0]))
     assert found.valid.any(axis=1).tolist() == [True, False]
 
 

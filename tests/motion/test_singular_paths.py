@@ -10,6 +10,7 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.rotation import rpy
+from armkin.motion.branch_columns import Columns, Samples
 
 
 def with_rates(name: str) -> armkin.Arm:
@@ -149,3 +150,27 @@ def test_nearer_to_a_singularity_is_hardly_slower(name: str) -> None:
     """Joint 4 turns by half a turn in any case; where its cubics wavered, 0.01 mm took 9 % longer than 0.1."""
     off = [beside(with_rates(name), [0.3, 0.3, 0.2, 0.5, 0.0, 0.3], off, 0.0)[0].duration for off in (1e-2, 1e-1)]
     assert off[0] <= 1.03 * off[1]
+
+
+@pytest.mark.parametrize(
+    ("way", "split", "carried"), [([0, 0, 20], False, True), ([20, 0, 0], True, True), ([0, 0, -20], True, False)]
+)
+def test_a_whole_stretch_of_singular_postures_is_solved_at_few_samples(
+    way: list[float], split: bool, carried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the Stanford arm's home: straight up joints 4 and 6 are free all along, and divided steps multiplied."""
+    seen, solved = [], Samples.solved
+
+    def counted(self: Samples, s: np.ndarray, examine: bool = True) -> Columns:
+        seen.append(len(s))
+        return solved(self, s, examine)
+
+    monkeypatch.setattr(Samples, "solved", counted)
+    moves: dict[str, object] = {"start": "home", "moves": [{"offset": {"xyz": way}}]}
+    arm = with_rates("stanford")
+    if carried:
+        assert len(armkin.path(arm, moves, split=split).runs) <= 2
+    else:
+        with pytest.raises(NoSolutionError, match=r"q3 meets its limit 304\.8 mm"):
+            armkin.path(arm, moves, split=split)
+    assert sum(seen) < 1500

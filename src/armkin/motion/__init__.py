@@ -9,6 +9,8 @@ geometry.py         lines, arcs, helices, splines and blends of the tool, each a
 dense.py            targets on lines, gathered; fitting.py: one smooth curve of them; chords.py: what lies between them
 least_knots.py      splines of few knots; b_spline.py: their least squares
 route.py            one after another, with rests at corners; outline.py: those of a path, before anything is planned
+branch_columns.py   every branch at samples of the route
+joint_steps.py      steps from joint values to others, and how far the tip leaves its chord on them
 linked_branches.py  every branch along the route, linked from sample to sample by a certificate
 branch_chains.py    how far each carries, and the fewest runs that carry all
 boundary.py         what branches that meet on a boundary make of it

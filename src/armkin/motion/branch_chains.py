@@ -16,8 +16,10 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
+from armkin.motion.branch_columns import Columns, Int
 from armkin.motion.free import hit_samples as motion_hits
-from armkin.motion.linked_branches import ENDS, Columns, Int, turns_of
+from armkin.motion.joint_steps import turns_of
+from armkin.motion.linked_branches import ENDS
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

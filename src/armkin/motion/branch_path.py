@@ -17,11 +17,13 @@ from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find
 from armkin.motion.boundary import through_boundaries
 from armkin.motion.branch_chains import Chain, Run, chains, fewest
+from armkin.motion.branch_columns import Columns
 from armkin.motion.cubics import Knots
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.grid import fine_enough
 from armkin.motion.hold_cap import hold_cap
-from armkin.motion.linked_branches import ENDS, Columns, change, linked
+from armkin.motion.joint_steps import change
+from armkin.motion.linked_branches import ENDS, linked
 from armkin.motion.route import Route
 from armkin.motion.time_optimal import Bounds, finer, knots, optimal
 from armkin.motion.wrist_turn import through_wrists

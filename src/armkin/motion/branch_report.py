@@ -16,8 +16,8 @@ from armkin.motion.path_plan import Branch, PathPlan, PathRun, Reconfiguration
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.branch_chains import Run
+    from armkin.motion.branch_columns import Columns
     from armkin.motion.branch_path import Carried
-    from armkin.motion.linked_branches import Columns
     from armkin.motion.trajectory import Trajectory
 
 _WHY = {

@@ -12,7 +12,7 @@ from armkin.inverse.numeric.linalg import damped_steps
 from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
 from armkin.model.units import radian_or_reach
 from armkin.motion.cubics import Knots
-from armkin.motion.linked_branches import chord_bound, levers
+from armkin.motion.joint_steps import chord_bound, levers
 from armkin.motion.scan import Int
 from armkin.motion.time_optimal import knots
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
-from armkin.motion.linked_branches import turns_of
+from armkin.motion.joint_steps import turns_of
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

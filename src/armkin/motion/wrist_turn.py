@@ -15,8 +15,9 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian
 from armkin.motion.branch_chains import Chain
+from armkin.motion.branch_columns import Columns
 from armkin.motion.grid import corrected
-from armkin.motion.linked_branches import Columns, change
+from armkin.motion.joint_steps import change
 from armkin.motion.windows import Window
 
 if TYPE_CHECKING:

@@ -1,0 +1,198 @@
+"""All branches at samples of a route, each in the column of its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.answers.solutions import Solutions, Status
+from armkin.inverse.numeric.newton import correct
+from armkin.inverse.numeric.tolerances import CONVERGING
+from armkin.inverse.solve import isolated as ik
+from armkin.inverse.tasks.fitting import task_for
+from armkin.model.arm import actual
+from armkin.model.limits import outside
+from armkin.motion.joint_steps import change
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+Int = NDArray[np.intp]
+_STEPS, _STAYS = 8, 1e-6  # of Newton's method on one's self-motion; [rad | mm] of a joint that is not free
+_BLOCK = 16_384  # samples that are solved at once at most
+_APART = 8  # samples from one of a few that are solved first to the next
+
+
+@dataclass
+class Columns:
+    """Branches of samples along a route, and their links."""
+
+    s: Array  # (N,) [mm]
+    q: Array  # (N, B, n), principal values; nan where there is no branch
+    name: NDArray[np.int16]  # (N, B) index into names, -1: none
+    status: NDArray[np.int8]  # (N,)
+    within: Bool  # (N, B) within limits, of some copy
+    names: tuple[str, ...] = ()
+    complete: bool = True
+    partner: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 0), np.int16))  # (N - 1, B) column, or -1
+
+    @property
+    def valid(self) -> Bool:
+        """Where a branch is: (N, B)."""
+        return np.asarray(~np.isnan(self.q[:, :, 0]))
+
+    def rows(self, rows: Int) -> Columns:
+        """Some samples, without their links."""
+        parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within[rows])
+        return Columns(*parts, self.names, self.complete)
+
+    def wider(self, B: int) -> Columns:
+        """The same with B columns of branches at least."""
+        return Columns(
+            self.s,
+            _widened(self.q, B),
+            _widened(self.name, B, -1),
+            self.status,
+            _widened(self.within, B, 0),
+            self.names,
+            self.complete,
+            _widened(self.partner, B, -1),
+        )
+
+    def inserted(self, at: Int, new: Columns) -> Columns:
+        """These samples with others before the rows `at`; the links of both stay, as far as they have any."""
+        B = max(self.q.shape[1], new.q.shape[1])
+        old, new = self.wider(B), new.wider(B)
+        links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
+        return Columns(
+            np.insert(old.s, at, new.s),
+            np.insert(old.q, at, new.q, axis=0),
+            np.insert(old.name, at, new.name, axis=0),
+            np.insert(old.status, at, new.status),
+            np.insert(old.within, at, new.within, axis=0),
+            old.names,
+            old.complete and new.complete,
+            np.insert(old.partner, at, links, axis=0),
+        )
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What solves a route at samples; near: joint values (n,) for joints that are free; length: [mm] of the route."""
+
+    arm: Arm
+    targets: Callable[[Array], Array]
+    task: str | None
+    near: Array
+    length: float
+
+    def first(self, s: Array) -> Columns:
+        """All branches at the first samples (N,), increasing.
+
+        From a singular posture on, where all may be dear to examine, a few of them are solved first: between two that
+        are out of reach nobody looks.
+        """
+        if len(s) <= 2 * _APART or self.solved(s[:1]).status[0] != Status.SINGULAR:
+            return self.solved(s)
+        few = np.append(np.arange(0, len(s) - 1, _APART), len(s) - 1)
+        found = self.solved(s[few])
+        out = found.status == Status.UNREACHABLE
+        between = np.setdiff1d(np.arange(len(s)), few)
+        nobody = (out[:-1] & out[1:])[np.searchsorted(few, between) - 1]
+        parts = [found]
+        if not nobody.all():
+            parts.append(self.solved(s[between[~nobody]]))
+        if nobody.any():
+            empty, none = found.rows(np.flatnonzero(out)[[0] * int(nobody.sum())]), s[between[nobody]]
+            parts.append(replace(empty, s=none))
+        whole = _together(parts)
+        return whole.rows(np.argsort(whole.s, kind="stable"))
+
+    def solved(self, s: Array, examine: bool = True) -> Columns:
+        """All branches at samples, not linked yet; of very many in parts, to bound the memory that takes."""
+        parts = [self._part(s[k : k + _BLOCK], examine) for k in range(0, len(s), _BLOCK)]
+        return parts[0] if len(parts) == 1 else _together(parts)
+
+    def _part(self, s: Array, examine: bool) -> Columns:
+        found = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
+        q, name, within = found.q, found.branch.astype(np.int16), found.within_limits
+        singular = np.flatnonzero(found.status == Status.SINGULAR)
+        if len(singular):
+            # Exactly on a singularity some joints are free: 1e-7 of the path's length beside it they are determined.
+            aside = np.clip(s[singular] + 1e-7 * self.length, 0.0, self.length)
+            aside = np.where(aside == s[singular], s[singular] - 1e-7 * self.length, aside)
+            beside = ik(self.arm, self.targets(aside), self.task, near=self.near)
+            # Where there is nothing beside it, a stretched arm's wrist for example, the posture there stays.
+            good = (beside.status != Status.SINGULAR) & beside.valid.any(axis=1)
+            B = max(q.shape[1], beside.q.shape[1])
+            q, name, within = _widened(q, B).copy(), _widened(name, B, -1).copy(), _widened(within, B, 0).copy()
+            within[singular[good]] = _widened(beside.within_limits, B, 0)[good]
+            q[singular[good]] = _widened(beside.q, B)[good]
+            name[singular[good]] = _widened(beside.branch.astype(np.int16), B, -1)[good]
+            if len(stay := singular[~good]):
+                q[stay] = self._staying(q[stay], self.targets(s[stay]), found.free[stay], within[stay])
+        return _in_columns(found, s, q, name, within)
+
+    def _staying(self, q: Array, target: Array, free: Bool, within: Bool) -> Array:
+        """Singular postures (M, B, n) with their free joints (M, n) as near as they can be to where the arm stands."""
+        rows, b = np.nonzero(~np.isnan(q[:, :, 0]) & within)
+        if not len(rows):
+            return q
+        arm, task = self.arm, task_for(self.arm, self.task)
+        start, loose = q[rows, b], free[rows]
+        there, miss = correct(
+            actual(arm), task, np.where(loose, self.near, start) * arm.ratio, target[rows], steps=_STEPS
+        )
+        there /= arm.ratio
+        same = np.where(loose, 0.0, np.abs(change(arm, start, there))).max(axis=1) < _STAYS
+        good = same & (miss <= CONVERGING) & ~outside(arm, there).any(axis=1)
+        q[rows[good], b[good]] = there[good]
+        return q
+
+
+def _together(parts: list[Columns]) -> Columns:
+    """Samples of all the parts, one part after another."""
+    B = max(part.q.shape[1] for part in parts)
+    wide = [part.wider(B) for part in parts]
+    return Columns(
+        np.concatenate([part.s for part in wide]),
+        np.concatenate([part.q for part in wide]),
+        np.concatenate([part.name for part in wide]),
+        np.concatenate([part.status for part in wide]),
+        np.concatenate([part.within for part in wide]),
+        max((part.names for part in parts), key=len),
+        all(part.complete for part in parts),
+    )
+
+
+def _in_columns(found: Solutions, s: Array, q: Array, name: NDArray[np.int16], within: Bool) -> Columns:
+    """Rows of solutions with every named branch in the column of its number."""
+    B = q.shape[1]
+    wide = max(B, int(name.max(initial=-1)) + 1)
+    status, complete = found.status.astype(np.int8), bool(np.all(found.complete))
+    moved = np.flatnonzero(((name >= 0) & (name != np.arange(B))).any(axis=1))
+    q, name, within = (_widened(x, wide, fill) for x, fill in ((q, np.nan), (name, -1), (within, 0)))
+    if len(moved):
+        q, name, within = q.copy(), name.copy(), within.copy()
+        old_q, old_name, old_within = q[moved], name[moved], within[moved]
+        q[moved], name[moved], within[moved] = np.nan, -1, False
+        row, column = np.nonzero((old_name >= 0) & ~np.isnan(old_q[:, :, 0]))
+        place = old_name[row, column]
+        q[moved[row], place] = old_q[row, column]
+        name[moved[row], place] = place
+        within[moved[row], place] = old_within[row, column]
+    return Columns(s, q, name, status, within, found.names, complete)
+
+
+def _widened(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]
+    """The same with B columns on axis 1."""
+    missing = B - values.shape[1]
+    if missing <= 0:
+        return values
+    more = np.full((values.shape[0], missing, *values.shape[2:]), fill, values.dtype)
+    return np.concatenate([values, more], axis=1)
