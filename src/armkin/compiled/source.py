@@ -25,6 +25,8 @@ PARTS = Path(__file__).parent / "parts"
 
 
 LANES = 16  # poses at once: vectors of any length, and blocks of some kilobytes
+EIGHT = 8  # of an elimination: as many as its vectors have
+_LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_pass")
 
 
 class Library(NamedTuple):
@@ -47,7 +49,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
     """
     solve, branches, level = "", 0, 3
     if task is not None and geometry is not None and program.has_form(geometry):
-        solve, branches = program.candidates(arm, task, geometry, prefer=False)
+        solve, branches = program.candidates(arm, task, geometry, prefer=False, lanes="".join(map(_part, _LOCKSTEP)))
     fields = {
         "about": f"{program.identifier(arm.name)}: built for this computer by armkin.compile.",
         "joints": str(arm.n),
@@ -63,7 +65,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         assert task is not None
         accepted = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
-            accepted, level, fields["lanes"] = elimination.ACCEPTED, 2, "1"  # its own criteria have been met
+            accepted, level, fields["lanes"] = elimination.ACCEPTED, 2, str(EIGHT)  # its own criteria have been met
         fields |= _of_task(arm, task, branches, accepted)
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"

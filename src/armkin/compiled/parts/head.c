@@ -1,6 +1,7 @@
 /* @about@ */
 #include <math.h>
 #include <stdint.h>
+#include <string.h>
 
 /* poses worked on at once: vectors of the compiler's choice, and blocks that stay in the cache */
 #define ARM_LANES 16

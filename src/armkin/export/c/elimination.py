@@ -68,8 +68,11 @@ def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list
     return list(every.values()), [[place[pencil.role, pencil.psi] for pencil in plans] for plans in kinds]
 
 
-def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PASSES) -> str:
-    """`arm_candidates` of an arm that the elimination solves, and all that it needs."""
+def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PASSES, lanes: str = "") -> str:
+    """`arm_candidates` of an arm that the elimination solves, and all that it needs.
+
+    lanes: C in which `arm_first_pass` takes several poses at once, where there are vectors and no slides.
+    """
     kinds = plans_of(elimination, passes)
     pencils, numbers_of = pencils_of(kinds)
     loop, passes = elimination.loop, len(kinds[0])
@@ -102,7 +105,10 @@ def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PAS
         _flags("plan", [number for plan in numbers_of for number in plan]),
         "",
     ]
-    text = part("pencil") + "\n".join(lines) + "\n" + "".join(map(part, _METHOD))
+    first = part("first_pass")
+    if lanes and not loop.prismatic.any():
+        first = f"#ifdef __GNUC__ /* or another compiler with its vectors */\n{lanes}#else\n{first}#endif\n"
+    text = part("pencil") + "\n".join(lines) + "\n" + "".join(map(part, _METHOD)) + first + part("candidates")
     if task.orientation == "axis":
         text = text.replace("arm_candidates", "arm_six_candidates") + _with_virtual_joint()
     return text
@@ -164,9 +170,9 @@ def _by_fours(rows: Array) -> Array:
 
 def _with_virtual_joint() -> str:
     """`arm_candidates` of five joints and the tool's axis, by way of the pose that `solvers.tool_axis` makes."""
-    code = c_and_js_code.write(recording.record(tool_axis.pose_of, 6), [f"axis[{k}]" for k in range(6)])
-    lines = [*code.lines, *(f"goal[{k}] = {text[0]};" for k, text in enumerate(code.outputs))]
-    return part("virtual_joint").replace("@lines@", "\n    ".join(lines))
+    code = c_and_js_code.write(recording.record(tool_axis.pose_of, 6), [f"axis[{k} * ARM_LANES + i]" for k in range(6)])
+    lines = [*code.lines, *(f"goal[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
+    return part("virtual_joint").replace("@lines@", "\n        ".join(lines))
 
 
 def frame(motion: ArrayLike) -> np.ndarray:

@@ -108,10 +108,12 @@ def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     return spare.task, held_by_near(arm, spare)
 
 
-def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:
+def candidates(
+    arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True, lanes: str = ""
+) -> tuple[str, int]:
     """The function `arm_candidates` of an arm's class, and how many branches it has.
 
-    Raises UsageError if the class has no form in C, or none in single precision.
+    lanes: see `elimination.candidates`. Raises UsageError if the class has no form in C, or none in single precision.
     """
     if geometry.pairs is not None:
         return kernel.candidates(arm, task, geometry, single, prefer)
@@ -122,7 +124,7 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
         )
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
-    return elimination.candidates(arm, task, geometry.elimination), elimination.BRANCHES
+    return elimination.candidates(arm, task, geometry.elimination, lanes=lanes), elimination.BRANCHES
 
 
 def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:

@@ -16,84 +16,40 @@ static double arm_apart(const double *a, const double *b)
     return most;
 }
 
-/* Whether a candidate whose vector is no product stands for nothing: its root is simple, or all solutions of it are known, and
-   it is far from the pose. */
-static int arm_stands_for_nothing(const arm_seed *seed, const double *goal, const double *re, const double *im, int size)
+/* Whether a candidate's vector says that it stands for nothing where it is far from the pose: the vector is no product, and its
+   root is simple, or all solutions of it are known. */
+static int arm_may_be_empty(const arm_seed *seed, const double *re, const double *im, int size)
 {
-    const double *q = seed->q;
-    double frame[12], joints[72], error[6];
     const int i = seed->root;
     int j;
+    if (!(seed->defect > ARM_NO_PRODUCT))
+        return 0;
     for (j = 0; j < size && i >= 0; j++) {
         const double a = 1 + re[i] * re[i] + im[i] * im[i], b = 1 + re[j] * re[j] + im[j] * im[j];
         const double x = re[i] - re[j], y = im[i] - im[j];
         if (j != i && !(4 * (x * x + y * y) > ARM_ALONE * ARM_ALONE * a * b))
             return 0;
     }
-    return arm_missing(q, goal, frame, joints, error) > ARM_STRAY;
+    return 1;
 }
 
-/* One pass over a pose: its answers (`found`, from `count` on), and whether the pass leaves it open; *touching: two
-   roots just touch, or just miss each other. */
-static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found, int *count, int *touching)
+/* What a pass makes of its candidates and of what steps brought them to: its answers (`found`, from `count` on), and whether
+   it leaves the pose open; *touching: two roots just touch, or just miss each other. */
+static int arm_judge(const arm_pencil *pencil, int pass, const arm_seed *seed, const arm_answer *done, int seeds,
+    arm_answer *found, int *count, int *touching)
 {
-    const arm_pencil *pencil = &arm_pencils[arm_plan[kind * ARM_PASSES + pass]];
     const double shake = arm_shakes[pass];
-    const int careful = pass > 0, joint = pencil->order[2 + pencil->hidden];
+    const int careful = pass > 0, joint = pencil->order[2 + pencil->hidden], begin = *count;
     const double pair = ARM_PAIRED + 10 * sqrt(shake); /* tilt below which a complex root may be one of two real ones */
-    const int size = pencil->size, lead = pencil->wide ? 16 : 12, c = lead + size, length = ARM_PRODUCTS + ARM_MOST;
-    const int row = size <= 16 ? 16 : ARM_MOST, begin = *count; /* numbers in a row of C */
-    double moved[12], back[12], E[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)], G[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)];
-    double C[ARM_MOST * ARM_MOST];
-    double re[ARM_MOST], im[ARM_MOST], most = 0, weakest = 0, hidden[ARM_MOST];
+    double weakest = 0, hidden[ARM_MOST];
     unsigned char own[ARM_MOST], stands[ARM_MOST], blurred[ARM_MOST], real[ARM_MOST];
-    arm_ends ends;
-    arm_seed seed[ARM_MOST];
-    int i, j, k, seeds, open = 0;
-    arm_times(arm_shaking + 12 * pass, goal, moved);
-    arm_invert(moved, back); /* the pose link closes the loop */
-    if (pencil->backward)
-        for (i = 0; i < 12; i++)
-            back[i] = moved[i];
-    if (!arm_eliminate(pencil, back, &ends))
-        return 1;
-    arm_equations(pencil, back, ends.N, E);
-    for (i = 0; i < lead; i++)
-        for (j = 0; j < length; j++)
-            G[i * length + j] = j < c ? E[i * c + j] : 0;
-    if (!(pencil->wide ? arm_reduce(G, 16, 16, ARM_PRODUCTS + ARM_MOST) : arm_reduce(G, 12, 12, ARM_PRODUCTS + ARM_MOST)))
-        return 1;
-    for (i = 0; i < size * row; i++)
-        C[i] = 0;
-    for (i = 0; i < lead; i++)
-        for (j = 0; j < size; j++) {
-            C[i * row + j] = -G[i * length + lead + j];
-            most = fabs(G[i * length + lead + j]) > most ? fabs(G[i * length + lead + j]) : most;
-        }
-    for (i = 0; i < lead; i++) /* of a singular pencil the rest may vanish on both sides: its pivots tell */
-        open |= !(fabs(G[i * length + i]) > 1e-11);
-    for (i = 0; i < size - lead; i++)
-        C[(lead + i) * row + 2 * pencil->r + i] = 1;
-    if (!(most <= 1e6)) {
-        open = 1;
-        if (!(most < 1e300))
-            return 1;
-    }
-    if (!(row == 16 ? arm_roots_of(C, size, 16, re, im) : arm_roots_of(C, size, ARM_MOST, re, im)))
-        return 1;
-    seeds = arm_seeds(pencil, E, back, &ends, re, im, careful ? ARM_LATER_TILT : ARM_MAIN_TILT,
-        (careful || pencil->wide) && !(pencil->slides[2] || pencil->slides[3] || pencil->slides[4]), seed);
+    int i, j, k, open = 0;
     for (i = 0; i < seeds && *count < ARM_ANSWERS; i++) {
         const double tilt = seed[i].tilt;
         arm_answer *one = &found[*count];
         int good;
-        if (seed[i].defect > ARM_NO_PRODUCT && !(shake > 0) && most < ARM_STEADY
-            && arm_stands_for_nothing(seed + i, goal, re, im, size))
-            continue;
-        for (k = 0; k < 6; k++)
-            one->q[k] = seed[i].q[k];
-        hidden[*count - begin] = one->q[joint];
-        arm_refine(goal, careful ? 12 : 4, careful, one);
+        *one = done[i];
+        hidden[*count - begin] = seed[i].q[joint];
         good = one->residual < (careful ? ARM_GRAZING : ARM_ELIMINATED);
         if (!good && (tilt < ARM_UPRIGHT || (careful ? one->residual < ARM_CLOSE_RESIDUAL
                     && tilt < (pair > ARM_STRAY ? pair : ARM_STRAY) : one->residual < ARM_STRAY)))
@@ -134,6 +90,79 @@ static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found
                 open = 1;
         }
     return open;
+}
+
+/* A pencil at a pose: the pose link, what is known of the end joints, the equations, and their roots; the largest entry of
+   the matrix whose eigenvalues these are, and whether that leaves the pose open. */
+typedef struct {
+    double Y[12], E[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)], re[ARM_MOST], im[ARM_MOST], most;
+    arm_ends ends;
+    int open;
+} arm_solved;
+
+/* The roots of a pencil at a pose; 0 if it is singular. */
+static int arm_solve(const arm_pencil *pencil, const double *goal, int pass, arm_solved *out)
+{
+    const int size = pencil->size, lead = pencil->wide ? 16 : 12, c = lead + size, length = ARM_PRODUCTS + ARM_MOST;
+    const int row = size <= 16 ? 16 : ARM_MOST; /* numbers in a row of C */
+    double moved[12], G[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)], C[ARM_MOST * ARM_MOST], most = 0;
+    int i, j;
+    arm_times(arm_shaking + 12 * pass, goal, moved);
+    arm_invert(moved, out->Y); /* the pose link closes the loop */
+    if (pencil->backward)
+        for (i = 0; i < 12; i++)
+            out->Y[i] = moved[i];
+    if (!arm_eliminate(pencil, out->Y, &out->ends))
+        return 0;
+    arm_equations(pencil, out->Y, out->ends.N, out->E);
+    for (i = 0; i < lead; i++)
+        for (j = 0; j < length; j++)
+            G[i * length + j] = j < c ? out->E[i * c + j] : 0;
+    if (!(pencil->wide ? arm_reduce(G, 16, 16, ARM_PRODUCTS + ARM_MOST) : arm_reduce(G, 12, 12, ARM_PRODUCTS + ARM_MOST)))
+        return 0;
+    for (i = 0; i < size * row; i++)
+        C[i] = 0;
+    for (i = 0; i < lead; i++)
+        for (j = 0; j < size; j++) {
+            C[i * row + j] = -G[i * length + lead + j];
+            most = fabs(G[i * length + lead + j]) > most ? fabs(G[i * length + lead + j]) : most;
+        }
+    for (i = 0; i < size - lead; i++)
+        C[(lead + i) * row + 2 * pencil->r + i] = 1;
+    out->most = most;
+    out->open = !(most <= 1e6);
+    for (i = 0; i < lead; i++) /* of a singular pencil the rest may vanish on both sides: its pivots tell */
+        out->open |= !(fabs(G[i * length + i]) > 1e-11);
+    if (!(most < 1e300))
+        return 0;
+    return row == 16 ? arm_roots_of(C, size, 16, out->re, out->im) : arm_roots_of(C, size, ARM_MOST, out->re, out->im);
+}
+
+/* One pass over a pose: its answers (`found`, from `count` on), and whether the pass leaves it open; *touching: see
+   `arm_judge`. */
+static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found, int *count, int *touching)
+{
+    const arm_pencil *pencil = &arm_pencils[arm_plan[kind * ARM_PASSES + pass]];
+    const int careful = pass > 0;
+    arm_solved of;
+    arm_seed seed[ARM_MOST];
+    arm_answer done[ARM_MOST];
+    int i, k, seeds, kept = 0;
+    if (!arm_solve(pencil, goal, pass, &of))
+        return 1;
+    seeds = arm_seeds(pencil, of.E, of.Y, &of.ends, of.re, of.im, careful ? ARM_LATER_TILT : ARM_MAIN_TILT,
+        (careful || pencil->wide) && !(pencil->slides[2] || pencil->slides[3] || pencil->slides[4]), seed);
+    for (i = 0; i < seeds; i++) {
+        double frame[12], joints[72], error[6];
+        if (!(arm_shakes[pass] > 0) && of.most < ARM_STEADY && arm_may_be_empty(seed + i, of.re, of.im, pencil->size)
+            && arm_missing(seed[i].q, goal, frame, joints, error) > ARM_STRAY)
+            continue;
+        seed[kept] = seed[i];
+        for (k = 0; k < 6; k++)
+            done[kept].q[k] = seed[i].q[k];
+        arm_refine(goal, careful ? 12 : 4, careful, &done[kept++]);
+    }
+    return of.open | arm_judge(pencil, pass, seed, done, kept, found, count, touching);
 }
 
 /* Sort answers by their key and keep one of each set of equal ones; *merged: some were further apart than rounding. */
@@ -187,40 +216,9 @@ static int arm_kind(const double *frame)
     return sine < ARM_BESIDE * ARM_BESIDE ? 1 : apart * apart < ARM_BESIDE * ARM_BESIDE * sine ? 2 : 0;
 }
 
-/* As of a closed form. goal: twelve numbers, columns x, y, z and the position [mm]. doubt: an answer near a
-   singularity, merged answers, touching roots, or a pose that no pass has settled. */
-static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RESTRICT near, double *ARM_RESTRICT q,
-    double *ARM_RESTRICT miss, int *ARM_RESTRICT doubt, int count)
-{
-    double target[12], scaled[12], there[12];
+/* A pose, in the loop's chain, and what passes have found of it. */
+typedef struct {
+    double goal[12];
     arm_answer found[ARM_ANSWERS];
-    int i, j, k, kind, pass, number = 0, open = 1, edge = 0, exact = 0;
-    (void)near;
-    (void)count;
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 4; j++)
-            target[4 * i + j] = goal[3 * j + i] / (j == 3 ? ARM_LENGTH : 1);
-    arm_times(arm_from_base, target, scaled);
-    arm_times(scaled, arm_from_tool, there);
-    kind = arm_kind(there);
-    for (pass = 0; pass < ARM_PASSES && open; pass++) {
-        edge |= arm_shakes[pass] > 0; /* a singular posture may be missing where the target had to be moved */
-        open = arm_attempt(there, kind, pass, found, &number, &edge);
-    }
-    for (i = 0; i < number; i++)
-        exact += found[i].residual < ARM_ELIMINATED;
-    for (i = k = 0; i < number; i++) /* a closest point stands in for answers only where there are none */
-        if (!exact || found[i].residual < ARM_ELIMINATED)
-            found[k++] = found[i];
-    number = arm_merge(there, found, k, &edge);
-    for (i = 0; i < number; i++)
-        edge |= !(found[i].weakness <= 1e4);
-    *doubt = edge || open || number > ARM_BRANCHES;
-    for (i = 0; i < ARM_BRANCHES; i++) {
-        miss[i] = i < number ? 0 : ARM_INFINITY;
-        for (j = 0; j < ARM_JOINTS; j++)
-            q[i * ARM_JOINTS + j] = i < number ? found[i].q[j] * (arm_loop_slides[j] ? ARM_LENGTH : 1) : 0;
-        if (i < number)
-            miss[i] = found[i].residual * found[i].residual * ARM_RESIDUAL;
-    }
-}
+    int kind, number, open, edge;
+} arm_state;

@@ -206,39 +206,65 @@ static int arm_shared(const arm_pencil *pencil, const double *E, const double *Y
     return count < 0 ? -1 : kept;
 }
 
-/* All candidates of a pencil whose roots are (re, im), those with a tilt below `most`; part: roots are taken apart that several
-   solutions share. */
-static int arm_seeds(const arm_pencil *pencil, const double *E, const double *Y, const arm_ends *ends, const double *re,
-    const double *im, double most, int part, arm_seed *out)
+/* Roots that are equal, from `from` to `end` of the order; of those that solutions share, where they may be taken apart:
+   d: how many these are, else 0; mean: their root. */
+typedef struct {
+    int from, end, d;
+    double mean;
+} arm_group;
+
+/* The roots (re, im) of a pencil with a tilt below `most`, in order, by groups; part: equal ones may be taken apart. */
+static int arm_groups(const arm_pencil *pencil, const double *re, const double *im, double most, int part, int *order,
+    double *tilt, arm_group *out)
 {
-    int order[ARM_MOST], i, j, k, roots = 0, count = 0;
-    double angle[ARM_MOST], tilt[ARM_MOST];
+    int i, j, roots = 0, count = 0;
+    double angle[ARM_MOST];
     for (i = 0; i < pencil->size; i++) {
-        angle[i] = 2 * atan(re[i]);
         tilt[i] = 2 * fabs(im[i]) / (1 + re[i] * re[i] + im[i] * im[i]);
         if (!(im[i] >= 0) || !(tilt[i] < most))
             continue;
+        angle[i] = 2 * atan(re[i]);
         for (j = roots++; j > 0 && angle[order[j - 1]] > angle[i]; j--)
             order[j] = order[j - 1];
         order[j] = i;
     }
-    for (i = 0; i < roots; i = j) { /* groups of equal ones */
+    for (i = 0; i < roots; i = j) {
         double mean = 0;
-        int d = 0, found = -1;
+        int d = 0;
         for (j = i; j < roots && (j == i || angle[order[j]] - angle[order[j - 1]] < ARM_EQUAL_ROOTS); j++) {
             const int both = tilt[order[j]] > 0 && tilt[order[j]] < ARM_EQUAL_ROOTS ? 2 : 1; /* rounding made a pair of some */
             d += both;
             mean += both * re[order[j]];
         }
-        if (part && d > 1 && d <= ARM_SHARED && count + d <= ARM_MOST
-            && (i == 0 || angle[order[i]] - angle[order[i - 1]] > ARM_TWIN_ROOTS)
-            && (j == roots || angle[order[j]] - angle[order[j - 1]] > ARM_TWIN_ROOTS))
-            found = arm_shared(pencil, E, Y, ends, mean / d, d, out + count);
+        out[count].from = i;
+        out[count].end = j;
+        out[count].d = part && d > 1 && d <= ARM_SHARED
+                && (i == 0 || angle[order[i]] - angle[order[i - 1]] > ARM_TWIN_ROOTS)
+                && (j == roots || angle[order[j]] - angle[order[j - 1]] > ARM_TWIN_ROOTS)
+            ? d : 0;
+        out[count++].mean = mean / d;
+    }
+    return count;
+}
+
+/* All candidates of a pencil whose roots are (re, im), those with a tilt below `most`; part: roots are taken apart that several
+   solutions share. */
+static int arm_seeds(const arm_pencil *pencil, const double *E, const double *Y, const arm_ends *ends, const double *re,
+    const double *im, double most, int part, arm_seed *out)
+{
+    int order[ARM_MOST], i, k, groups, count = 0;
+    double tilt[ARM_MOST];
+    arm_group group[ARM_MOST];
+    groups = arm_groups(pencil, re, im, most, part, order, tilt, group);
+    for (i = 0; i < groups; i++) {
+        int found = -1;
+        if (group[i].d && count + group[i].d <= ARM_MOST)
+            found = arm_shared(pencil, E, Y, ends, group[i].mean, group[i].d, out + count);
         if (found >= 0) {
             count += found;
             continue;
         }
-        for (k = i; k < j && count < ARM_MOST; k++) {
+        for (k = group[i].from; k < group[i].end && count < ARM_MOST; k++) {
             arm_seed *one = &out[count];
             one->tilt = tilt[order[k]];
             one->root = order[k];
