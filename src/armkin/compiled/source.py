@@ -25,7 +25,7 @@ PARTS = Path(__file__).parent / "parts"
 
 
 LANES = 16  # poses at once: vectors of any length, and blocks of some kilobytes
-EIGHT = 8  # of an elimination: as many as its vectors have
+BLOCK = 8  # poses at once of an elimination: a multiple of its vectors' lanes
 _LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_pass")
 
 
@@ -65,7 +65,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         assert task is not None
         accepted = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
-            accepted, level, fields["lanes"] = elimination.ACCEPTED, 2, str(EIGHT)  # its own criteria have been met
+            accepted, level, fields["lanes"] = elimination.ACCEPTED, 2, str(BLOCK)  # its own criteria have been met
         fields |= _of_task(arm, task, branches, accepted)
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"

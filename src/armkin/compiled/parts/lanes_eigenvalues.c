@@ -1,12 +1,12 @@
 /* Similarity transformations that make rows and columns about equally long, as `arm_balance`. Matrices stand in rows of n + 1. */
-static void arm_balance_lanes(arm_eight *a, int n)
+static void arm_balance_lanes(arm_many *a, int n)
 {
     const int row = n + 1;
     int i, j, done = 0, round;
     for (round = 0; round < 20 && !done; round++) {
         done = 1;
         for (i = 0; i < n; i++) {
-            arm_eight c = arm_all(0), r = arm_all(0), f, over;
+            arm_many c = arm_all(0), r = arm_all(0), f, over;
             arm_flags change;
             for (j = 0; j < n; j++)
                 if (j != i) {
@@ -14,7 +14,7 @@ static void arm_balance_lanes(arm_eight *a, int n)
                     r += arm_size(a[i * row + j]);
                 }
             /* the power of two next to the root of r / c, by its exponent */
-            f = (arm_eight)(((((arm_flags)(r / c)) >> 53) + 512) << 52);
+            f = (arm_many)(((((arm_flags)(r / c)) >> 53) + 512) << 52);
             change = (arm_flags)(c > 0) & (arm_flags)(r > 0) & (arm_flags)(c * f + r / f < 0.95 * (c + r));
             if (!arm_any(change))
                 continue;
@@ -30,13 +30,13 @@ static void arm_balance_lanes(arm_eight *a, int n)
 }
 
 /* To upper Hessenberg form by reflections. */
-static void arm_hessenberg_lanes(arm_eight *a, int n)
+static void arm_hessenberg_lanes(arm_many *a, int n)
 {
     const int row = n + 1;
-    arm_eight v[ARM_MOST];
+    arm_many v[ARM_MOST];
     int i, j, m;
     for (m = 1; m < n - 1; m++) {
-        arm_eight square = arm_all(0), size, first = a[m * row + m - 1], factor;
+        arm_many square = arm_all(0), size, first = a[m * row + m - 1], factor;
         for (i = m; i < n; i++) {
             v[i] = a[i * row + m - 1];
             square += v[i] * v[i];
@@ -48,7 +48,7 @@ static void arm_hessenberg_lanes(arm_eight *a, int n)
         v[m] = first - size;
         a[m * row + m - 1] = size;
         for (j = m; j < n; j++) {
-            arm_eight along = arm_all(0);
+            arm_many along = arm_all(0);
             for (i = m; i < n; i++)
                 along += v[i] * a[i * row + j];
             along *= factor;
@@ -56,7 +56,7 @@ static void arm_hessenberg_lanes(arm_eight *a, int n)
                 a[i * row + j] -= along * v[i];
         }
         for (i = 0; i < n; i++) {
-            arm_eight along = arm_all(0);
+            arm_many along = arm_all(0);
             for (j = m; j < n; j++)
                 along += v[j] * a[i * row + j];
             along *= factor;
@@ -68,22 +68,22 @@ static void arm_hessenberg_lanes(arm_eight *a, int n)
 
 /* One double-shift step of every lane on its own window, from low to last; p, q, r: how it begins there. from, end: all
    windows. Lanes outside theirs are reflected by nothing. */
-static void arm_sweep_lanes(arm_eight *a, int n, arm_eight low, arm_eight last, const arm_eight *begin, int from, int end)
+static void arm_sweep_lanes(arm_many *a, int n, arm_many low, arm_many last, const arm_many *begin, int from, int end)
 {
     const int row = n + 1;
     int i, j, k;
     for (k = from; k < end; k++) {
-        arm_eight *up = a + k * row, *mid = up + row, *under = mid + row, p = begin[0], q = begin[1], r = begin[2];
+        arm_many *up = a + k * row, *mid = up + row, *under = mid + row, p = begin[0], q = begin[1], r = begin[2];
         const arm_flags first = (arm_flags)(low == (double)k), three = (arm_flags)(last > (double)(k + 1));
         arm_flags moves = (arm_flags)(low <= (double)k) & (arm_flags)(last > (double)k), later;
         const int below = k + 3 < end ? k + 3 : end;
-        arm_eight size, over, part, x, y, z;
+        arm_many size, over, part, x, y, z;
         if (k > from) {
             p = arm_pick(first, p, up[k - 1]);
             q = arm_pick(first, q, mid[k - 1]);
             r = arm_pick(first, r, under[k - 1]);
         }
-        r = (arm_eight)((arm_flags)r & three);
+        r = (arm_many)((arm_flags)r & three);
         size = arm_roots(p * p + q * q + r * r);
         moves &= (arm_flags)(size > 0);
         size = arm_pick((arm_flags)(p < 0), -size, size);
@@ -96,20 +96,20 @@ static void arm_sweep_lanes(arm_eight *a, int n, arm_eight low, arm_eight last, 
         p += size;
         over = 1 / size;
         part = 1 / p;
-        x = (arm_eight)((arm_flags)(p * over) & moves);
-        y = (arm_eight)((arm_flags)(q * over) & moves);
-        z = (arm_eight)((arm_flags)(r * over) & moves);
-        q = (arm_eight)((arm_flags)(q * part) & moves);
-        r = (arm_eight)((arm_flags)(r * part) & moves);
+        x = (arm_many)((arm_flags)(p * over) & moves);
+        y = (arm_many)((arm_flags)(q * over) & moves);
+        z = (arm_many)((arm_flags)(r * over) & moves);
+        q = (arm_many)((arm_flags)(q * part) & moves);
+        r = (arm_many)((arm_flags)(r * part) & moves);
         for (j = k; j <= end; j++) {
-            const arm_eight t = up[j] + q * mid[j] + r * under[j];
+            const arm_many t = up[j] + q * mid[j] + r * under[j];
             up[j] -= t * x;
             mid[j] -= t * y;
             under[j] -= t * z;
         }
         for (i = from; i <= below; i++) {
-            arm_eight *c = a + i * row + k;
-            const arm_eight t = x * c[0] + y * c[1] + z * c[2];
+            arm_many *c = a + i * row + k;
+            const arm_many t = x * c[0] + y * c[1] + z * c[2];
             c[0] -= t;
             c[1] -= t * q;
             c[2] -= t * r;
@@ -119,7 +119,7 @@ static void arm_sweep_lanes(arm_eight *a, int n, arm_eight low, arm_eight last, 
 
 /* The roots at the end of one lane's window that stand alone or as a pair, as many as there are: re, im. The last row that is
    left, -1 of none. */
-static int arm_deflate_lane(const arm_eight *a, int n, int t, int last, arm_eight *re, arm_eight *im)
+static int arm_deflate_lane(const arm_many *a, int n, int t, int last, arm_many *re, arm_many *im)
 {
     const int row = n + 1;
 #define ARM_AT(i, j) a[(i) * row + (j)][t]
@@ -150,33 +150,33 @@ static int arm_deflate_lane(const arm_eight *a, int n, int t, int last, arm_eigh
     return last;
 }
 
-/* Eigenvalues of eight upper Hessenberg matrices, as `arm_eigenvalues`: in each lane its own window, shifts and start. Lanes
+/* Eigenvalues of upper Hessenberg matrices, as `arm_eigenvalues`: in each lane its own window, shifts and start. Lanes
    that do not converge are flagged. */
-static arm_flags arm_eigenvalues_lanes(arm_eight *a, int n, arm_eight *re, arm_eight *im)
+static arm_flags arm_eigenvalues_lanes(arm_many *a, int n, arm_many *re, arm_many *im)
 {
     const double rounding = 2.220446049250313e-16;
     const int row = n + 1;
-    arm_eight norm = arm_all(0);
+    arm_many norm = arm_all(0);
     arm_flags failed = {0};
-    int last[ARM_EIGHT], steps[ARM_EIGHT], i, j, k, t;
+    int last[ARM_MANY], steps[ARM_MANY], i, j, k, t;
     for (i = 0; i < n; i++)
         for (j = i > 0 ? i - 1 : 0; j < n; j++)
             norm += arm_size(a[i * row + j]);
-    for (t = 0; t < ARM_EIGHT; t++) {
+    for (t = 0; t < ARM_MANY; t++) {
         last[t] = n - 1;
         steps[t] = 0;
     }
     for (;;) {
-        arm_eight low = arm_all(0), top, begin[3], x = arm_all(0), y = arm_all(0), w = arm_all(0);
+        arm_many low = arm_all(0), top, begin[3], x = arm_all(0), y = arm_all(0), w = arm_all(0);
         int from = n, end = -1;
-        for (t = 0; t < ARM_EIGHT; t++)
+        for (t = 0; t < ARM_MANY; t++)
             end = last[t] > end ? last[t] : end;
         for (k = 1; k <= end; k++) { /* nothing is left below the diagonal */
-            arm_eight *d = a + k * row + k, size = arm_size(d[-row - 1]) + arm_size(d[0]);
+            arm_many *d = a + k * row + k, size = arm_size(d[-row - 1]) + arm_size(d[0]);
             size = arm_pick((arm_flags)(size > 0), size, norm);
-            d[-1] = (arm_eight)((arm_flags)d[-1] & (arm_flags)(arm_size(d[-1]) > rounding * size));
+            d[-1] = (arm_many)((arm_flags)d[-1] & (arm_flags)(arm_size(d[-1]) > rounding * size));
         }
-        for (t = 0, end = -1; t < ARM_EIGHT; t++) {
+        for (t = 0, end = -1; t < ARM_MANY; t++) {
             const int before = last[t];
             last[t] = arm_deflate_lane(a, n, t, before, re, im);
             steps[t] = last[t] < before ? 1 : steps[t] + 1;
@@ -191,7 +191,7 @@ static arm_flags arm_eigenvalues_lanes(arm_eight *a, int n, arm_eight *re, arm_e
             return failed;
         for (k = 1; k < end; k++)
             low = arm_pick((arm_flags)(top > (double)k) & (arm_flags)(a[k * row + k - 1] == 0), arm_all(k), low);
-        for (t = 0; t < ARM_EIGHT; t++) {
+        for (t = 0; t < ARM_MANY; t++) {
             const int l = (int)low[t], m = last[t];
             double z, r, u;
             if (m < 0) {

@@ -1,14 +1,14 @@
 #define ARM_WORTH 3 /* poses whose roots are found in lockstep: fewer are as quick one by one */
 
-/* A candidate of one of eight poses. */
+/* A candidate of one of some poses. */
 typedef struct {
     arm_seed seed;
     double x;
     int lane, known; /* known: joint values have been found */
-} arm_eight_seed;
+} arm_many_seed;
 
 /* What one pass says of lane t. */
-static void arm_read_lane(const arm_pencil *pencil, const arm_eight_poses *of, int t, arm_solved *out)
+static void arm_read_lane(const arm_pencil *pencil, const arm_many_poses *of, int t, arm_solved *out)
 {
     int i;
     for (i = 0; i < pencil->size; i++) {
@@ -20,7 +20,7 @@ static void arm_read_lane(const arm_pencil *pencil, const arm_eight_poses *of, i
 }
 
 /* The equations there, too. */
-static void arm_read_equations(const arm_pencil *pencil, const arm_eight_poses *of, int t, arm_solved *out)
+static void arm_read_equations(const arm_pencil *pencil, const arm_many_poses *of, int t, arm_solved *out)
 {
     const int p = pencil->wide ? 16 : 12;
     int i;
@@ -33,7 +33,7 @@ static void arm_read_equations(const arm_pencil *pencil, const arm_eight_poses *
 }
 
 /* The same the other way round. */
-static void arm_write_lane(const arm_pencil *pencil, const arm_solved *from, int t, arm_eight_poses *of)
+static void arm_write_lane(const arm_pencil *pencil, const arm_solved *from, int t, arm_many_poses *of)
 {
     const int p = pencil->wide ? 16 : 12;
     int i;
@@ -50,8 +50,8 @@ static void arm_write_lane(const arm_pencil *pencil, const arm_solved *from, int
 }
 
 /* Candidates of lane t, of roots `solved`: those that are taken apart are known. */
-static int arm_seeds_of_lane(const arm_pencil *pencil, const arm_eight_poses *of, int t, arm_solved *solved,
-    arm_eight_seed *out)
+static int arm_seeds_of_lane(const arm_pencil *pencil, const arm_many_poses *of, int t, arm_solved *solved,
+    arm_many_seed *out)
 {
     double tilt[ARM_MOST];
     int order[ARM_MOST], i, j, k, groups, count = 0, whole = 0;
@@ -75,7 +75,7 @@ static int arm_seeds_of_lane(const arm_pencil *pencil, const arm_eight_poses *of
             continue;
         }
         for (k = group[i].from; k < group[i].end && count < ARM_MOST; k++) {
-            arm_eight_seed *one = &out[count++];
+            arm_many_seed *one = &out[count++];
             one->seed.tilt = tilt[order[k]];
             one->seed.root = order[k];
             one->x = solved->re[order[k]];
@@ -86,14 +86,14 @@ static int arm_seeds_of_lane(const arm_pencil *pencil, const arm_eight_poses *of
     return count;
 }
 
-/* Up to eight candidates: their joint values, and what steps bring them to. */
-static void arm_chase(const arm_pencil *pencil, const arm_eight_poses *of, arm_eight_seed *seed, arm_answer *done, int count)
+/* Up to ARM_MANY candidates: their joint values, and what steps bring them to. */
+static void arm_chase(const arm_pencil *pencil, const arm_many_poses *of, arm_many_seed *seed, arm_answer *done, int count)
 {
     arm_flags lane;
-    arm_eight x, u[16], v[16], Y[12], goal[12], recover[75], q[6] = {arm_all(0)}, defect = arm_all(0), residual, guess, weakness;
+    arm_many x, u[16], v[16], Y[12], goal[12], recover[75], q[6] = {arm_all(0)}, defect = arm_all(0), residual, guess, weakness;
     int i, k, t, known = 1;
-    for (t = 0; t < ARM_EIGHT; t++) {
-        const arm_eight_seed *one = &seed[t < count ? t : 0];
+    for (t = 0; t < ARM_MANY; t++) {
+        const arm_many_seed *one = &seed[t < count ? t : 0];
         lane[t] = one->lane;
         x[t] = one->known ? 1 : one->x;
         known &= one->known;
@@ -109,8 +109,8 @@ static void arm_chase(const arm_pencil *pencil, const arm_eight_poses *of, arm_e
         arm_vector_lanes(pencil, u, x, v);
         arm_joints_lanes(pencil, v, Y, recover, x, q, &defect);
     }
-    for (t = 0; t < ARM_EIGHT; t++) {
-        arm_eight_seed *one = &seed[t < count ? t : 0];
+    for (t = 0; t < ARM_MANY; t++) {
+        arm_many_seed *one = &seed[t < count ? t : 0];
         for (k = 0; k < 6; k++)
             if (one->known)
                 q[k][t] = one->seed.q[k];
@@ -129,15 +129,15 @@ static void arm_chase(const arm_pencil *pencil, const arm_eight_poses *of, arm_e
     }
 }
 
-/* The first pass over up to eight poses of one kind. */
+/* The first pass over up to ARM_MANY poses of one kind. */
 static void arm_pass_lanes(const arm_pencil *pencil, arm_state **pose, int count)
 {
-    arm_eight_poses of;
-    arm_solved solved[ARM_EIGHT];
-    arm_eight_seed seed[ARM_EIGHT * ARM_MOST];
-    arm_answer done[ARM_EIGHT * ARM_MOST];
-    int i, j, t, seeds = 0, begin[ARM_EIGHT + 1];
-    for (t = 0; t < ARM_EIGHT; t++) {
+    arm_many_poses of;
+    arm_solved solved[ARM_MANY];
+    arm_many_seed seed[ARM_MANY * ARM_MOST];
+    arm_answer done[ARM_MANY * ARM_MOST];
+    int i, j, t, seeds = 0, begin[ARM_MANY + 1];
+    for (t = 0; t < ARM_MANY; t++) {
         const double *goal = pose[t < count ? t : 0]->goal;
         double back[12];
         arm_invert(goal, back); /* the pose link closes the loop */
@@ -162,8 +162,8 @@ static void arm_pass_lanes(const arm_pencil *pencil, arm_state **pose, int count
         seeds += arm_seeds_of_lane(pencil, &of, t, &solved[t], seed + seeds);
     }
     begin[count] = seeds;
-    for (i = 0; i < seeds; i += ARM_EIGHT)
-        arm_chase(pencil, &of, seed + i, done + i, seeds - i < ARM_EIGHT ? seeds - i : ARM_EIGHT);
+    for (i = 0; i < seeds; i += ARM_MANY)
+        arm_chase(pencil, &of, seed + i, done + i, seeds - i < ARM_MANY ? seeds - i : ARM_MANY);
     for (t = 0; t < count; t++) {
         arm_state *one = pose[t];
         arm_seed kept[ARM_MOST];
@@ -189,12 +189,15 @@ static void arm_first_pass(arm_state *state, int count)
 {
     int i, kind;
     for (kind = 0; kind < 3; kind++) {
-        arm_state *pose[ARM_EIGHT];
+        arm_state *pose[ARM_MANY];
         int number = 0;
-        for (i = 0; i < count; i++)
+        for (i = 0; i < count; i++) {
             if (state[i].kind == kind)
                 pose[number++] = &state[i];
-        if (number)
-            arm_pass_lanes(&arm_pencils[arm_plan[kind * ARM_PASSES]], pose, number);
+            if (number == ARM_MANY || (number && i == count - 1)) {
+                arm_pass_lanes(&arm_pencils[arm_plan[kind * ARM_PASSES]], pose, number);
+                number = 0;
+            }
+        }
     }
 }

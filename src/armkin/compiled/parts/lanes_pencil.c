@@ -1,15 +1,15 @@
-/* What one pass says of eight poses: the pose links Y, what removes the end joints and gives them back (as `arm_ends`, rows of
+/* What one pass says of some poses: the pose links Y, what removes the end joints and gives them back (as `arm_ends`, rows of
    fifteen), and the equations; open: of a pose whose pencil is nearly singular, lost: of one that takes the plain way. */
 typedef struct {
-    arm_eight goal[12], Y[12], N[ARM_ROWS * 15], recover[5 * 15], E[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)];
-    arm_eight re[ARM_MOST], im[ARM_MOST], most;
+    arm_many goal[12], Y[12], N[ARM_ROWS * 15], recover[5 * 15], E[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)];
+    arm_many re[ARM_MOST], im[ARM_MOST], most;
     arm_flags open, lost;
-} arm_eight_poses;
+} arm_many_poses;
 
 /* As `arm_rep`, rows of fifteen. */
-static void arm_rep_lanes(const arm_eight *motion, arm_eight *out)
+static void arm_rep_lanes(const arm_many *motion, arm_many *out)
 {
-    arm_eight t[3], tR[3], square;
+    arm_many t[3], tR[3], square;
     int i, j;
     for (i = 0; i < 225; i++)
         out[i] = arm_all(0);
@@ -20,8 +20,8 @@ static void arm_rep_lanes(const arm_eight *motion, arm_eight *out)
         tR[j] = t[0] * motion[j] + t[1] * motion[4 + j] + t[2] * motion[8 + j];
     for (i = 0; i < 3; i++) {
         for (j = 0; j < 3; j++) {
-            const arm_eight R = motion[4 * i + j];
-            const arm_eight across = t[(i + 1) % 3] * motion[4 * ((i + 2) % 3) + j]
+            const arm_many R = motion[4 * i + j];
+            const arm_many across = t[(i + 1) % 3] * motion[4 * ((i + 2) % 3) + j]
                 - t[(i + 2) % 3] * motion[4 * ((i + 1) % 3) + j];
             out[15 * i + j] = out[15 * (3 + i) + 3 + j] = out[15 * (8 + i) + 8 + j] = out[15 * (11 + i) + 11 + j] = R;
             out[15 * (8 + i) + 3 + j] = across;
@@ -38,10 +38,10 @@ static void arm_rep_lanes(const arm_eight *motion, arm_eight *out)
 }
 
 /* As `arm_features`. */
-static void arm_features_lanes(const arm_eight *frame, arm_eight *out)
+static void arm_features_lanes(const arm_many *frame, arm_many *out)
 {
-    const arm_eight p[3] = {frame[3], frame[7], frame[11]}, l[3] = {frame[2], frame[6], frame[10]};
-    const arm_eight square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2], along = p[0] * l[0] + p[1] * l[1] + p[2] * l[2];
+    const arm_many p[3] = {frame[3], frame[7], frame[11]}, l[3] = {frame[2], frame[6], frame[10]};
+    const arm_many square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2], along = p[0] * l[0] + p[1] * l[1] + p[2] * l[2];
     int i;
     for (i = 0; i < 3; i++) {
         out[i] = p[i];
@@ -55,17 +55,17 @@ static void arm_features_lanes(const arm_eight *frame, arm_eight *out)
 }
 
 /* As `arm_eliminate`. */
-static void arm_eliminate_lanes(const arm_pencil *pencil, arm_eight_poses *of)
+static void arm_eliminate_lanes(const arm_pencil *pencil, arm_many_poses *of)
 {
     static const unsigned char first[9] = {1, 1, 2, 2, 0, 1, 2, 0, 0}, second[9] = {1, 2, 1, 2, 0, 0, 0, 1, 2};
-    arm_eight back[12], a[15 * 24];
+    arm_many back[12], a[15 * 24];
     int i, j, k;
     if (pencil->slot == 1) {
-        arm_eight R[225];
+        arm_many R[225];
         arm_rep_lanes(of->Y, R);
         for (i = 0; i < pencil->rows; i++)
             for (j = 0; j < 15; j++) {
-                arm_eight sum = arm_all(0);
+                arm_many sum = arm_all(0);
                 for (k = 0; k < 15; k++)
                     sum += pencil->N[16 * i + k] * R[15 * k + j];
                 of->N[15 * i + j] = sum;
@@ -83,18 +83,18 @@ static void arm_eliminate_lanes(const arm_pencil *pencil, arm_eight_poses *of)
     for (i = 0; i < 15 * 24; i++)
         a[i] = arm_all(i % 24 == 9 + i / 24 ? 1 : 0);
     if (pencil->slot == 5) {
-        arm_eight f[15];
+        arm_many f[15];
         arm_features_lanes(back, f);
         for (k = 0; k < 15; k++)
             for (j = 0; j < 9; j++)
                 for (i = 0; i < 15; i++)
                     a[24 * i + j] += f[k] * pencil->first[9 * 16 * k + 16 * j + i];
     } else {
-        arm_eight R[225], turned[15 * 3];
+        arm_many R[225], turned[15 * 3];
         arm_rep_lanes(back, R);
         for (i = 0; i < 15; i++)
             for (j = 0; j < 3; j++) {
-                arm_eight sum = arm_all(0);
+                arm_many sum = arm_all(0);
                 for (k = 0; k < 15; k++)
                     sum += R[15 * i + k] * pencil->second[4 * k + j];
                 turned[3 * i + j] = sum;
@@ -118,14 +118,14 @@ static void arm_eliminate_lanes(const arm_pencil *pencil, arm_eight_poses *of)
 }
 
 /* As `arm_equations`, of N that is moved. */
-static void arm_equations_lanes(const arm_pencil *pencil, arm_eight_poses *of)
+static void arm_equations_lanes(const arm_pencil *pencil, arm_many_poses *of)
 {
     const int m = pencil->rows, p = pencil->wide ? 16 : 12, factors = pencil->wide ? 4 : 2, c = p + pencil->size;
     const int width = factors * c;
-    arm_eight mixed[ARM_ROWS * ARM_WIDTH], *rows = pencil->mix ? mixed : of->E;
+    arm_many mixed[ARM_ROWS * ARM_WIDTH], *rows = pencil->mix ? mixed : of->E;
     int i, j, k;
     for (j = 0; j < width; j++) {
-        arm_eight sum[ARM_ROWS];
+        arm_many sum[ARM_ROWS];
         for (i = 0; i < ARM_ROWS; i++)
             sum[i] = arm_all(0);
         for (k = 0; k < 15; k++) {
@@ -149,11 +149,11 @@ static void arm_equations_lanes(const arm_pencil *pencil, arm_eight_poses *of)
         }
 }
 
-/* The roots of eight poses' pencils. */
-static void arm_roots_lanes(const arm_pencil *pencil, arm_eight_poses *of)
+/* The roots of some poses' pencils. */
+static void arm_roots_lanes(const arm_pencil *pencil, arm_many_poses *of)
 {
     const int size = pencil->size, p = pencil->wide ? 16 : 12, c = p + size, row = size + 1;
-    arm_eight G[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)], C[(ARM_MOST + 1) * (ARM_MOST + 1)];
+    arm_many G[ARM_PRODUCTS * (ARM_PRODUCTS + ARM_MOST)], C[(ARM_MOST + 1) * (ARM_MOST + 1)];
     int i, j;
     arm_eliminate_lanes(pencil, of);
     arm_equations_lanes(pencil, of);
@@ -169,7 +169,7 @@ static void arm_roots_lanes(const arm_pencil *pencil, arm_eight_poses *of)
     of->most = arm_all(0);
     for (i = 0; i < p; i++)
         for (j = 0; j < size; j++) {
-            const arm_eight one = arm_size(G[i * c + p + j]);
+            const arm_many one = arm_size(G[i * c + p + j]);
             C[i * row + j] = -G[i * c + p + j];
             of->most = arm_pick((arm_flags)(one <= of->most), of->most, one);
         }
@@ -178,7 +178,7 @@ static void arm_roots_lanes(const arm_pencil *pencil, arm_eight_poses *of)
     of->lost = ~(arm_flags)(of->most < 1e300);
     of->open |= ~(arm_flags)(of->most <= 1e6);
     for (i = 0; i < row * row; i++) /* no lane keeps others waiting */
-        C[i] = (arm_eight)((arm_flags)C[i] & ~of->lost);
+        C[i] = (arm_many)((arm_flags)C[i] & ~of->lost);
     arm_balance_lanes(C, size);
     arm_hessenberg_lanes(C, size);
     of->lost |= arm_eigenvalues_lanes(C, size, of->re, of->im);

@@ -1,27 +1,27 @@
 /* What the equations E at x take to zero, n numbers: as `arm_null_vector` of `arm_system_at`, by inverse iteration on R^T R of
    A = Q R. */
-static void arm_null_lanes(const arm_pencil *pencil, const arm_eight *E, arm_flags lane, arm_eight x, arm_eight *v)
+static void arm_null_lanes(const arm_pencil *pencil, const arm_many *E, arm_flags lane, arm_many x, arm_many *v)
 {
     const int r = pencil->r, w = pencil->w, n = pencil->wide ? 16 : 12, c = n + pencil->size;
     const arm_flags far = (arm_flags)(arm_size(x) > 1);
-    const arm_eight y = arm_pick(far, 1 / x, x);
-    arm_eight A[256], size = arm_all(0);
+    const arm_many y = arm_pick(far, 1 / x, x);
+    arm_many A[256], size = arm_all(0);
     int i, j, k;
     for (i = 0; i < n; i++) {
-        const arm_eight *e = E + i * c;
+        const arm_many *e = E + i * c;
         for (j = 0; j < 2 * r; j++) {
-            const arm_eight one = arm_take(e[j], lane), none = arm_take(e[n + j], lane);
+            const arm_many one = arm_take(e[j], lane), none = arm_take(e[n + j], lane);
             A[n * i + j] = arm_pick(far, one, none) + arm_pick(far, none, one) * y;
         }
         for (j = 0; j < w; j++) {
-            const arm_eight two = arm_take(e[2 * r + j], lane), one = arm_take(e[n + 2 * r + j], lane);
-            const arm_eight none = arm_take(e[n + 2 * r + w + j], lane);
+            const arm_many two = arm_take(e[2 * r + j], lane), one = arm_take(e[n + 2 * r + j], lane);
+            const arm_many none = arm_take(e[n + 2 * r + w + j], lane);
             A[n * i + 2 * r + j] = (arm_pick(far, none, two) * y + one) * y + arm_pick(far, two, none);
         }
     }
     arm_triangle_lanes(A, n, n, n);
     for (i = 0; i < n; i++) {
-        const arm_eight d = A[n * i + i];
+        const arm_many d = A[n * i + i];
         A[n * i + i] = arm_pick((arm_flags)(arm_size(d) > 1e-14), d, arm_all(1e-14));
         v[i] = arm_all(1.0 + 0.37 * i - 0.11 * i * i);
     }
@@ -45,15 +45,15 @@ static void arm_null_lanes(const arm_pencil *pencil, const arm_eight *E, arm_fla
 }
 
 /* As `arm_vector`. */
-static void arm_vector_lanes(const arm_pencil *pencil, const arm_eight *u, arm_eight x, arm_eight *v)
+static void arm_vector_lanes(const arm_pencil *pencil, const arm_many *u, arm_many x, arm_many *v)
 {
     const int r = pencil->r, w = pencil->w, p = pencil->wide ? 16 : 12;
-    const arm_eight scale = arm_pick((arm_flags)(arm_size(x) > 1), x, arm_all(1)) / (1 + x * x);
+    const arm_many scale = arm_pick((arm_flags)(arm_size(x) > 1), x, arm_all(1)) / (1 + x * x);
     int i, j;
     for (i = 0; i < p; i++) {
         v[i] = arm_all(0);
         for (j = 0; j < r; j++) {
-            const arm_eight a1 = u[j] * scale, a2 = u[r + j] * scale;
+            const arm_many a1 = u[j] * scale, a2 = u[r + j] * scale;
             v[i] += (a1 * x + a2) * pencil->K_re[i * r + j] - (a1 - a2 * x) * pencil->K_im[i * r + j];
         }
         for (j = 0; j < w; j++)
@@ -62,22 +62,22 @@ static void arm_vector_lanes(const arm_pencil *pencil, const arm_eight *u, arm_e
 }
 
 /* (cos 3f, sin 3f, cos f, sin f) of f = q / 2. */
-static void arm_half_lanes(arm_eight q, arm_eight *out)
+static void arm_half_lanes(arm_many q, arm_many *out)
 {
     arm_turn_lanes(1.5 * q, &out[0], &out[1]);
     arm_turn_lanes(0.5 * q, &out[2], &out[3]);
 }
 
 /* As `arm_joints_from`, of loops without slides. */
-static void arm_joints_lanes(const arm_pencil *pencil, const arm_eight *v, const arm_eight *Y, const arm_eight *recover,
-    arm_eight x, arm_eight *q, arm_eight *defect)
+static void arm_joints_lanes(const arm_pencil *pencil, const arm_many *v, const arm_many *Y, const arm_many *recover,
+    arm_many x, arm_many *q, arm_many *defect)
 {
     const int three = pencil->wide ? 4 : 3, third = 3 - pencil->hidden - pencil->dialytic;
-    arm_eight middle[3], link[72], a[12], b[12], f[15], m[5], part[6], cosine[3], sine[3], first[4], second[4], row[4];
-    arm_eight high = arm_all(0), low = arm_all(0), most = arm_all(-1), whole = arm_all(0), along = arm_all(0), sign;
+    arm_many middle[3], link[72], a[12], b[12], f[15], m[5], part[6], cosine[3], sine[3], first[4], second[4], row[4];
+    arm_many high = arm_all(0), low = arm_all(0), most = arm_all(-1), whole = arm_all(0), along = arm_all(0), sign;
     int i, j, k;
     for (i = 0; i < 4; i++) {
-        arm_eight size = arm_all(0);
+        arm_many size = arm_all(0);
         arm_flags better;
         for (j = 0; j < three; j++)
             size += v[three * i + j] * v[three * i + j];
@@ -89,7 +89,7 @@ static void arm_joints_lanes(const arm_pencil *pencil, const arm_eight *v, const
     }
     most = arm_all(-1);
     for (j = 0; j < three; j++) {
-        arm_eight size = arm_all(0);
+        arm_many size = arm_all(0);
         arm_flags better;
         for (i = 0; i < 4; i++)
             size += v[three * i + j] * v[three * i + j];
@@ -137,7 +137,7 @@ static void arm_joints_lanes(const arm_pencil *pencil, const arm_eight *v, const
     for (k = 0; k < 2; k++)
         arm_turn_lanes(part[k], &cosine[k], &sine[k]);
     {
-        arm_eight before[12], step[12], across = arm_all(0);
+        arm_many before[12], step[12], across = arm_all(0);
         arm_move_lanes(link + 60, cosine[0], sine[0], step);
         arm_times_lanes(step, link, before);
         arm_move_lanes(before, cosine[1], sine[1], step);
@@ -155,10 +155,10 @@ static void arm_joints_lanes(const arm_pencil *pencil, const arm_eight *v, const
 }
 
 /* As `arm_missing`. */
-static arm_eight arm_missing_lanes(const arm_eight *q, const arm_eight *goal, arm_eight *frame, arm_eight *joints,
-    arm_eight *error)
+static arm_many arm_missing_lanes(const arm_many *q, const arm_many *goal, arm_many *frame, arm_many *joints,
+    arm_many *error)
 {
-    arm_eight moved[12], cosine, sine, square = arm_all(0);
+    arm_many moved[12], cosine, sine, square = arm_all(0);
     int i, j, k;
     for (i = 0; i < 12; i++)
         frame[i] = arm_all(i % 5 == 0 ? 1 : 0);
@@ -185,12 +185,12 @@ static arm_eight arm_missing_lanes(const arm_eight *q, const arm_eight *goal, ar
 }
 
 /* The inverse of the Jacobian; its norm. */
-static arm_eight arm_inverse_lanes(const arm_eight *frame, const arm_eight *joints, arm_eight *inverse)
+static arm_many arm_inverse_lanes(const arm_many *frame, const arm_many *joints, arm_many *inverse)
 {
-    arm_eight system[72], norm = arm_all(0);
+    arm_many system[72], norm = arm_all(0);
     int i, j, k;
     for (k = 0; k < 6; k++) {
-        const arm_eight *f = joints + 12 * k;
+        const arm_many *f = joints + 12 * k;
         for (i = 0; i < 3; i++) {
             const int x = (i + 1) % 3, y = (i + 2) % 3;
             system[12 * i + k] = f[4 * x + 2] * (frame[4 * y + 3] - f[4 * y + 3])
@@ -213,10 +213,10 @@ static arm_eight arm_inverse_lanes(const arm_eight *frame, const arm_eight *join
 }
 
 /* As `arm_refine` without damping: the best points met, what they and the first ones miss, how weak the arm is there. */
-static void arm_refine_lanes(const arm_eight *goal, int steps, arm_eight *q, arm_eight *residual, arm_eight *guess,
-    arm_eight *weakness)
+static void arm_refine_lanes(const arm_many *goal, int steps, arm_many *q, arm_many *residual, arm_many *guess,
+    arm_many *weakness)
 {
-    arm_eight at[6], inverse[36], last = arm_all(0);
+    arm_many at[6], inverse[36], last = arm_all(0);
     arm_flags goes = ~(arm_flags){0};
     int i, j, step;
     for (i = 0; i < 6; i++)
@@ -225,8 +225,8 @@ static void arm_refine_lanes(const arm_eight *goal, int steps, arm_eight *q, arm
         inverse[i] = arm_all(0);
     *residual = *weakness = arm_all(ARM_INFINITY);
     for (step = 0; arm_any(goes); step++) {
-        arm_eight frame[12], joints[72], error[6], move[6], longest = arm_all(0);
-        const arm_eight size = arm_missing_lanes(at, goal, frame, joints, error);
+        arm_many frame[12], joints[72], error[6], move[6], longest = arm_all(0);
+        const arm_many size = arm_missing_lanes(at, goal, frame, joints, error);
         const arm_flags better = goes & (arm_flags)(size < *residual);
         arm_flags fresh = goes;
         if (step == 0)
@@ -237,7 +237,7 @@ static void arm_refine_lanes(const arm_eight *goal, int steps, arm_eight *q, arm
         for (i = 0; i < 6; i++)
             q[i] = arm_pick(better, at[i], q[i]);
         if (arm_any(fresh)) {
-            arm_eight found[36];
+            arm_many found[36];
             *weakness = arm_pick(fresh, arm_inverse_lanes(frame, joints, found), *weakness);
             for (i = 0; i < 36; i++)
                 inverse[i] = arm_pick(fresh, found[i], inverse[i]);

@@ -107,7 +107,7 @@ def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PAS
     ]
     first = part("first_pass")
     if lanes and not loop.prismatic.any():
-        first = f"#ifdef __GNUC__ /* or another compiler with its vectors */\n{lanes}#else\n{first}#endif\n"
+        first = f"#ifdef ARM_MANY\n{lanes}#else\n{first}#endif\n"
     text = part("pencil") + "\n".join(lines) + "\n" + "".join(map(part, _METHOD)) + first + part("candidates")
     if task.orientation == "axis":
         text = text.replace("arm_candidates", "arm_six_candidates") + _with_virtual_joint()
