@@ -233,7 +233,7 @@ class _Groups:
         on: Bool = np.asarray(self.at.sure.any(axis=2))
         with np.errstate(invalid="ignore"):
             away = newton.wrapped_distance(self.goals.arm, self.at.q[:, :, None], self.at.q[:, None])
-        close = (away < CLOSE_BY) & (valid & ~on)[:, None] & ~np.eye(valid.shape[1], dtype=bool)
+        close: Bool = (away < CLOSE_BY) & (valid & ~on)[:, None] & ~np.eye(valid.shape[1], dtype=bool)
         weak = valid & (sigma < FOLDED) & ~on
         told = weak & self.known & ~self.moves
         other = weak & ~(told & (sigma >= SOLUTION))  # may be on a self-motion

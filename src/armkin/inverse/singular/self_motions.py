@@ -107,48 +107,52 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
     curve: (K, M, n) the joints that a posture's self-motion moves. One group's posture may be close to another's;
     where a self-motion consists of double roots, known to the root of rounding, its postures were taken for many.
     """
-    unit = radian_or_reach(arm)
     moving = np.asarray(curve.any(axis=2))
     moving[:, 0] = True  # `near`, the first: nothing is said to move where three directions are lost at once
-    for k in np.flatnonzero((chosen & moving).sum(axis=1) > 1):
-        kept: list[int] = []
-        for i in np.flatnonzero(chosen[k] & moving[k]):
-            apart = newton.difference(arm, q[k, kept], q[k, i])
-            close = np.abs(apart).max(axis=1, initial=0.0) < BESIDE
-            between = q[k, i] + 0.5 * apart[close] * unit
-            there = np.repeat(target[k : k + 1], len(between), axis=0)
-            # one kept may be where its own self-motion and this one meet
-            turned = np.where(curve[k, i], 0.0, np.abs(apart)).max(axis=1, initial=0.0)
-            held = (turned < TURNED) & ((np.abs(apart) > TURNED).sum(axis=1) <= ALONG)
-            # a joint may move too slowly at one of the two alone to be called free there
-            theirs = np.where(curve[k, kept], 0.0, np.abs(apart)).max(axis=1, initial=0.0)
-            slow = ~held & (np.maximum(turned, theirs) > TURNED) & (np.maximum(turned, theirs) < DRIFT)
-            held |= np.array(kept, dtype=int) == 0  # `near` stands for all that meet there
-            if (
-                (newton.missing(arm, task, between, there) <= SOLUTION).any()
-                or any(_straight(arm, task, q[k, i], d, target[k]) for d in apart[held])
-                or any(
-                    _round(arm, task, q[k, i], curve[k, i] | (np.abs(d) > SAME), q[k, i] + d * unit, target[k])
-                    for d in apart[slow]
-                )
-            ):
-                chosen[k, i] = False
-            else:
-                kept.append(int(i))
+    some = chosen & moving
+    pairs = some[:, :, None] & some[:, None] & np.tri(q.shape[1], k=-1, dtype=bool)
+    k, i, j = np.nonzero(pairs)
+    if not len(k):
+        return
+    at, apart, unit = q[k, i], newton.difference(arm, q[k, j], q[k, i]), radian_or_reach(arm)
+    same, size = np.zeros(len(k), bool), np.abs(apart)
+    # one may be where its own self-motion and the other meet
+    turned = np.where(curve[k, i], 0.0, size).max(axis=1)
+    held = (turned < TURNED) & ((size > TURNED).sum(axis=1) <= ALONG)
+    # a joint may move too slowly at one of the two alone to be called free there
+    most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
+    slow = ~held & (most > TURNED) & (most < DRIFT)
+    held |= j == 0  # `near` stands for all that meet there
+    close = np.flatnonzero(size.max(axis=1) < BESIDE)
+    between = at[close] + 0.5 * apart[close] * unit
+    same[close] = newton.missing(arm, task, between, target[k[close]]) <= SOLUTION
+    some = np.flatnonzero(held & ~same)
+    same[some] = _straight(arm, task, at[some], apart[some], target[k[some]])
+    for p in np.flatnonzero(slow & ~same):
+        joints = curve[k[p], i[p]] | (size[p] > SAME)
+        same[p] = _round(arm, task, at[p], joints, at[p] + apart[p] * unit, target[k[p]])
+    for row, one, other in zip(k[same], i[same], j[same], strict=True):
+        chosen[row, one] &= not chosen[row, other]
 
 
-def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> bool:
-    """Whether the joints can move from q (n,) to q + way while they keep the target, each at a constant pace.
+def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool:
+    """Whether the joints can move from q (M, n) to q + way while they keep the target, each at a constant pace: (M,).
 
     A quarter, half and three quarters of the way are asked, each way round for joints that turn by 180 degrees. They
     may be off by as much as roots of high order are.
     """
-    steps = (np.array([0.25, 0.5, 0.75])[:, None, None] * _both_ways(arm, way)).reshape(-1, arm.n)
-    start = q + steps * radian_or_reach(arm)
-    there, size = newton.correct(arm, task, start, np.repeat(target[None], len(start), axis=0), steps=3, least=WEAK)
-    off = np.abs(newton.difference(arm, there, start)).max(axis=1)
+    out = np.zeros(len(q), bool)
+    if not len(q):
+        return out
+    ways = [_both_ways(arm, one) for one in way]
+    who = np.repeat(np.arange(len(q)), [len(each) for each in ways])
+    start = q[who] + np.array([0.25, 0.5, 0.75])[:, None, None] * np.concatenate(ways) * radian_or_reach(arm)
+    goal = np.concatenate([target[who]] * 3)
+    there, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=3, least=WEAK)
+    off = np.abs(newton.difference(arm, there, start.reshape(-1, arm.n))).max(axis=1)
     good = (size <= SOLUTION) & (off < 10 * TURNED)
-    return bool(good.reshape(3, -1).all(axis=0).any())
+    out[who[good.reshape(3, -1).all(axis=0)]] = True
+    return out
 
 
 def _round(arm: Arm, task: Task, q: Array, joints: Bool, other: Array, target: Array) -> bool:
