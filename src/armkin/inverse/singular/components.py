@@ -233,14 +233,15 @@ class _Groups:
         on: Bool = np.asarray(self.at.sure.any(axis=2))
         with np.errstate(invalid="ignore"):
             away = newton.wrapped_distance(self.goals.arm, self.at.q[:, :, None], self.at.q[:, None])
-        close: Bool = (away < CLOSE_BY) & (valid & ~on)[:, None] & ~np.eye(valid.shape[1], dtype=bool)
+        others: Bool = ~np.eye(valid.shape[1], dtype=bool)
+        close: Bool = np.asarray((away < CLOSE_BY) & (valid & ~on)[:, None] & others)
         weak = valid & (sigma < FOLDED) & ~on
         told = weak & self.known & ~self.moves
         other = weak & ~(told & (sigma >= SOLUTION))  # may be on a self-motion
-        one = self.component[self.place] & told[:, :, None] & valid[:, None] & ~np.eye(valid.shape[1], dtype=bool)
+        one: Bool = self.component[self.place] & told[:, :, None] & valid[:, None] & others
         told &= (one == one.swapaxes(1, 2)).all(axis=2) & ~(close & ~told[:, None]).any(axis=2)
         told &= (one.sum(axis=2) < 2) & ~one[:, :, 0]
-        told &= ~((weak & self.moves).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[:, None]
+        told &= ~np.asarray((weak & self.moves).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[:, None]
         told &= (~one | told[:, None]).all(axis=2)
         alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
         before = np.tri(valid.shape[1], k=-1, dtype=bool)

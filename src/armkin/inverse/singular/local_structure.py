@@ -107,7 +107,8 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
         some = left[on]
         out.x[:, some], out.g[:, some] = x[:, on], g[:, on]
         _decide(out, some)
-        left = left[~out.known[left]]
+        # where two directions are all but lost no shorter curve stays at hand
+        left = left[~out.known[left] & (out.second[left] > CLEAR)]
         if not len(left):
             break
         out.span[left] /= SHRINK

@@ -126,8 +126,8 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
     close = np.flatnonzero(size.max(axis=1) < BESIDE)
     between = at[close] + 0.5 * apart[close] * unit
     same[close] = newton.missing(arm, task, between, target[k[close]]) <= SOLUTION
-    some = np.flatnonzero(held & ~same)
-    same[some] = _straight(arm, task, at[some], apart[some], target[k[some]])
+    open_ = np.flatnonzero(held & ~same)
+    same[open_] = _straight(arm, task, at[open_], apart[open_], target[k[open_]])
     for p in np.flatnonzero(slow & ~same):
         joints = curve[k[p], i[p]] | (size[p] > SAME)
         same[p] = _round(arm, task, at[p], joints, at[p] + apart[p] * unit, target[k[p]])
