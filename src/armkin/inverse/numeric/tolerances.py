@@ -33,7 +33,6 @@ WEAK = 1e-6  # smallest singular value below which a branch may be part of a sel
 FOLDED = 4.5e-4  # and from which on no component holds a turning point: s^2 = 2 SOLUTION times a curvature of 100
 MOVING = 3e-8  # and below which it is asked whether it is
 DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
-CLUSTER = 0.02  # candidates this close may be one root of third or fourth order
 
 # ---- closed forms, relative to the equation's own size
 TANGENT = 1e-7  # discriminant below which the posture between two roots may solve the target: 3e-4 rad to each

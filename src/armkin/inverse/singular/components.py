@@ -380,9 +380,6 @@ def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool, B
     own[:, 0] = True
     free = np.flatnonzero(~(own.ravel() | sure.reshape(-1, n).any(axis=1) | (size < CLOSED)))
     if len(free):
-        mean = np.concatenate([near[:, None], roots.means(arm, q[:, 1:])], axis=1).reshape(-1, n)[free]
-        better = newton.missing(arm, task, mean, goal[free]) < size[free]
-        flat[free[better]] = mean[better]
         some = free[size[free] < most]
         far = some[size[some] > SOLUTION]
         beyond[far] = beyond_folds(arm, task, flat[far], goal[far])

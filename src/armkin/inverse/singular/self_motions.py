@@ -63,10 +63,6 @@ def drop_contained(
         for i in np.flatnonzero(chosen[k] & (sigma[k] < HIGH) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
             pairs += [(int(k), int(i), int(j)) for j in mine[(away < CLOSE_BY) & few]]
-            if sigma[k, i] < WEAK and i:
-                one = bool((away[few] < 10 * TURNED).any())
-                on = (_round(arm, task, q[k, j], curve[k, j], q[k, i], target[k]) for j in mine[(away < TURNED) & ~few])
-                chosen[k, i] = not (one or any(on))
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]
