@@ -204,6 +204,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "inverse/test_equal_roots.py": ("test_round_postures_that_share_a_joint_are_complete",),
     "inverse/test_every_branch.py": (),
     "inverse/test_exact_postures.py": (),
+    "inverse/test_constants.py": ("test_no_word_hangs_on_the_others",),
     "inverse/test_families.py": (
         "test_a_nearly_stretched_arm_has_its_short_families",
         "test_a_row_is_the_posture_of_its_interval_nearest_to_near",

@@ -5,34 +5,41 @@ Those that say which targets are read and which task fits stand in `armkin.inver
 Lengths are in units of the arm's reach, angles in rad, unless a line says otherwise.
 """
 
-# ---- what a solution is
+# ---- what decides a word: docs/solution.md, "Constants", derives each, and no other does
 SOLUTION = 1e-9  # residual up to which joint values solve a target
 REACH = 0.1  # [rad, reaches] a component along which a joint moves by this or more is a self-motion manifold
-ACCEPTED = 2.5e-13  # residual of a closed form's candidate that needs no correction
+ERROR = 1e-13  # residual that rounding leaves: some hundred operations on numbers of the reach's size
+CURVATURE = 100.0  # [1/rad, 1/reach] of the sharpest fold
+WEAK = 1e-6  # singular value below which a direction is lost
+HIGH = 1e-4  # smallest one of a posture 1e-9 of the reach off a root of third order, or closer
+
+# ---- what follows from these
+SAME = ERROR / WEAK  # distance of joint values that rounding explains
+THERE = SOLUTION / 100.0  # [rad, reaches] a branch this close to `near` is there: `near` solves the target, too
+TURNED = SOLUTION / HIGH  # joints that a self-motion holds differ by less along it
+MOVED = SOLUTION / WEAK  # of the way: a joint that moves less along a component does not move
+DRIFT = 2.0 * MOVED  # joints that move along a self-motion, but too slowly to be called free
+ACCEPTED = 2.5 * ERROR  # residual of a closed form's candidate that needs no correction
+CLOSED = 10.0 * ERROR  # of a branch on an edge that needs none; growth of a residual that is rounding
+EQUAL_RESIDUALS = 0.1 * ERROR  # residuals below this are equal
+DOUBLE = ERROR**0.5  # singular value below which a root may be double: arithmetic cannot tell its two halves apart
+DOUBLE_ROOT = ERROR**0.25  # [rad] how far rounding parts candidates at most: those of a root of fourth order
+FOLDED = (2.0 * SOLUTION * CURVATURE) ** 0.5  # smallest singular value from which on no component holds a turning point
+MOVING = 2.0 * SOLUTION / REACH  # and below which it is asked whether joints can move
+GROWTH = SOLUTION / REACH  # residual a radian along a self-motion
+CLOSE_BY = REACH / 2.0  # branches this close are one if the posture between them solves the target, too
+BESIDE = 2.0 * REACH  # postures of self-motions this close are asked whether they are one
+
+# ---- what is worth correcting
 NEARBY = 1e-6  # residual up to which a closed form's candidate is worth correcting
 SEED = 1e-3  # residual up to which a candidate of a doubted target is
 HOPELESS = 0.3  # residual of a seed from which nothing is corrected any more
-
-# ---- when two are one
-SAME = 1e-7  # distance of joint values that rounding explains
-CLOSE_BY = 0.05  # branches this close are one if the posture between them solves the target, too
-BESIDE = 0.2  # postures of self-motions this close are asked whether they are one
-TURNED = 1e-5  # joints that a self-motion holds differ by less along it
-DRIFT = 2e-3  # and those that it moves, but too slowly to be called free
-THERE = 1e-11  # [rad, reaches] a branch this close to `near` is there: `near` solves the target, too
 EQUAL = 6  # decimals [deg | mm] of motions that count: rounding does not choose between equal ones
 
 # ---- position first: minima of the rotation angle at a position
 STATIONARY = 1e-10  # slope of 1 - cos(angle) [1/rad, 1/reach] at a minimum
 LEVEL_CURVATURE = 1e-6  # its curvature below which a minimum may be one of a curve of such
 ONE_MINIMUM = 1e-6  # [rad, reaches] minima this close, in angle and joints, are one
-
-# ---- how singular
-HIGH = 1e-4  # smallest singular value of a posture 1e-9 of the reach off a root of third order, or closer
-WEAK = 1e-6  # smallest singular value below which a branch may be part of a self-motion
-FOLDED = 4.5e-4  # and from which on no component holds a turning point: s^2 = 2 SOLUTION times a curvature of 100
-MOVING = 3e-8  # and below which it is asked whether it is
-DOUBLE = 3e-7  # and below which it counts as a double root: arithmetic cannot tell its two halves apart
 
 # ---- closed forms, relative to the equation's own size
 TANGENT = 1e-7  # discriminant below which the posture between two roots may solve the target: 3e-4 rad to each
@@ -111,9 +118,6 @@ NO_BLOCK = 1e-10  # determinant of a block of it that loses a direction
 NOISE = 1e-13  # relative size of noise that makes a matrix regular
 LEFT_OUT = 1e-10  # singular value that a step of least norm leaves out
 CONVERGING = 1e-11  # residual below which a step has to halve it
-MOVED = 1e-3  # of the way: a joint that moves less along a component does not move
-DOUBLE_ROOT = 3e-4  # [rad] how far rounding parts a candidate from its root at most
-ROOT_ROUNDING = 1e-13  # that way times the smallest singular value
 DECIMAL = 4e-16  # relative distance of a number from a decimal one that it is printed as
 FLOAT32 = 2.0**-24  # of a number in single precision: half a unit of its last place
 FEW_DIGITS = 1e-4  # entry of a rounded rotation below which it does not tell to how many digits
@@ -124,7 +128,6 @@ GRADIENT_WAY = 1e-5  # [rad, reaches] of the gradient's differences
 LEVEL_VALUE = 1e-5  # least curvature that a step is divided by
 UPHILL = 1e-6  # curvature that rounding may hide
 FLAT_GRADIENT = 1e-8  # largest component of the gradient at a minimum; cost in squared reaches
-ONE_CROSSING = 1e-4  # [rad, reaches] postures where one pair of self-motions crosses are no further apart
 EQUAL_ROOTS = 1e-7  # [rad] roots no further apart may be one that two solutions share
 APART_VECTORS = 1e-4  # sine between two vectors of such a root; those of one that has one vector are 1e-7 apart
 OWN_ROOT = 1e-6  # [rad, scaled length] how far a root may be off the answer that it stands for
@@ -139,20 +142,11 @@ COPLANAR = 1e-12  # smallest singular value of the slides' directions below whic
 MERGED_SLIDES = 3e-15  # square of the sine of half the angle between the two values of q2 below which they are one
 NEARLY_COPLANAR = 1e-5  # smallest singular value and sine below which both happen at once, to rounding
 FOLD_WAY = 1e-3  # [rad, reaches] of the second difference: its rounding is 1e-10
-CLEAR = 1e-4  # singular value that the second smallest must have for one direction alone to be lost
 BENT = 1e-3  # curvature of a fold; along a self-motion it is zero
-NEARBY_STEP = 1e-3  # [rad, reaches] what is missing across a fold may take a step so long
-OFF_LIMITS = 1e-7  # [rad, reaches] how far outside limits a double root may be that stands for one on them
-ON_MANIFOLD = 1e-12  # smallest singular value of a posture on a self-motion to rounding
 BLURRED = 1e-9  # distance from a class that rounding alone explains
-CLOSED = 1e-12  # residual of a branch that needs no correction
-GROWTH = 1e-8  # residual a radian along a self-motion: a double root beside it is known to the root of rounding
-NO_GROWTH = 1e-12  # growth of a residual that is rounding
 STALLED = 1e-6  # residual from which a step that brings hardly anything tells that no further one will
 ARRIVED = 1e-9  # [rad, reaches] a step that ends them: its square is below rounding
 SMOOTH = 1e-5  # of a span: how far polynomials may be off their curve
-EQUAL_RESIDUALS = 1e-14  # residuals below this are equal
-RESTING = 1e-9  # [rad, reaches] a radian: joints that move less do not move
 LEAST_COST = 1e-30  # a cost that shares are taken of is no smaller
 LOOSE = 1e-12  # squared length across a joint [1 or reaches] below which it may be free: of a double root of the next
 LOOSE_DOUBLE = 1e-9  # rounding leaves the root; the same where that root is one of fourth order, and leaves the fourth

@@ -28,7 +28,6 @@ from armkin.inverse.numeric.tolerances import (
     HIGH,
     HOPELESS,
     MOVING,
-    RESTING,
     SAME,
     SEED,
     SOLUTION,
@@ -186,7 +185,7 @@ class _Groups:
         self.valid: Bool = np.asarray(at.size <= SOLUTION)
         on: Bool = np.asarray(at.sure.any(axis=2))
         # where one direction alone is lost, joints that rest there and on a part of the self-motion rest on all of it
-        self.resting: Bool = (lost.nullity == 1)[:, :, None] & (np.abs(lost.V[:, :, -1]) < RESTING)
+        self.resting: Bool = (lost.nullity == 1)[:, :, None] & (np.abs(lost.V[:, :, -1]) < SOLUTION)
         # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
         self.rank = np.maximum(at.size, EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0

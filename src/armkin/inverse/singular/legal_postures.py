@@ -17,7 +17,7 @@ from armkin.inverse.answers.closest import thorough
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, OFF_LIMITS, ON_MANIFOLD, SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, CLOSED, SAME, SOLUTION
 from armkin.inverse.singular import components
 from armkin.model.units import radian_or_reach
 
@@ -71,7 +71,7 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
 def _at_limits(arm: Arm, q: Array) -> Bool:
     """Which joints of postures (..., n) are within limits or at one."""
     beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
-    return np.asarray(beyond < OFF_LIMITS)
+    return np.asarray(beyond < SAME)
 
 
 def _may_be_legal(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Bool:
@@ -84,5 +84,5 @@ def _may_be_legal(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Bool:
     on: Bool = np.asarray(inside.all(axis=1))
     some = some[~on[some]]
     sigma, *_ = newton.null_space(arm, task, out.q[rows[k[some]], b[some]], target[rows[k[some]]])
-    on[some] = sigma < ON_MANIFOLD
+    on[some] = sigma < CLOSED
     return np.bincount(k[on], minlength=len(rows)) > 0

@@ -20,13 +20,12 @@ from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import (
     ARRIVED,
     BENT,
-    CLEAR,
     CLOSED,
     FINEST,
     FOLD_WAY,
     FOLDED,
+    HIGH,
     MOVED,
-    NEARBY_STEP,
     REACH,
     SMOOTH,
     SOLUTION,
@@ -335,7 +334,7 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     ahead, behind = np.split(newton.residuals(arm, task, both, np.concatenate([target, target])), 2)
     bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / FOLD_WAY**2
     lost = (u * r).sum(axis=1)
-    rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], CLEAR)
-    fold = (S[:, -2] > CLEAR) & (S[:, -1] < WEAK) & (np.abs(bend) > BENT)
+    rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], HIGH)
+    fold = (S[:, -2] > HIGH) & (S[:, -1] < WEAK) & (np.abs(bend) > BENT)
     beyond = (lost * bend > 0.0) & (np.abs(lost) > 10.0 * SOLUTION)
-    return np.asarray(fold & beyond & (rest < NEARBY_STEP) & (100.0 * rest**2 < np.abs(lost)))
+    return np.asarray(fold & beyond & (rest < FOLD_WAY) & (100.0 * rest**2 < np.abs(lost)))

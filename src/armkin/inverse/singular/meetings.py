@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, ONE_CROSSING, SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, HIGH, SOLUTION
 from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -41,7 +41,7 @@ def ways_out(
     k, b = np.nonzero((size[:, 1:] <= SOLUTION) & (nullity[:, 1:] > 1))
     b += 1
     V, nullity = V[k, b], nullity[k, b]
-    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / ONE_CROSSING)
+    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / HIGH)
     _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     at, row = q[k[first], b[first]], k[first]
     most = np.maximum(ACCEPTED, 2.0 * size[row, b[first]])

@@ -17,8 +17,8 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     CLOSE_BY,
     DOUBLE_ROOT,
+    ERROR,
     HIGH,
-    ROOT_ROUNDING,
     SAME,
     SOLUTION,
     TINY,
@@ -89,4 +89,4 @@ def alike(
 
 def _radius(sigma: Array) -> Array:
     """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
-    return SAME + np.minimum(ROOT_ROUNDING / np.maximum(sigma, TINY), DOUBLE_ROOT)
+    return SAME + np.minimum(ERROR / np.maximum(sigma, TINY), DOUBLE_ROOT)

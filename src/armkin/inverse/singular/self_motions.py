@@ -18,12 +18,12 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     BESIDE,
     CLOSE_BY,
+    CLOSED,
     DRIFT,
     GROWTH,
     HIGH,
     MOVED,
     NO_BLOCK,
-    NO_GROWTH,
     NO_JOINT,
     SAME,
     SOLUTION,
@@ -213,7 +213,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     first = np.where(several, 10 * STEP, STEP)
     some, grown = _stays(arm, task, q[who], first, push, target[who])
     # of those that lose one direction most do not stay on a longer way
-    one = np.flatnonzero(~several[some] & (grown > NO_GROWTH))
+    one = np.flatnonzero(~several[some] & (grown > CLOSED))
     if len(one):
         at = some[one]
         on, _ = _stays(arm, task, q[who[at]], 10 * first[at], push[at], target[who[at]])
@@ -230,7 +230,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     short, long = _slow(grown) & _apart(away, push)
     # where the residual grows at all, it must do so slowly as far as the long step: near a fold the first tenth of a
     # radian costs nothing
-    along = (short & ((grown[0] <= NO_GROWTH) | long)) | (long & several)
+    along = (short & ((grown[0] <= CLOSED) | long)) | (long & several)
     np.logical_or.at(moving, who, along)
     np.logical_or.at(joints, who, along[:, None] & _moved(away, long))
     return moving, joints
