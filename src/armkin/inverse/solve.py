@@ -123,10 +123,12 @@ def _answered(
         out, count = _rows(arm, definition, geometry, target, each, examine, workers)
     shown, most = target_rounding.of_targets(arm, definition, target, (given, shown), single, rounding, lead)
     if examine:
-        out = legal_postures.with_legal_postures(Goals(arm, definition, target, each), out)
-        out = near_itself.stand(Goals(arm, definition, target, each), out, most)
+        goals = Goals(arm, definition, target, each)
+        if not out.within.any(axis=1).all():
+            out = legal_postures.with_legal_postures(goals, out)
+        out = near_itself.stand(goals, out, most)
         if arm.keep_out:
-            out = free_postures.with_free_postures(Goals(arm, definition, target, each), out)
+            out = free_postures.with_free_postures(goals, out)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > FAR] = False
     if not geometry.ordered:

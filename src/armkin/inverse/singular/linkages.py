@@ -121,7 +121,8 @@ def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _M
     joint = np.full(line.shape, -1)
     k, b = np.nonzero(loose & (count == 4))
     bars = np.zeros_like(line)
-    bars[k, b], joint[k, b] = four_bars.dead_points(arm, base[k, b], moving[k, b])
+    if len(k):
+        bars[k, b], joint[k, b] = four_bars.dead_points(arm, base[k, b], moving[k, b])
     return np.asarray((line | bars | ~loose).all(axis=1)), _Motions(line, d, base, joint)
 
 
