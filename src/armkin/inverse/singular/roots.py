@@ -89,4 +89,4 @@ def alike(
 
 def _radius(sigma: Array) -> Array:
     """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
-    return SAME + np.minimum(ERROR / np.maximum(sigma, TINY), DOUBLE_ROOT)
+    return np.asarray(SAME + np.minimum(ERROR / np.maximum(sigma, TINY), DOUBLE_ROOT))
