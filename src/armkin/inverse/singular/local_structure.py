@@ -107,7 +107,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
         out.x[:, some], out.g[:, some] = x[:, on], g[:, on]
         _decide(out, some)
         # where two directions are all but lost no shorter curve stays at hand
-        left = left[~out.known[left] & (out.second[left] > CLEAR)]
+        left = left[~out.known[left] & (out.second[left] > HIGH)]
         if not len(left):
             break
         out.span[left] /= SHRINK

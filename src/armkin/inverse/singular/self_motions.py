@@ -118,7 +118,7 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
     # a joint may move too slowly at one of the two alone to be called free there
     most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
     slow = ~held & (most > TURNED) & (most < DRIFT)
-    held |= j == 0  # `near` stands for all that meet there
+    held |= np.equal(j, 0)  # `near` stands for all that meet there
     close = np.flatnonzero(size.max(axis=1) < BESIDE)
     between = at[close] + 0.5 * apart[close] * unit
     same[close] = newton.missing(arm, task, between, target[k[close]]) <= SOLUTION
