@@ -4,7 +4,6 @@
 //   HAL_LOCK() … HAL_UNLOCK()  a block that the tick interrupt stays out of; also a memory barrier both ways
 //   HAL_BARRIER()              what was written before is in memory before what is written after
 //   HAL_NOINIT                 attribute of variables that a reset leaves as they are
-//   HAL_TABLE, HAL_READ32(p)   a constant table where it costs no RAM, and how to read it
 //   HAL_RECEIVE                bytes that the serial line keeps while the core is busy (INFO's `receive`)
 //   fine_t, sfine_t            an unsigned and a signed integer of at least 24 bits
 //   DDA_ADVANCE(planned)       planned = dda.interval >> 16, dda.interval += dda.add >> 8
@@ -14,7 +13,8 @@
 //   HAL_PREPARES               whether its tick takes the next segment's rates ahead of time (dda.prepared)
 //   dda_direction(back)        sets the DIR pins, inline where a call would cost too much
 //   HAL_MULTIPLY(a, b)         16 by 16 bits
-// and, where it has a quicker way than C's: HAL_RECIPROCAL(interval), 2^23 / interval; HAL_STEPS(phase, rate, fine, ticks), see core/motion.h
+// and, where it has a quicker way than C's: HAL_RECIPROCAL(interval), 2^23 / interval; HAL_STEPS(phase, rate, fine, ticks), see core/motion.h;
+// HAL_CRC(crc, byte), see core/crc.h, with HAL_TABLE, the attribute of a constant table where it costs no RAM
 #pragma once
 
 // Not inlined: its variables take up stack only while it runs.

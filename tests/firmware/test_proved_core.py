@@ -9,8 +9,7 @@ from emulator import FIRMWARE
 
 # The lines that EVA leaves open, each discharged by test/proof/count.c, which takes every number of ticks through them.
 COUNTED = {
-    "change += (s->bend * (int32_t)(bends >> 8) + (s->bend * (int32_t)(bends & 0xFF) >> 8)) >> 9;",
-    "change += s->bend * (int32_t)(bends >> 8) >> 14;",
+    "return (product(s->bend, bends >> 8) + (product(s->bend, bends & 0xFF) >> 8)) >> 9;",
     "memcpy((uint8_t *)&memory.image + offset, data, length);",
 }
 

@@ -20,7 +20,6 @@
 #define HAL_NOINIT __attribute__((section(".noinit")))
 #define HAL_PREPARES 1
 #define HAL_TABLE PROGMEM
-#define HAL_READ32(p) pgm_read_dword_near(p)
 #define HAL_RECEIVE RECEIVE
 
 typedef __uint24 fine_t;
@@ -171,3 +170,26 @@ static inline uint16_t hal_steps(fine_t *phase, uint16_t rate, bool fine, uint16
     return sum >> 24;
 }
 #define HAL_STEPS(phase, rate, fine, ticks) hal_steps(phase, rate, fine, ticks)
+
+// The four bytes of the table's entries stand 256 apart: an index is an address's low byte.
+static inline uint32_t hal_crc(uint32_t crc, uint8_t byte) {
+    extern const uint8_t crc_table[4][256];
+    __asm__("mov r30, %A[c]\n\t"
+            "eor r30, %[b]\n\t"
+            "ldi r31, hi8(%[t])\n\t"
+            "lpm %A[c], Z\n\t"
+            "eor %A[c], %B[c]\n\t"
+            "inc r31\n\t"
+            "lpm %B[c], Z\n\t"
+            "eor %B[c], %C[c]\n\t"
+            "inc r31\n\t"
+            "lpm %C[c], Z\n\t"
+            "eor %C[c], %D[c]\n\t"
+            "inc r31\n\t"
+            "lpm %D[c], Z"
+            : [c] "+r"(crc)
+            : [b] "r"(byte), [t] "i"(crc_table)
+            : "r30", "r31");
+    return crc;
+}
+#define HAL_CRC(crc, byte) hal_crc(crc, byte)

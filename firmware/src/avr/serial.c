@@ -33,19 +33,17 @@ static volatile uint8_t received_head, received_tail, sending_head, sending_tail
     "1:"
 #endif
 
-// By hand, as a tick may come while it runs: 17 cycles shorter than gcc's.
+// By hand, as a tick may come while it runs: 21 cycles shorter than gcc's.
 ISR(USART_RX_vect, ISR_NAKED) {
     __asm__ volatile(
         "push r24\n\t"
         "in r24, __SREG__\n\t"
         "push r24\n\t"
-        "push r25\n\t"
         "push r30\n\t"
         "push r31\n\t"
         "lds r24, %[status]\n\t"
         "sbrc r24, %[overrun]\n\t"  // a byte was lost before this one: this interrupt came too late
         "sts %[spilled], r24\n\t"
-        "lds r25, %[data]\n\t"
         "lds r30, %[head]\n\t"
         "mov r24, r30\n\t"
         "inc r24\n\t" WRAP
@@ -53,20 +51,21 @@ ISR(USART_RX_vect, ISR_NAKED) {
         "cp r24, r31\n\t"
         "breq 2f\n\t"
         "sts %[head], r24\n\t"
+        "lds r24, %[data]\n\t"
         "ldi r31, 0\n\t"
         "subi r30, lo8(-(%[ring_]))\n\t"
         "sbci r31, hi8(-(%[ring_]))\n\t"
-        "st Z, r25\n"
+        "st Z, r24\n"
         "3:\n\t"
         "pop r31\n\t"
         "pop r30\n\t"
-        "pop r25\n\t"
         "pop r24\n\t"
         "out __SREG__, r24\n\t"
         "pop r24\n\t"
         "reti\n"
         "2:\n\t"
-        "ldi r24, 1\n\t"  // it is lost
+        "lds r24, %[data]\n\t"  // it is lost
+        "ldi r24, 1\n\t"
         "sts %[spilled], r24\n\t"
         "rjmp 3b\n"
         :

@@ -160,6 +160,14 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "ldd r24, Z+%[add]+2\n\t"
       "sts %[sum]+3, r24\n\t"
       "or r25, r24\n\t"
+      "breq 2f\n\t"
+      "ldi r25, 1\n\t"
+      "ldd r24, Z+%[bend]\n\t"
+      "ldd r21, Z+%[bend]+1\n\t"
+      "or r24, r21\n\t"
+      "breq 2f\n\t"
+      "ldi r25, %[bends]\n"
+      "2:\n\t"
       "sts %[changing], r25\n\t"
       "ldd r24, Z+%[ticks]\n\t"
       "ldd r25, Z+%[ticks]+1\n\t"
@@ -176,7 +184,8 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "eor r24, r25",
       [first] FIELD(interval), [ocr] MEM(OCR1AL), [interval] "i"(&dda.interval), [add] FIELD(add), [sum] "i"(&dda.add), [tail] "i"(&queue_tail),
       [prepared] "i"(&dda.prepared), [now] "i"(&dda.now), [ticks] FIELD(ticks), [left] "i"(&dda.left), [from] FIELD(back),
-      [back] "i"(&dda.back), [top] "n"(sizeof(axes_t) - 1), [invert] "i"(&direction_invert), [changing] "i"(&dda.changing));
+      [back] "i"(&dda.back), [top] "n"(sizeof(axes_t) - 1), [invert] "i"(&direction_invert), [changing] "i"(&dda.changing),
+      [bend] FIELD(bend), [bends] "M"(BENDS));
     STEPPER_PINS(DIRECT)
     A("pop r21\n\t"
       "pop r30\n\t"
@@ -184,17 +193,27 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "short_timer:");
     SET_TIMER();
 
+    // interval += add >> 8
     A("lds r24, %[changing]\n\t"
       "tst r24\n\t"
-      "breq short_high\n\t"
-      "rjmp short_changing\n"
+      "breq short_high\n\t" SUM("add", "%[i]", "%[a]+1") SUM("adc", "%[i]+1", "%[a]+2") SUM("adc", "%[i]+2", "%[a]+3") "lds r24, %[i]+3\n\t"
+      "sbrc r25, 7\n\t"
+      "rjmp 1f\n\t"
+      "ldi r25, 0\n\t"
+      "rjmp 2f\n"
+      "1: ldi r25, 0xFF\n"
+      "2: adc r24, r25\n\t"
+      "sts %[i]+3, r24\n\t"
+      "lds r24, %[changing]\n\t"
+      "sbrc r24, 7\n\t"
+      "rjmp short_bend\n"
       "short_high:\n\t"  // STEP is high long enough
       "lds r24, %[now]\n\t"
       "sub r24, r22\n\t"
       "lds r25, %[high]\n\t"
       "cp r24, r25\n\t"
       "brcs short_high",
-      [changing] "i"(&dda.changing), [now] MEM(TCNT1L), [high] "i"(&step_high));
+      [changing] "i"(&dda.changing), [i] "i"(&dda.interval), [a] "i"(&dda.add), [now] MEM(TCNT1L), [high] "i"(&step_high));
     STEPPER_PINS(LOWER)
     A("ldi r23, 0\n\t"
       "lds r24, %[fine]\n\t"
@@ -268,15 +287,8 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "reti",
       [prepared] "i"(&dda.prepared), [flags] "I"(_SFR_IO_ADDR(TIFR1)), [due] "n"(OCF1A), [now] MEM(TCNT1L), [allowed] "n"(LATE), [late] "i"(&dda.overruns));
 
-    // interval += add >> 8; add grows by the bend, with every block of ticks or, QUICK, with each; behind the last tick nobody looks
-    A("short_changing:\n\t" SUM("add", "%[i]", "%[a]+1") SUM("adc", "%[i]+1", "%[a]+2") SUM("adc", "%[i]+2", "%[a]+3") "lds r24, %[i]+3\n\t"
-      "sbrc r25, 7\n\t"
-      "rjmp 1f\n\t"
-      "ldi r25, 0\n\t"
-      "rjmp 2f\n"
-      "1: ldi r25, 0xFF\n"
-      "2: adc r24, r25\n\t"
-      "sts %[i]+3, r24\n\t"
+    // add grows by the bend, with every block of ticks or, QUICK, with each; behind the last tick nobody looks
+    A("short_bend:\n\t"
       "brts 1f\n\t"
       "lds r24, %[left]\n\t"
       "andi r24, %[block] - 1\n\t"
@@ -294,9 +306,6 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "lds r31, %[now]+1\n\t"
       "ldd r24, Z+%[bend]\n\t"
       "ldd r25, Z+%[bend]+1\n\t"
-      "mov r23, r24\n\t"
-      "or r23, r25\n\t"
-      "breq 4f\n\t"
       "mov r22, r25\n\t"
       "lsl r22\n\t"
       "sbc r22, r22\n\t"  // its sign
@@ -331,13 +340,12 @@ ISR(TIMER1_COMPA_vect, ISR_NAKED) {
       "sts %[a]+2, r30\n\t"
       "lds r30, %[a]+3\n\t"
       "adc r30, r22\n\t"
-      "sts %[a]+3, r30\n"
-      "4:\n\t"
+      "sts %[a]+3, r30\n\t"
       "pop r22\n\t"
       "pop r30\n\t"
       "pop r31\n\t"
       "rjmp short_high",
-      [i] "i"(&dda.interval), [left] "i"(&dda.left), [block] "n"(BLOCK), [back] "i"((uint8_t *)&dda.back + sizeof dda.back - 1), [a] "i"(&dda.add),
+      [left] "i"(&dda.left), [block] "n"(BLOCK), [back] "i"((uint8_t *)&dda.back + sizeof dda.back - 1), [a] "i"(&dda.add),
       [now] "i"(&dda.now), [bend] FIELD(bend));
 
     A("short_fine:");

@@ -109,9 +109,8 @@ static bool beyond(fine_t *excess, int32_t change, uint32_t budget, uint32_t sla
 // any two segments differ by no more than the budget of the time between, and rounding once, however short they are.
 APART static bool accelerates(uint8_t axis, const struct segment *a, const struct pace *before, const struct segment *b, const struct pace *pace) {
     const axes_t bit = 1U << axis;
-    const int32_t left = motion.plan_speed[axis], first = velocity(size(b, axis, bit), pace->first, b->back & bit);
+    const int32_t left = velocity(size(a, axis, bit), before->last, a->back & bit), first = velocity(size(b, axis, bit), pace->first, b->back & bit);
     const int32_t last = pace->last == pace->first ? first : velocity(size(b, axis, bit), pace->last, b->back & bit);
-    motion.plan_speed[axis] = last;
     fine_t *const excess = motion.plan_excess[axis];
     const bool stands = !(before->first && a->rate[axis]) && !(pace->first && b->rate[axis]);
     if (stands || limits.jump[axis] >= JUMP_MAX) {
@@ -138,24 +137,34 @@ APART static bool accelerates(uint8_t axis, const struct segment *a, const struc
     return over;
 }
 
-// The first axis from `axis` on that needs a look by accelerates(). As nearly always none does, where no interval changes and nothing is
-// beyond its budget: jumps are less than the budget's greater part, or the axis is not checked.
-APART static uint8_t next_unclear(uint8_t axis, uint8_t axes, const struct pace *before, const struct segment *b, const struct pace *pace) {
-    if (before->first != before->last || pace->first != pace->last) {
+static uint16_t apart(uint16_t a, uint16_t b) {
+    return a > b ? a - b : b - a;
+}
+
+// The first axis from `axis` on that needs a look by accelerates(). As nearly always none does: nothing is beyond its budget, and what changes
+// at the jump and half of what changes on both sides of it is less than the budget's greater part, as is what changes within `b`
+// (8: rounding of quarters); or the axis is not checked.
+APART static uint8_t next_unclear(uint8_t axis, uint8_t axes, const struct segment *a, const struct pace *before, const struct segment *b, const struct pace *pace) {
+    const uint16_t left = before->last, left_change = apart(before->first, left), change = apart(pace->first, pace->last);
+    const uint16_t both = (left_change >> 1) + (change >> 1) + 1 + apart(left, pace->first), most = both > change ? both : change;
+    if ((left_change && before->windows) || (change && pace->windows) || most > 0x7FFF) {
         return axis;
     }
-    const uint16_t time = (before->time >> 1) + (pace->time >> 1);
-    uint8_t back = b->back, fine = b->fine, exceeding = motion.plan_exceeding, bit = 1;
-    for (uint8_t i = 0; i < axes; i++) {
-        const uint16_t jump = limits.jump[i] >> 8;
-        if (i >= axis && jump < JUMP_MAX >> 8) {
-            const int32_t first = velocity(fine & bit ? b->rate[i] >> 9 : b->rate[i] >> 1, pace->first, back & bit);
-            if (exceeding & bit || distance(motion.plan_speed[i], first) + 4 > HAL_MULTIPLY(jump, time)) {
-                return i;
+    const uint16_t between = (before->time >> 1) + (pace->time >> 1), time = pace->time < between ? pace->time : between;
+    axes_t turned = (a->back ^ b->back) >> axis, fine = b->fine >> axis, left_fine = a->fine >> axis, exceeding = motion.plan_exceeding >> axis;
+    for (; axis < axes; axis++) {
+        const uint16_t jump = limits.jump[axis] >> 8;
+        if (jump < JUMP_MAX >> 8) {
+            const uint16_t from = left_fine & 1 ? a->rate[axis] >> 9 : a->rate[axis] >> 1, to = fine & 1 ? b->rate[axis] >> 9 : b->rate[axis] >> 1;
+            const uint16_t turn = turned & 1 ? from + to : apart(from, to);
+            if (exceeding & 1 || HAL_MULTIPLY(turn, left) + HAL_MULTIPLY(from > to ? from : to, most) + 8 > HAL_MULTIPLY(jump, time)) {
+                break;
             }
-            motion.plan_speed[i] = first;
         }
-        NEXT_AXIS(bit, (back = b->back >> 8, fine = b->fine >> 8, exceeding = motion.plan_exceeding >> 8))
+        turned >>= 1;
+        fine >>= 1;
+        left_fine >>= 1;
+        exceeding >>= 1;
     }
-    return axes;
+    return axis;
 }

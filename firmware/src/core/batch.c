@@ -86,7 +86,7 @@ static bool times_valid(const struct segment *s, int32_t *last) {
     if (*last < least || *last > 0xFFFF) {
         return false;
     }
-    return motion_interval(s, s->ticks) <= 0xFFFF;
+    return *last <= 0xFFFF - ADD_MOST / 65536 - 1 || motion_interval(s, s->ticks) <= 0xFFFF;
 }
 
 static enum error read_head(const uint8_t *p, bool wide, struct segment *s, const struct pace *before, struct pace *pace, uint32_t *units) {
@@ -140,7 +140,7 @@ APART static void read_rates(const uint8_t *p, uint16_t mask, struct segment *s,
 
 static inline __attribute__((always_inline)) void check_changes(const struct segment *a, const struct pace *before, const struct segment *s, const struct pace *pace, struct look *look) {
     //@ loop unroll AXES;
-    for (uint8_t i = 0; (i = next_unclear(i, look->past, before, s, pace)) < look->past; i++) {
+    for (uint8_t i = 0; (i = next_unclear(i, look->past, a, before, s, pace)) < look->past; i++) {
         if (accelerates(i, a, before, s, pace)) {
             found(look, i, E_ACCEL);
         }

@@ -21,7 +21,7 @@ __attribute__((noinline, optimize("O2"))) bool dda_load(void) {
     dda.add = (int32_t)((uint32_t)(int32_t)s->add << 8);
     const axes_t back = s->back;
     if (HAL_PREPARES) {
-        dda.changing = s->add != 0;
+        dda.changing = s->bend ? BENDS : s->add != 0;
     }
     if (HAL_PREPARES && dda.prepared) {
         dda.prepared = false;

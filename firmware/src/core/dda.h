@@ -33,6 +33,7 @@ _Static_assert(((axes_t)LAST & (axes_t)QUICK) == 0, "one is not the other, where
         shift;                  \
     }
 
+enum { BENDS = 0x80 };  // in dda.changing
 enum { BLOCK = 16 };  // ticks with the same `add`, counted from the segment's end
 
 // Phases and rates: 2^-24 step. At rest a phase is half a step. An axis that turns round goes on from the other side.
@@ -64,7 +65,7 @@ struct dda {
     axes_t back;                // as in the segment taken up last
     uint8_t bits;               // STEP pins of the next tick
     bool prepared;              // the next segment's rates are taken, and phases turned, by a chip's own tick
-    uint8_t changing, fine;     // not 0: there is an `add`; a rate has a low byte. For a chip's own tick
+    uint8_t changing, fine;     // not 0: there is an `add`, and BENDS: a bend; a rate has a low byte. For a chip's own tick
     uint8_t overruns;
 
     uint16_t stretch;      // hold: intervals become `stretch`/256 times as long; 256: as planned

@@ -21,21 +21,32 @@ static const float UNIT_MS = 256e3F / CLOCK;
 
 #define SHARED(x) (*(volatile __typeof__(x) *)&(x))  // the interrupt changes it
 
-// Cycles between ticks after `ticks` of them, not rounded from tick to tick.
-APART int32_t motion_bent_interval(const struct segment *s, uint16_t ticks) {
-    const uint32_t coarse = (uint32_t)(int32_t)(s->add >> 8) * ticks, fine = (uint32_t)(uint8_t)s->add * ticks >> 8;
-    int32_t change = (int32_t)(coarse + fine) >> 8;
+static int32_t product(int16_t a, uint16_t b) {
+    return (int32_t)(HAL_MULTIPLY((uint16_t)a, b) - (a < 0 ? (uint32_t)b << 16 : 0));
+}
+
+// What the bend makes of the interval.
+APART static int32_t bent(const struct segment *s, uint16_t ticks) {
     if (s->back & QUICK) {
-        const uint32_t bends = (uint32_t)ticks * (ticks - 1) / 2;
-        change += (s->bend * (int32_t)(bends >> 8) + (s->bend * (int32_t)(bends & 0xFF) >> 8)) >> 9;
-    } else if (s->bend) {
-        const uint8_t first = (s->ticks - 1) % BLOCK + 1;  // ticks of the first block
-        const uint32_t more = ticks > first ? ticks - first : 0;
-        const uint32_t blocks = more / BLOCK, rest = more % BLOCK;
-        const uint32_t bends = (BLOCK / 2 * blocks + rest) * (blocks + 1);  // of all ticks so far
-        change += s->bend * (int32_t)(bends >> 8) >> 14;
+        const uint32_t bends = HAL_MULTIPLY(ticks, ticks - 1) / 2;
+        return (product(s->bend, bends >> 8) + (product(s->bend, bends & 0xFF) >> 8)) >> 9;
     }
-    return s->interval + change;
+    const uint8_t first = (s->ticks - 1) % BLOCK + 1;  // ticks of the first block
+    const uint16_t more = ticks > first ? ticks - first : 0;
+    const uint16_t blocks = more / BLOCK, rest = more % BLOCK;
+    const uint32_t bends = HAL_MULTIPLY(BLOCK / 2 * blocks + rest, blocks + 1);  // of all ticks so far
+    return product(s->bend, bends >> 8) >> 14;
+}
+
+// Cycles between ticks after `ticks` of them, not rounded from tick to tick.
+APART int32_t motion_changed_interval(const struct segment *s, uint16_t ticks) {
+    const uint8_t fine = s->add;
+    int32_t change = product(s->add >> 8, ticks);
+    if (fine) {
+        change += HAL_MULTIPLY(fine, ticks) >> 8;
+    }
+    change = s->interval + (change >> 8);
+    return s->bend ? change + bent(s, ticks) : change;
 }
 
 static uint16_t last_interval(const struct segment *s) {
@@ -173,7 +184,6 @@ struct segment *motion_slot(uint8_t ahead) {
 }
 
 static void plan_rest(void) {
-    memset(motion.plan_speed, 0, sizeof motion.plan_speed);
     motion.plan_exceeding = 0;
     motion.ended = true;
     at_rest(&motion.plan_fraction);

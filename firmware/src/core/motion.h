@@ -18,8 +18,7 @@ struct motion {
     // at the end of the queue:
     int32_t plan[AXES];
     struct fraction plan_fraction;
-    int32_t plan_speed[AXES];     // velocities, see acceleration.h
-    fine_t plan_excess[AXES][2];  // of changes of velocity over their budget, up and down, of axes in:
+    fine_t plan_excess[AXES][2];  // of changes of velocity over their budget, see acceleration.h, up and down, of axes in:
     axes_t plan_exceeding;
     bool ended;                   // at rest
     uint8_t gentle;               // eighths of the accelerations that a hold leaves out
@@ -49,11 +48,11 @@ struct segment *motion_slot(uint8_t ahead);
 void motion_advance(const struct segment *s);  // motion.plan to a segment's end
 void motion_append(uint8_t segments, uint32_t units, bool end);
 uint32_t motion_units(const struct segment *s);  // its time, 256 cycles
-int32_t motion_bent_interval(const struct segment *s, uint16_t ticks);
+int32_t motion_changed_interval(const struct segment *s, uint16_t ticks);
 
 // Cycles to the tick after so many.
 static inline int32_t motion_interval(const struct segment *s, uint16_t ticks) {
-    return s->add ? motion_bent_interval(s, ticks) : s->interval;
+    return s->add ? motion_changed_interval(s, ticks) : s->interval;
 }
 
 // Steps that an axis makes in so many ticks; moves its phase on.

@@ -8,6 +8,4 @@
 #define HAL_UNLOCK() }
 #define HAL_BARRIER() __asm__ volatile("" ::: "memory")
 #define HAL_NOINIT
-#define HAL_TABLE
-#define HAL_READ32(p) (*(p))
 #define HAL_RECEIVE RECEIVE

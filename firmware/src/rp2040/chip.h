@@ -14,6 +14,4 @@
     __asm__ volatile("msr primask, %0" : : "r"(primask) : "memory");     \
     }
 #define HAL_NOINIT __attribute__((section(".noinit")))
-#define HAL_TABLE
-#define HAL_READ32(p) (*(p))
 #define HAL_RECEIVE RECEIVE

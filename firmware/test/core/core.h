@@ -23,6 +23,7 @@ void press_abort(void);
 
 // One group of promises each, in the file of its name.
 void test_steps(void);
+void test_accelerations(void);
 void test_holds(void);
 void test_sessions(void);
 void test_positions(void);

@@ -37,6 +37,7 @@ void press_abort(void) {
 int main(void) {
     srand(1);
     test_steps();
+    test_accelerations();
     test_holds();
     test_sessions();
     test_positions();

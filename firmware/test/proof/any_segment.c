@@ -15,13 +15,10 @@ void dda_direction(uint16_t back) { (void)back; }
 enum error inputs_ready(bool moving) { return moving ? E_BUSY : OK; }
 enum error inputs_blocking(const struct segment *s, uint8_t *detail) { (void)s; *detail = 0; return OK; }
 
-#define FASTEST ((int32_t)(0x7FFF * (RECIPROCAL / MIN_INTERVAL)))
-
 // A plan within the limits that every image keeps to, under way or at rest.
 static void any_plan(void) {
     for (uint8_t i = 0; i < AXES; i++) {
         motion.plan[i] = Frama_C_interval(-(1 << 30), 1 << 30);
-        motion.plan_speed[i] = Frama_C_interval(-FASTEST, FASTEST);
         motion.plan_excess[i][0] = Frama_C_interval(0, 1 << 23);
         motion.plan_excess[i][1] = Frama_C_interval(0, 1 << 23);
         motion.plan_fraction.phase[i] = Frama_C_interval(0, PHASE_MASK);
