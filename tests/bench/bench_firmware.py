@@ -133,7 +133,7 @@ def chip_rows() -> None:
             if not exact:
                 break
             best = got_rate
-        row(f"{board}: segments/s at {baud}, 25 kHz x 4", f"{best:.0f}", grbl)
+        row(f"{board}: segments/s at {baud}, 25 kHz x 4, `add`", f"{best:.0f}", grbl)
     for cause in ("hold", "abort", "silence"):
         stop = measure.hold(cause=cause)
         figures = f"{stop.milliseconds:.0f} / {stop.ideal:.0f} ms"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import armkin
 from armkin.board.firmware import protocol
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.protocol import whole
+from armkin.board.firmware.protocol import Segment, whole
 from armkin.board.firmware.trajectory_to_counts import plan
 from armkin.motion.profile import Profile
 
@@ -104,29 +104,37 @@ def ceiling(board: str, rates: range, jitter_us: float = 10.0) -> float:
     return best
 
 
-def segments_per_second(baud: int, rate: float, batch: int = 8, board: str = "uno_cnc_shield") -> tuple[float, bool]:
+def segments_per_second(baud: int, rate: float, board: str = "uno_cnc_shield") -> tuple[float, bool]:
     """Streams short segments of four axes in ticks of 25 kHz; what came out at the pins, and whether it was all exact.
 
-    Each changes two velocities by more than half of what ACCEL allows.
+    The interval grows or falls with every tick of each, and each changes two velocities by more than half of what
+    ACCEL allows. As many segments in a frame as the board takes, and enough of them that a queue would run dry.
     """
-    count, ticks = 1500, round(25_000 / rate)
+    batch, count = (15, 4000) if board == "mega_ramps14" else (8, 1500)
+    ticks = round(25_000 / rate)
+    interval = round(CLOCK / rate / ticks)
+    ends = interval - ticks // 2, interval + ticks // 2
+
+    def changing(number: int, counts: tuple[int, ...]) -> Segment:
+        """One cycle a tick longer or shorter."""
+        return whole(ticks, ends[number % 2], 256 * (1 - 2 * (number % 2)), counts)
+
     elf = slow_elf(board) if baud == 115_200 else None
     with EmulatedBoard(board, speed="step", elf=elf) as emulated:
         host = BareHost(emulated, baud)
         host.run(0.02)
         host.setup(image_for(board, replace(WIDE, max_accel=1_950_000)), counts_at_home(board))
         emulated.control("clear")
-        interval = round(CLOCK / rate / ticks)
-        fast = [(3 + i % 2, -3, 2 - i % 2, -1) for i in range(count)]
-        brake = [(3, -2, 2, -1), (2, -1, 1, -1), (1, -1, 1, -1)]
+        steps = [(3 + i % 2, -3, 2 - i % 2, -1) for i in range(count)]
+        steps += [(3, -2, 2, -1), (2, -1, 1, -1), (1, -1, 1, -1)]
         # a pause in front, so that the queue is full when it matters
-        work = [whole(100, 9600, 0, (0, 0, 0, 0))] + [whole(ticks, interval, 0, counts) for counts in fast + brake]
+        work = [whole(100, 9600, 0, (0, 0, 0, 0))] + [changing(i, counts) for i, counts in enumerate(steps)]
         plan = batches((0, 1, 2, 3), (0, 0, 0, 0), work, batch)
         status = host.stream(plan, slice_s=0.25e-3, bytes_ahead=300)  # more than it promises, but it keeps up
         x = emulated.stats()["axes"]["X"]
         seconds = (x["last_step_cycle"] - x["first_step_cycle"]) / CLOCK
         exact = (status.error, status.overruns) == (0, 0) and status.counts[:4] == plan[-1].end
-        return (count + len(brake)) / seconds, exact
+        return len(steps) / seconds, exact
 
 
 def first_step_ms(batch: int = 6) -> float:

@@ -90,8 +90,7 @@ typedef __int24 sfine_t;
 // 2^23 / interval, of intervals above 256: the first nine bits of the quotient are 0.
 static inline uint16_t hal_reciprocal(uint16_t interval) {
     uint16_t rest = 256, quotient = 0;
-    uint8_t bits = 15;
-    __asm__("1:\n\t"
+    __asm__(".rept 15\n\t"
             "lsl %A[q]\n\t"
             "rol %B[q]\n\t"
             "lsl %A[r]\n\t"
@@ -105,9 +104,8 @@ static inline uint16_t hal_reciprocal(uint16_t interval) {
             "sbc %B[r], %B[i]\n\t"
             "inc %A[q]\n"
             "3:\n\t"
-            "dec %[n]\n\t"
-            "brne 1b"
-            : [q] "+r"(quotient), [r] "+r"(rest), [n] "+r"(bits)
+            ".endr"
+            : [q] "+r"(quotient), [r] "+r"(rest)
             : [i] "r"(interval));
     return quotient;
 }

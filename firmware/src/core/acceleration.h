@@ -23,7 +23,7 @@ struct pace {
 };
 
 // RECIPROCAL / interval: long division of a power of two, a third of what a small chip's library takes.
-static uint16_t reciprocal(uint16_t interval) {
+APART static uint16_t reciprocal(uint16_t interval) {
 #ifdef HAL_RECIPROCAL
     return HAL_RECIPROCAL(interval);
 #else
@@ -151,20 +151,29 @@ APART static uint8_t next_unclear(uint8_t axis, uint8_t axes, const struct segme
         return axis;
     }
     const uint16_t between = (before->time >> 1) + (pace->time >> 1), time = pace->time < between ? pace->time : between;
-    axes_t turned = (a->back ^ b->back) >> axis, fine = b->fine >> axis, left_fine = a->fine >> axis, exceeding = motion.plan_exceeding >> axis;
-    for (; axis < axes; axis++) {
-        const uint16_t jump = limits.jump[axis] >> 8;
-        if (jump < JUMP_MAX >> 8) {
-            const uint16_t from = left_fine & 1 ? a->rate[axis] >> 9 : a->rate[axis] >> 1, to = fine & 1 ? b->rate[axis] >> 9 : b->rate[axis] >> 1;
-            const uint16_t turn = turned & 1 ? from + to : apart(from, to);
-            if (exceeding & 1 || HAL_MULTIPLY(turn, left) + HAL_MULTIPLY(from > to ? from : to, most) + 8 > HAL_MULTIPLY(jump, time)) {
-                break;
-            }
+    axes_t turned = a->back ^ b->back, fine = b->fine, left_fine = a->fine, exceeding = motion.plan_exceeding;
+    if (axis) {
+        turned >>= axis, fine >>= axis, left_fine >>= axis, exceeding >>= axis;
+    }
+    for (; axis < axes; axis++, turned >>= 1, fine >>= 1, left_fine >>= 1, exceeding >>= 1) {
+        uint16_t from = a->rate[axis], to = b->rate[axis];
+        if (exceeding & 1) {
+            break;
         }
-        turned >>= 1;
-        fine >>= 1;
-        left_fine >>= 1;
-        exceeding >>= 1;
+        const uint16_t jump = limits.jump[axis] >> 8;
+        if ((from | to) == 0 || jump >= JUMP_MAX >> 8) {
+            continue;
+        }
+        from >>= left_fine & 1 ? 9 : 1;
+        to >>= fine & 1 ? 9 : 1;
+        const uint16_t turn = turned & 1 ? from + to : apart(from, to);
+        uint32_t sum = HAL_MULTIPLY(from > to ? from : to, most) + 8;
+        if (turn) {
+            sum += HAL_MULTIPLY(turn, left);
+        }
+        if (sum > HAL_MULTIPLY(jump, time)) {
+            break;
+        }
     }
     return axis;
 }

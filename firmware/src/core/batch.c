@@ -159,10 +159,15 @@ APART static void plan_axes(uint16_t mask, const struct segment *s, struct look 
             *phase ^= PHASE_TURN;
         }
         if (named & bit && s->rate[i]) {
-            const int32_t before = motion.plan[i], steps = motion_steps(phase, s->rate[i], fine & bit, ticks);
-            const int32_t after = motion.plan[i] = back & bit ? before - steps : before + steps;
+            const uint16_t steps = motion_steps(phase, s->rate[i], fine & bit, ticks);
             const struct axis_config *config = &memory.image.axis[i];
-            if (!within(config->lower, config->upper, before, after)) {
+            bool beyond_limit;  // it is the only one that it may come to, or go away from
+            if (back & bit) {
+                beyond_limit = (motion.plan[i] -= steps) < config->lower;
+            } else {
+                beyond_limit = (motion.plan[i] += steps) > config->upper;
+            }
+            if (beyond_limit && steps) {
                 found(look, i, E_LIMIT);
             }
         }
