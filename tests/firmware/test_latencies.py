@@ -38,7 +38,7 @@ def test_short_moves_lose_no_byte(monkeypatch: pytest.MonkeyPatch, load: float, 
 
         monkeypatch.setattr(machine.session.line, "replies", replies)
         at = machine.counts()
-        for degrees in ([4, -3, 5], [-5, 6, 2], [0.3, 0.1, -0.2]):
+        for degrees in ([4, -3, 5], [-5, 6, 2], [0.3, 0.1, -0.2], [1.65, 1.4, 0.35]):
             plan = machine.plan(at, ARM.home + np.deg2rad(degrees))
             machine.run([plan])
             at = machine.counts()
@@ -46,3 +46,23 @@ def test_short_moves_lose_no_byte(monkeypatch: pytest.MonkeyPatch, load: float, 
         stats = board.stats()
         assert [stats["axes"][axis]["net"] for axis in "XYZ"] == list(at)
         assert (spilled, machine.session.line.resent, stats["uart"]["overruns"], machine.status.bad) == (0, 0, 0, 0)
+
+
+def test_a_plan_begins_within_10_ms_of_the_first_byte(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The law's own first step follows 8.4 ms later: half a step from rest."""
+    monkeypatch.setattr(streaming, "_load", lambda session: 0.0)
+    with EmulatedBoard(speed="step", reset_on_open=False, trace=True) as board:
+        port = SteppedPort(board, 0.0005)
+        port.wait(0.02)
+        machine = Machine(port, ARM, configure(ARM))
+        machine.prepare(assume=ARM.home)
+        plan = machine.plan(machine.counts(), np.deg2rad([-3, 0.5, -0.5]))
+        law = plan.trajectory.stretches[0].law  # type: ignore[attr-defined]
+        own = np.sqrt(law.length / law.accel / np.abs(plan.end - plan.start).max())
+        port.wait(0.03)
+        begin = board.control("cycles")["cycle"]
+        machine.run([plan])
+        trace = board.trace()
+        arrived, _ = trace.edges("uart.in")
+        step = min(trace.rises(f"{axis}.STEP")[0] for axis in "XYZ")
+        assert 0.005 < (step - arrived[arrived > begin][0]) / board.clock_hz - own < 0.01

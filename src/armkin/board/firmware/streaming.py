@@ -25,13 +25,19 @@ if TYPE_CHECKING:
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
 _LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.05
 _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
-_TICK = 20_000  # [cycles]
+_TICK = 20_000  # [cycles] of that pause, at most
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
 _MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop
 _TWICE = 1 + 33 / 32  # [s] of motion that each second since rest wants in the queue
 _FIRST = 0.01  # [s] of a motion in its first frame, at least
-_SEEN = 24  # segments of a beginning, whose way to the board is reckoned
-_STARTING = (2, 3, 4)  # segments of its first frames: a short one is there soon
+_SEEN = 64  # segments of a beginning, whose way to the board is reckoned: both ramps of a short move
+_STARTING = (
+    (2, 3, 3, 3, 4),
+    (2, 3, 4),
+)  # segments of its first frames: short ones are there soon, few need few answers
+_FAR = (
+    0.005  # [s] of the slowest answer, from where the queue holds too few segments to wait for credit in a short move
+)
 _BUSY = 0.0005  # [s] that a board is busy with a segment
 _ACK = 16  # [bytes] of an answer
 _BEGUN = 0.1  # [s] after its longest pause, until which a motion that has made no step may begin again
@@ -148,7 +154,7 @@ def _pieces(session: Session) -> Pieces:
     """How finely ramps are cut."""
     if session.line.noisy:
         return Pieces.ROUGH
-    return Pieces.FEW if _load(session) > 1 else Pieces.FINE
+    return Pieces.FEW if _load(session) > 1 or session.line.slowest > _FAR else Pieces.FINE
 
 
 def _load(session: Session) -> float:
@@ -216,12 +222,15 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
     places = [count * protocol.STEP + protocol.HALF for count in at]
     source = (s.of(moving) for s in move.segments)
     todo: list[Segment] = list(islice(source, _SEEN))
-    sizes = [_BATCH[0]] if line.noisy else list(_STARTING)  # of the first frames of a motion from rest
-    pause = lead(session, _first_frames(todo, sizes, room, clock), least)
+    pause, sizes = min(  # of the first frames of a motion from rest
+        (lead(session, _first_frames(todo, sizes, room, clock), least), list(sizes))
+        for sizes in ([(_BATCH[0],)] if line.noisy else _STARTING)
+    )
     begins = not line.damaged and _left(session) >= pause  # behind a rest, which may wait for room
     if todo and not begins:
         pause = max(pause, _FIRST - _seconds(todo[: sizes[0] - 1], clock))
-        todo.insert(0, Segment(math.ceil(pause * clock / _TICK), _TICK, 0, (0,) * len(moving)))
+        ticks = math.ceil(pause * clock / _TICK)
+        todo.insert(0, Segment(ticks, math.ceil(pause * clock / ticks), 0, (0,) * len(moving)))
     else:
         sizes = []
     while todo := todo + list(islice(source, max(0, _BATCH[1] + 1 - len(todo)))):
