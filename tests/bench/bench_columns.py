@@ -36,11 +36,10 @@ AT_REST = 0.56  # [us] a pose of a UR5e, all branches
 
 
 class Spent(NamedTuple):
-    """Of a command and its processes: CPU and wall time [s], largest memory of one process [MB]."""
+    """Of a command and its processes: CPU and wall time [s]."""
 
     cpu: float
     wall: float
-    memory: float
 
 
 def poses(count: int) -> np.ndarray:
@@ -71,16 +70,16 @@ def write(values: np.ndarray, folder: Path, name: str) -> dict[str, Path]:
 def spent(*words: Any, times: int = 3) -> Spent:
     """The least CPU time of some runs of a command, with byte code as an installed package has it."""
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
-    least = Spent(np.inf, np.inf, 0.0)
+    least = Spent(np.inf, np.inf)
     for _ in range(times):
         began, at = _children(), time.perf_counter()
         subprocess.run(
             [sys.executable, "-m", "armkin", *map(str, words)],
             env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False,
         )  # fmt: skip
-        one = Spent(_children() - began, time.perf_counter() - at, 0.0)
-        least = Spent(min(one.cpu, least.cpu), min(one.wall, least.wall), 0.0)
-    return least._replace(memory=resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)
+        one = Spent(_children() - began, time.perf_counter() - at)
+        least = Spent(min(one.cpu, least.cpu), min(one.wall, least.wall))
+    return least
 
 
 def _children() -> float:
@@ -155,14 +154,27 @@ def workers(folder: Path, count: int) -> bool:
 
 
 def memory(folder: Path, count: int) -> bool:
-    """Memory of a process for some rows, and for ten times as many."""
-    values = poses(count)
-    few, many = write(values[: count // 10], folder, "few"), write(values, folder, "many")
-    found = {}
-    for name, files in (("few", few), ("many", many)):
-        found[name] = spent(*batch(files["csv"], folder), times=1).memory
-        print(f"memory       {name}: {found[name]:.0f} MB (bar {MEMORY})", flush=True)
+    """Memory of a process for some rows, and for ten times as many: the same hundred thousand again and again."""
+    block, found = min(count // 10, 100_000), {}
+    heading, _, lines = write(poses(block), folder, "block")["csv"].read_text().partition("\n")
+    for name, size in (("few", count // 10), ("many", count)):
+        given = folder / f"{name}.csv"
+        with given.open("w") as file:
+            file.write(f"{heading}\n")
+            file.writelines(lines for _ in range(size // block))
+        words = [sys.executable, "-m", "armkin", *map(str, batch(given, folder))]
+        # by way of a small process: what a process had before it became the command counts as the command's
+        said = subprocess.run([sys.executable, "-c", _LARGEST, *words], capture_output=True, text=True, check=True)
+        found[name] = int(said.stdout) / 1024
+        print(f"memory       {size:,} rows: {found[name]:.0f} MB (bar {MEMORY})", flush=True)
     return found["many"] <= MEMORY
+
+
+_LARGEST = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+"""
 
 
 def second(job: float, chunk: bytes) -> bytes:

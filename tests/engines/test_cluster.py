@@ -89,6 +89,15 @@ def test_a_batch_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path, mo
     assert one.read_bytes() == two.read_bytes()
 
 
+def test_work_is_shared_by_one_kind_of_engine(tmp_path: Path) -> None:
+    """Before anything is connected to, or written."""
+    words = ("reach", "three_dof", "--grid", 200, "--out", tmp_path / "one.npz")
+    found = run(*words, "--workers", 2, "--cluster", "tcp://127.0.0.1:1")
+    assert found.code == 2
+    assert "--workers and --cluster" in found.err
+    assert not [*tmp_path.iterdir()]
+
+
 def test_reach_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path) -> None:
     one, two = tmp_path / "one.npz", tmp_path / "two.npz"
     words = ("reach", "three_dof", "--grid", 60, "--out")

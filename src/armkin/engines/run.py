@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
+from armkin.errors import UsageError
+
 Chunk = TypeVar("Chunk")
 Result = TypeVar("Result")
 
@@ -31,8 +33,10 @@ def in_order(
 ) -> Iterator[Result]:
     """``work(job, chunk)`` of every chunk; work is a function of a module, job and chunks can be pickled.
 
-    Chunks are taken as they are needed. Raises what `work` raises; ClusterError.
+    Chunks are taken as they are needed. Raises what `work` raises; ClusterError; UsageError for both kinds of engine.
     """
+    if engine.cluster is not None and engine.workers != 1:
+        raise UsageError("--workers and --cluster: the cluster has workers of its own; leave one of the two away")
     if engine.cluster is not None:
         from armkin.engines import cluster
 
