@@ -1,0 +1,55 @@
+"""What short ways decide of edge targets is what the long ones decide."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.inverse.singular import components, local_structure
+from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.task import targets_of
+
+ARMS = ("three_dof", "puma560", "ur5e")
+
+
+def beside_folds(arm: armkin.Arm) -> np.ndarray:
+    """Postures (N, n) with joint 3 beside a stretched or folded elbow, 1e-6 to 1e-3 rad off."""
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-np.pi, np.pi, (16, arm.n))
+    wrist = (arm.link[3] @ arm.link[4])[:2, 3] if arm.name == "puma560" else np.array([1.0, 0.0])
+    stretched = -float(np.arctan2(wrist[1], wrist[0]))
+    q[:, 2] = stretched + rng.choice([0.0, np.pi], 16) + rng.choice([-1.0, 1.0], 16) * np.geomspace(1e-6, 1e-3, 16)
+    return q
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_the_curvature_tells_what_the_followed_curve_tells(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = armkin.load(name)
+    task, q = task_for(arm), beside_folds(arm)
+    target = np.asarray(targets_of(task, armkin.fk(arm, q), q))
+    short = local_structure.local_structure(arm, task, q, target)
+    monkeypatch.setattr(local_structure, "_second_order", lambda *_: None)
+    long = local_structure.local_structure(arm, task, q, target)
+    assert short.known.all()
+    assert np.array_equal(short.known, long.known)
+    assert np.array_equal(short.boundary, long.boundary)
+    assert np.array_equal(short.manifold, long.manifold)
+    assert 0 < short.boundary.sum() < len(q)
+    np.testing.assert_allclose(short.low, long.low, rtol=0.1)
+    np.testing.assert_allclose(short.high, long.high, rtol=0.1)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_plain_folds_are_those_that_one_by_one_are_found(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = armkin.load(name)
+    rng = np.random.default_rng(6)
+    q = np.concatenate([beside_folds(arm), rng.integers(-4, 4, (8, arm.n)) * np.pi / 4])
+    target = np.asarray(targets_of(task_for(arm), armkin.fk(arm, q), q))
+    short = armkin.ik(arm, target)
+    monkeypatch.setattr(components, "FEW", 0)
+    long = armkin.ik(arm, target)
+    assert {0, 1} <= set(short.status.tolist())
+    for field in ("status", "valid", "free", "complete"):
+        assert np.array_equal(getattr(short, field), getattr(long, field)), field
+    np.testing.assert_allclose(np.nan_to_num(short.q), np.nan_to_num(long.q), atol=1e-3)
