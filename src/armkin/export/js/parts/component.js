@@ -139,7 +139,7 @@ function component(q, goal) {
 /** What the series say; null where the component leaves a span without any joint having moved by REACH.
  * @param {number[][]} x @param {number[][]} g @param {number} span */
 function decided(x, g, span) {
-  const over = (/** @type {number} */ s) => Math.hypot(...chebyshev(g, s)) > SOLUTION;
+  const over = (/** @type {number} */ s) => norm(chebyshev(g, s)) > SOLUTION;
   const [low, high] = [-1, 1].map((sign) => {
     let inner = 0;
     for (let outer of POINTS) {

@@ -1,40 +1,64 @@
+const MOST_COLUMNS = 64; // of a matrix that is decomposed: six joints, or as many ways out of a posture
+const ORTHOGONAL = 1e-15; // the cosine between columns that rounding leaves
+const wholeColumns = new Float64Array(MOST_COLUMNS * 2 * MOST_COLUMNS);
+const squares = new Float64Array(MOST_COLUMNS);
+
 /**
  * Singular value decomposition A = U S V' of a small matrix by rotations of its columns (Hestenes 1958).
  * @param {number[][]} A m rows of n
  * @returns {{U: number[][], S: number[], V: number[][]}} columns of U and V, largest singular value first
  */
 function decompose(A) {
+  const m = A.length;
   const n = A[0].length;
-  const U = Array.from({ length: n }, (_, j) => A.map((row) => row[j]));
-  const V = Array.from({ length: n }, (_, j) => Array.from({ length: n }, (_, i) => (i === j ? 1 : 0)));
+  const all = m + n; // columns of A V, and below them those of V
+  const W = wholeColumns;
+  const square = squares;
+  for (let j = 0; j < n; j++) {
+    for (let i = 0; i < m; i++) W[all * j + i] = A[i][j];
+    for (let i = 0; i < n; i++) W[all * j + m + i] = i === j ? 1 : 0;
+  }
   for (let sweep = 0, rotated = true; rotated && sweep < 40; sweep++) {
     rotated = false;
+    for (let j = 0; j < n; j++) {
+      square[j] = 0;
+      for (let i = all * j; i < all * j + m; i++) square[j] += W[i] * W[i];
+    }
     for (let j = 0; j < n; j++)
       for (let k = j + 1; k < n; k++) {
-        const a = dot(U[j], U[j]);
-        const b = dot(U[k], U[k]);
-        const c = dot(U[j], U[k]);
-        if (Math.abs(c) <= 1e-16 * Math.sqrt(a * b) || c * c < 1e-300) continue;
+        const a = square[j];
+        const b = square[k];
+        let c = 0;
+        for (let i = 0; i < m; i++) c += W[all * j + i] * W[all * k + i];
+        if (Math.abs(c) <= ORTHOGONAL * Math.sqrt(a * b) || c * c < 1e-300) continue;
         rotated = true;
         const z = (b - a) / (2 * c);
         const t = (z < 0 ? -1 : 1) / (Math.abs(z) + Math.sqrt(1 + z * z));
         const cosine = 1 / Math.sqrt(1 + t * t);
-        for (const W of [U, V])
-          for (let i = 0; i < W[j].length; i++) {
-            const x = W[j][i];
-            const y = W[k][i];
-            W[j][i] = cosine * (x - t * y);
-            W[k][i] = cosine * (y + t * x);
-          }
+        const sine = cosine * t;
+        for (let to = all * j, from = all * k; to < all * j + all; to++, from++) {
+          const x = W[to];
+          const y = W[from];
+          W[to] = cosine * x - sine * y;
+          W[from] = cosine * y + sine * x;
+        }
+        square[j] = a - t * c;
+        square[k] = b + t * c;
       }
   }
-  const size = U.map((u) => Math.sqrt(dot(u, u)));
-  const order = size.map((_, j) => j).sort((a, b) => size[b] - size[a]);
-  return {
-    U: order.map((j) => U[j].map((x) => (size[j] > 0 ? x / size[j] : 0))),
-    S: order.map((j) => size[j]),
-    V: order.map((j) => V[j]),
-  };
+  const U = [];
+  const S = [];
+  const V = [];
+  for (let j = 0; j < n; j++) {
+    const u = Array.from(W.subarray(all * j, all * j + m));
+    const size = Math.sqrt(dot(u, u));
+    let at = j;
+    for (; at > 0 && S[at - 1] < size; at--);
+    U.splice(at, 0, size > 0 ? u.map((x) => x / size) : u);
+    S.splice(at, 0, size);
+    V.splice(at, 0, Array.from(W.subarray(all * j + m, all * (j + 1))));
+  }
+  return { U, S, V };
 }
 
 /** @param {Numbers} a @param {Numbers} b */
@@ -43,6 +67,9 @@ function dot(a, b) {
   for (let i = 0; i < a.length; i++) sum += a[i] * b[i];
   return sum;
 }
+
+/** The length of a vector. @param {Numbers} v */
+const norm = (v) => Math.sqrt(dot(v, v));
 
 /** to -= factor what, n numbers from these places on.
  * @param {Float64Array} to @param {number} at @param {Numbers} what @param {number} from @param {number} factor @param {number} n */

@@ -1,3 +1,5 @@
+const REGULAR = 1e-5; // singular value from which on a Jacobian is inverted
+
 /**
  * What joint values miss of a target: lengths in reaches, angles in rad.
  * @param {Numbers} q @param {Numbers} goal @returns {number[]}
@@ -84,8 +86,11 @@ function apartFrom(T, q, goal) {
 function slope(q) {
   slopeOf(q, slopes);
   const n = ARM.joints;
-  const row = (/** @type {number} */ i, /** @type {number} */ scale) =>
-    Array.from({ length: n }, (_, j) => slopes[n * i + j] * ARM.unit[j] * scale);
+  const row = (/** @type {number} */ i, /** @type {number} */ scale) => {
+    const out = new Array(n);
+    for (let j = 0; j < n; j++) out[j] = slopes[n * i + j] * ARM.unit[j] * scale;
+    return out;
+  };
   const rows = [];
   for (let i = 0; i < ARM.position; i++) rows.push(row(i, 1 / ARM.reach));
   for (const sum of ARM.sums) rows.push(sum.map((x, j) => x * ARM.unit[j]));
@@ -103,10 +108,41 @@ function slope(q) {
 }
 
 /** How far joint values miss a target: the norm of the residual. @param {Numbers} q @param {Numbers} goal */
-const missed = (q, goal) => Math.hypot(...residual(q, goal));
+const missed = (q, goal) => norm(residual(q, goal));
 
 /** @param {number[]} a @param {number[]} b */
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+const stepSystem = new Float64Array(ARM.joints * (2 * ARM.joints + 1));
+
+/** The step that takes a residual away, where the Jacobian's inverse says that no direction is weak; else null.
+ * @param {number[][]} J @param {number[]} r @param {number} weakest */
+function regularStep(J, r, weakest) {
+  const n = ARM.joints;
+  const wide = 2 * n + 1;
+  if (r.length !== n) return null;
+  for (let i = 0; i < n; i++)
+    for (let j = 0; j < wide; j++) stepSystem[wide * i + j] = j < n ? J[i][j] : j === n ? r[i] : j - n - 1 === i ? 1 : 0;
+  if (!reduce(stepSystem, n, n, wide)) return null;
+  let square = 0;
+  for (let i = 0; i < n; i++) for (let j = n + 1; j < wide; j++) square += stepSystem[wide * i + j] ** 2;
+  if (!(square * Math.max(weakest, REGULAR) ** 2 < 1)) return null; // its norm is no less than one over the weakest singular value
+  const move = new Array(n);
+  for (let j = 0; j < n; j++) move[j] = stepSystem[wide * j + n];
+  return move;
+}
+
+/** The least step that takes a residual away, but along weak directions. @param {number[][]} J @param {number[]} r @param {number} weakest */
+function weakStep(J, r, weakest) {
+  const { U, S, V } = decompose(J);
+  const move = new Array(ARM.joints).fill(0);
+  for (let k = 0; k < S.length; k++) {
+    if (!(S[k] > weakest)) continue;
+    const along = dot(U[k], r) / S[k];
+    for (let j = 0; j < move.length; j++) move[j] += along * V[k][j];
+  }
+  return move;
+}
 
 /**
  * Newton's method, the step along weak directions damped.
@@ -119,17 +155,13 @@ function newton(start, goal, steps, weakest = 1e-10) {
   let best = { q, missed: Infinity };
   for (let step = 0; step <= steps; step++) {
     const r = residual(q, goal);
-    const size = Math.hypot(...r);
+    const size = norm(r);
     if (size < best.missed) best = { q, missed: size };
     if (size < 1e-15 || step === steps) break;
-    const { U, S, V } = decompose(slope(q));
-    const move = new Array(ARM.joints).fill(0);
-    S.forEach((s, k) => {
-      if (!(s > weakest)) return;
-      const along = dot(U[k], r) / s;
-      V[k].forEach((v, j) => (move[j] += along * v));
-    });
-    const longest = Math.max(...move.map(Math.abs));
+    const J = slope(q);
+    const move = regularStep(J, r, weakest) ?? weakStep(J, r, weakest);
+    let longest = 0;
+    for (let j = 0; j < move.length; j++) longest = Math.max(longest, Math.abs(move[j]));
     const scale = longest > 0.3 ? 0.3 / longest : 1;
     q = q.map((x, j) => x + scale * move[j] * ARM.unit[j]);
   }
