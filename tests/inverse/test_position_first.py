@@ -63,6 +63,14 @@ def test_no_posture_of_a_grid_is_nearer(name: str, sample: Callable[[int, int], 
     assert (s.status[~own] == Status.POSITION).sum() >= 14  # a turn about an axis may be one that the arm can make
 
 
+def test_small_basins_on_limits_are_found() -> None:
+    """Two of 250 targets of an SO-101 were answered 4 and 10 degrees worse than a grid does."""
+    arm = armkin.load("so101")
+    s = armkin.ik(arm, targets(arm, 250, 7)[[57, 93]], "pose", position_first=True)
+    assert s.angle is not None
+    assert np.rad2deg(s.angle[:, 0]) == pytest.approx([87.788808, 98.651210], abs=1e-5)
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_rows_are_minima_each_once_by_angle(name: str) -> None:
     arm = armkin.load(name)

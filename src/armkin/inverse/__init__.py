@@ -19,6 +19,7 @@ traced.py      and their families
 pieces.py      pieces of such curves: intervals of the redundant joint
 families.py    one joint more than the target asks for: intervals of the redundant joint
 position_first.py  four or five joints asked for a pose: the position exact, the rotation as near as it goes
+minima.py     the descent to those postures
 solve.py      `ik`
 choose.py     one branch a target, of an arm with joints held or swept, too; or why none is
 """

@@ -1,10 +1,7 @@
 """Arms of four or five joints asked for a pose: the position exact, the rotation as near as it goes.
 
 Over the postures within limits whose tool stands at the target's position, a family of one or two dimensions, the rows
-are the local minima of the rotation angle. Minimised is f = 1 - cos(angle) = (3 - trace(R_target' R)) / 2, smooth up to
-half a turn, by Newton's method in the null space of the position's Jacobian, with the exact second derivatives of the
-chain and an active set of limits (Nocedal and Wright, Numerical Optimization, 2006, 16.5 and 18.1), from many
-postures at once.
+are the local minima of the rotation angle: `minima` descends to them from many postures at once.
 """
 
 from __future__ import annotations
@@ -12,26 +9,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array
 from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.minima import Box, box_of, descend, flat_minima
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     EQUAL,
-    LEVEL_CURVATURE,
     ONE_MINIMUM,
     SAME,
     SOLUTION,
-    STATIONARY,
     TINY,
     WEAK,
 )
@@ -42,15 +38,14 @@ from armkin.inverse.tasks.task import Task, read_near, read_targets
 from armkin.keep_out.clearance import clear
 from armkin.model.arm import actual
 from armkin.model.limits import outside
-from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 POOL = 32_768  # postures within limits
+ON_LIMIT = 0.25  # share of their joints that are on a limit
 NEAREST = 1024  # of them, those nearest to a target's position
-STARTS = 144  # of these, those farthest from each other
-STEPS = 80  # of one start
+STARTS = 256  # of these, those farthest from each other
 AT_ONCE = 64  # targets worked on together
 METHOD = "position first"
 Ik = Callable[..., Solutions]
@@ -126,9 +121,9 @@ def closest_each(arm: Arm, targets: Array, near: Array) -> list[Closest]:
 
 def _of_chunk(ik: Ik, arm: Arm, task: Task, target: Array, near: Array) -> list[Array]:
     """The minima (B, n) of each of some targets, sorted."""
-    box = _box(arm)
+    box = box_of(arm)
     q, row = _seeds(arm, box, target, near)
-    state = _descend(arm, box, q, target[row])
+    state = descend(arm, box, q, target[row])
     q, row = state.q[state.done], row[state.done]
     exact = _exact(ik, arm, target, near)
     out = []
@@ -162,7 +157,7 @@ def _sorted(arm: Arm, task: Task, q: Array, exact: int, target: Array, near: Arr
     level[by_angle] = np.cumsum(np.diff(angle[by_angle], prepend=0.0) > ONE_MINIMUM)
     order = np.lexsort((motion.round(EQUAL), searched, level))
     q, level = q[order], level[order]
-    flat = _flat(arm, q, target)
+    flat = flat_minima(arm, q, target)
     kept: list[int] = []
     for i in range(len(q)):
         same = [j for j in kept if level[j] == level[i]]
@@ -172,33 +167,23 @@ def _sorted(arm: Arm, task: Task, q: Array, exact: int, target: Array, near: Arr
     return q[kept]
 
 
-class _Box(NamedTuple):
-    """Limits (n,) that can hold a minimum: those of joints that turn less than a whole turn."""
-
-    lower: Array
-    upper: Array
-    unit: Array
-
-
-def _box(arm: Arm) -> _Box:
-    turns = ~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi)
-    return _Box(
-        np.where(turns, -np.inf, arm.lower), np.where(turns, np.inf, arm.upper), np.asarray(radian_or_reach(arm))
-    )
-
-
 @lru_cache(maxsize=16)
 def _pool(arm: Arm) -> tuple[Array, Array]:
-    """Postures spread within limits (P, n), and where the tool stands there (P, 3)."""
+    """Postures spread within limits (P, n), and where the tool stands there (P, 3).
+
+    A joint in four is on a limit: so are those of many minima.
+    """
     rng = np.random.default_rng(12)
     span = np.where(arm.prismatic, arm.reach, np.pi)
     low = np.where(np.isfinite(arm.lower), arm.lower, np.minimum(-span, arm.home - span))
     high = np.where(np.isfinite(arm.upper), arm.upper, np.maximum(span, arm.home + span))
     q = rng.uniform(low, high, (POOL, arm.n))
+    limit = np.where(rng.random(q.shape) < 0.5, arm.lower, arm.upper)
+    q = np.where((rng.random(q.shape) < ON_LIMIT) & np.isfinite(limit), limit, q)
     return q, position(arm, q)
 
 
-def _seeds(arm: Arm, box: _Box, target: Array, near: Array) -> tuple[Array, NDArray[np.intp]]:
+def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, NDArray[np.intp]]:
     """Postures (M, n) at the targets' positions, within limits, and whose target each is (M,)."""
     pool, tips = _pool(arm)
     point = target[:, :3, 3]
@@ -226,7 +211,7 @@ def _spread(arm: Arm, q: Array) -> Array:
     return np.asarray(q[rows[:, None], taken])
 
 
-def _to_position(arm: Arm, box: _Box, q: Array, point: Array, steps: int) -> tuple[Array, Array]:
+def _to_position(arm: Arm, box: Box, q: Array, point: Array, steps: int) -> tuple[Array, Array]:
     """Projected Gauss-Newton of least norm onto positions (M, 3); also what is missed [reaches]."""
     q = q.copy()
     active = np.arange(len(q))
@@ -254,143 +239,3 @@ def _least(J: Array, c: Array) -> Array:
     G = J @ J.swapaxes(1, 2) + (1e-2 * size + WEAK * WEAK) * np.eye(3)
     step: Array = (J.swapaxes(1, 2) @ np.linalg.solve(G, c[:, :, None]))[:, :, 0]
     return step
-
-
-class _Local(NamedTuple):
-    """f to second order at postures (M, n), joints in rad or reaches, and the position's Jacobian."""
-
-    missed: Array  # (M, 3) [reaches]
-    f: Array
-    J: Array  # (M, 3, n)
-    g: Array  # (M, n)
-    H: Array  # (M, n, n)
-    bend: Array  # (M, 3, n, n) second derivatives of the position
-
-
-def _local(arm: Arm, box: _Box, q: Array, target: Array) -> _Local:
-    T, slopes = tip_and_jacobian(arm, q)
-    p, w = slopes[:, :3] * (box.unit / arm.reach), slopes[:, 3:]
-    C = T[:, :3, :3] @ target[:, :3, :3].swapaxes(1, 2)
-    trace = np.trace(C, axis1=1, axis2=2)
-    twist = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], axis=1)
-    g = 0.5 * np.einsum("mi,mij->mj", twist, w)
-    # of joints i <= j: d2R = [w_i][w_j] R, d2p = w_i x dp_j
-    H = -0.5 * (np.einsum("mai,mab,mbj->mij", w, C, w) - np.einsum("mai,maj->mij", w, w) * trace[:, None, None])
-    bend = np.cross(w.swapaxes(1, 2)[:, :, None], p.swapaxes(1, 2)[:, None]).transpose(0, 3, 1, 2)
-    upper = np.triu(np.ones((arm.n, arm.n)))
-    strict = np.triu(np.ones((arm.n, arm.n)), 1)
-    H, bend = (np.where(upper > 0, A, 0.0) for A in (H, bend))
-    H, bend = (A + (A * strict).swapaxes(-1, -2) for A in (H, bend))
-    return _Local((target[:, :3, 3] - T[:, :3, 3]) / arm.reach, 0.5 * (3.0 - trace), p, g, H, bend)
-
-
-class _Tangent(NamedTuple):
-    """What the constraints leave: P (M, n, n) projects onto it, `back` (M, n, 3) undoes what the position misses."""
-
-    P: Array
-    back: Array
-    multipliers: Array  # (M, 3) of the position
-    H: Array  # (M, n, n) of the Lagrangian
-    slope: Array  # (M, n) of the Lagrangian
-
-
-def _tangent(at: _Local, held: Bool) -> _Tangent:
-    n = held.shape[1]
-    J = np.where(held[:, None, :], 0.0, at.J)
-    U, S, Vt = np.linalg.svd(J, full_matrices=False)
-    gain = np.where(S > WEAK, 1.0 / np.maximum(S, WEAK), 0.0)
-    back = np.einsum("mkn,mk,mak->mna", Vt, gain, U)
-    rows = Vt * (S > WEAK)[:, :, None]
-    P = np.eye(n) * ~held[:, :, None] - rows.swapaxes(1, 2) @ rows
-    multipliers = -np.einsum("mna,mn->ma", back, np.where(held, 0.0, at.g))
-    slope = at.g + np.einsum("man,ma->mn", at.J, multipliers)
-    H = at.H + np.einsum("maij,ma->mij", at.bend, multipliers)
-    return _Tangent(P, back, multipliers, P @ H @ P, slope)
-
-
-class _State(NamedTuple):
-    q: Array
-    done: Bool
-
-
-def _descend(arm: Arm, box: _Box, q: Array, target: Array) -> _State:
-    """Newton's method along the postures at a position, from each of them to its local minimum."""
-    q, M = q.copy(), len(q)
-    held = np.zeros(q.shape, bool)
-    trust = np.full(M, 0.5)
-    done = np.zeros(M, bool)
-    active = np.arange(M)
-    for _ in range(STEPS):
-        if not len(active):
-            break
-        x, goal = q[active], target[active]
-        at = _local(arm, box, x, goal)
-        low, high = x <= box.lower, x >= box.upper
-        hold = held[active] & (low | high)
-        tangent = _tangent(at, hold)
-        across = np.einsum("mij,mj->mi", tangent.P, at.g)
-        flat = np.abs(across).max(axis=1) <= STATIONARY
-        # at rest: a limit whose multiplier pulls away from it lets go, the strongest first
-        pull = np.where(hold & low, -tangent.slope, np.where(hold & high, tangent.slope, -np.inf))
-        worst = pull.argmax(axis=1)
-        leaves = flat & (pull.max(axis=1) > STATIONARY)
-        values, vectors = np.linalg.eigh(tangent.H)
-        least = values[:, 0]
-        rest = flat & ~leaves & (least > -LEVEL_CURVATURE) & (np.abs(at.missed).max(axis=1) <= SOLUTION * SAME * 10)
-        done[active[rest]] = True
-        hold[leaves, worst[leaves]] = False
-        held[active] = hold
-        saddle = flat & ~leaves & ~rest
-        along = np.einsum("mij,mi->mj", vectors, -across)
-        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), LEVEL_CURVATURE))
-        step[saddle] = vectors[saddle, :, 0] * 0.05
-        step += np.einsum("mna,ma->mn", tangent.back, at.missed)
-        step = np.where(hold, 0.0, step)
-        pressed = ((low & (step < 0)) | (high & (step > 0))) & ~hold
-        blocked = pressed.any(axis=1) & ~leaves
-        held[active] |= pressed
-        step *= np.minimum(1.0, trust[active] / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
-        room = np.where(step > 0, (box.upper - x) / box.unit, (x - box.lower) / box.unit)
-        share = np.where(np.abs(step) > TINY, room / np.maximum(np.abs(step), TINY), np.inf)
-        share[pressed] = np.inf
-        reach = np.minimum(1.0, share.min(axis=1))
-        hit = (share <= reach[:, None]) & (share < 1.0)
-        trial = np.clip(x + np.where(pressed, 0.0, step * reach[:, None]) * box.unit, box.lower, box.upper)
-        trial = np.where(hit & (step > 0), box.upper, np.where(hit & (step < 0), box.lower, trial))
-        trial = _back(arm, box, trial, goal, tangent)
-        T = fk(arm, trial)
-        missed = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
-        f = 0.5 * (3.0 - np.einsum("mij,mij->m", T[:, :3, :3], goal[:, :3, :3]))
-        before = at.f + 10.0 * np.linalg.norm(at.missed, axis=1)
-        better = (f + 10.0 * missed <= before + SOLUTION * SAME) & ~rest & ~(blocked & flat)
-        better &= ~leaves
-        go = active[better]
-        q[go] = trial[better]
-        held[go] |= hit[better]
-        trust[go] = np.minimum(2.0 * trust[go], 0.5)
-        refused = active[~better & ~rest & ~blocked & ~leaves]
-        trust[refused] *= 0.25
-        active = active[~rest & (trust[active] > SOLUTION)]
-    return _State(q, done)
-
-
-def _back(arm: Arm, box: _Box, q: Array, target: Array, tangent: _Tangent) -> Array:
-    """Postures (M, n) moved back onto their positions, with the Jacobian of before."""
-    for _ in range(2):
-        missed = (target[:, :3, 3] - fk(arm, q)[:, :3, 3]) / arm.reach
-        q = np.clip(q + np.einsum("mna,ma->mn", tangent.back, missed) * box.unit, box.lower, box.upper)
-    return q
-
-
-def _flat(arm: Arm, q: Array, target: Array) -> Bool:
-    """Whether minima (M, n) of one target lie on a curve of such."""
-    if not len(q):
-        return np.zeros(0, bool)
-    box = _box(arm)
-    at = _local(arm, box, q, np.broadcast_to(target, (len(q), 4, 4)))
-    held = (q <= box.lower) | (q >= box.upper)
-    tangent = _tangent(at, held)
-    values, vectors = np.linalg.eigh(tangent.H)
-    inside = np.linalg.norm(tangent.P @ vectors, axis=1) > 0.5
-    flat: Bool = (inside & (np.abs(values) <= LEVEL_CURVATURE)).any(axis=1)
-    return flat

@@ -1,0 +1,192 @@
+"""The descent to the minima of the rotation angle at a position.
+
+Minimised is f = 1 - cos(angle) = (3 - trace(R_target' R)) / 2, smooth up to half a turn, by Newton's method in the null
+space of the position's Jacobian, with the exact second derivatives of the chain and an active set of limits (Nocedal
+and Wright, Numerical Optimization, 2006, 16.5 and 18.1), from many postures at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.forward import fk, position, tip_and_jacobian
+from armkin.inverse.numeric.tolerances import LEVEL_CURVATURE, SAME, SOLUTION, STATIONARY, TINY, WEAK
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+STEPS = 80  # of one start
+
+
+class Box(NamedTuple):
+    """Limits (n,) that can hold a minimum: those of joints that turn less than a whole turn."""
+
+    lower: Array
+    upper: Array
+    unit: Array
+
+
+def box_of(arm: Arm) -> Box:
+    turns = ~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi)
+    return Box(
+        np.where(turns, -np.inf, arm.lower), np.where(turns, np.inf, arm.upper), np.asarray(radian_or_reach(arm))
+    )
+
+
+class _Local(NamedTuple):
+    """f to second order at postures (M, n), joints in rad or reaches, and the position's Jacobian."""
+
+    missed: Array  # (M, 3) [reaches]
+    f: Array
+    J: Array  # (M, 3, n)
+    g: Array  # (M, n)
+    H: Array  # (M, n, n)
+    bend: Array  # (M, 3, n, n) second derivatives of the position
+
+
+def _local(arm: Arm, box: Box, q: Array, target: Array) -> _Local:
+    T, slopes = tip_and_jacobian(arm, q)
+    p, w = slopes[:, :3] * (box.unit / arm.reach), slopes[:, 3:]
+    C = T[:, :3, :3] @ target[:, :3, :3].swapaxes(1, 2)
+    trace = np.trace(C, axis1=1, axis2=2)
+    twist = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], axis=1)
+    g = 0.5 * np.einsum("mi,mij->mj", twist, w)
+    # of joints i <= j: d2R = [w_i][w_j] R, d2p = w_i x dp_j
+    H = -0.5 * (np.einsum("mai,mab,mbj->mij", w, C, w) - np.einsum("mai,maj->mij", w, w) * trace[:, None, None])
+    bend = np.cross(w.swapaxes(1, 2)[:, :, None], p.swapaxes(1, 2)[:, None]).transpose(0, 3, 1, 2)
+    upper = np.triu(np.ones((arm.n, arm.n)))
+    strict = np.triu(np.ones((arm.n, arm.n)), 1)
+    H, bend = (np.where(upper > 0, A, 0.0) for A in (H, bend))
+    H, bend = (A + (A * strict).swapaxes(-1, -2) for A in (H, bend))
+    return _Local((target[:, :3, 3] - T[:, :3, 3]) / arm.reach, 0.5 * (3.0 - trace), p, g, H, bend)
+
+
+class _Tangent(NamedTuple):
+    """What the constraints leave: P (M, n, n) projects onto it, `back` (M, n, 3) undoes what the position misses."""
+
+    P: Array
+    back: Array
+    multipliers: Array  # (M, 3) of the position
+    H: Array  # (M, n, n) of the Lagrangian
+    slope: Array  # (M, n) of the Lagrangian
+
+
+def _tangent(at: _Local, held: Bool) -> _Tangent:
+    n = held.shape[1]
+    J = np.where(held[:, None, :], 0.0, at.J)
+    U, S, Vt = np.linalg.svd(J, full_matrices=False)
+    gain = np.where(S > WEAK, 1.0 / np.maximum(S, WEAK), 0.0)
+    back = np.einsum("mkn,mk,mak->mna", Vt, gain, U)
+    rows = Vt * (S > WEAK)[:, :, None]
+    P = np.eye(n) * ~held[:, :, None] - rows.swapaxes(1, 2) @ rows
+    multipliers = -np.einsum("mna,mn->ma", back, np.where(held, 0.0, at.g))
+    slope = at.g + np.einsum("man,ma->mn", at.J, multipliers)
+    H = at.H + np.einsum("maij,ma->mij", at.bend, multipliers)
+    return _Tangent(P, back, multipliers, P @ H @ P, slope)
+
+
+class State(NamedTuple):
+    q: Array
+    done: Bool
+
+
+class _Move(NamedTuple):
+    """A step (M, n) of each posture, and what is to be done with it."""
+
+    step: Array
+    back: Array  # (M, n, 3) of `_Tangent`
+    pressed: Bool  # (M, n) joints that it would take beyond a limit
+    flat: Bool  # (M,) nothing leads downhill
+    rest: Bool  # (M,) a minimum
+    leaves: Bool  # (M,) a limit lets go instead
+    blocked: Bool  # (M,) a limit takes hold first
+
+
+def _move(box: Box, at: _Local, x: Array, held: Bool) -> _Move:
+    """Newton's step of postures x (M, n), at limits held (M, n), which lets go of one of them where it is to."""
+    low, high = x <= box.lower, x >= box.upper
+    held &= low | high
+    tangent = _tangent(at, held)
+    across = np.einsum("mij,mj->mi", tangent.P, at.g)
+    flat = np.abs(across).max(axis=1) <= STATIONARY
+    # at rest: a limit whose multiplier pulls away from it lets go, the strongest first
+    pull = np.where(held & low, -tangent.slope, np.where(held & high, tangent.slope, -np.inf))
+    leaves = flat & (pull.max(axis=1) > STATIONARY)
+    values, vectors = np.linalg.eigh(tangent.H)
+    there = np.abs(at.missed).max(axis=1) <= SOLUTION * SAME * 10
+    rest = flat & ~leaves & (values[:, 0] > -LEVEL_CURVATURE) & there
+    held[leaves, pull.argmax(axis=1)[leaves]] = False
+    saddle = flat & ~leaves & ~rest
+    along = np.einsum("mij,mi->mj", vectors, -across)
+    step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), LEVEL_CURVATURE))
+    step[saddle] = vectors[saddle, :, 0] * 0.05
+    step = np.where(held, 0.0, step + np.einsum("mna,ma->mn", tangent.back, at.missed))
+    pressed = ((low & (step < 0)) | (high & (step > 0))) & ~held
+    held |= pressed
+    return _Move(step, tangent.back, pressed, flat, rest, leaves, pressed.any(axis=1) & ~leaves)
+
+
+def _tried(arm: Arm, box: Box, x: Array, goal: Array, move: _Move, trust: Array) -> tuple[Array, Bool]:
+    """Where the steps of at most trust (M,) lead, to the first limit at most; joints (M, n) that come onto one."""
+    step = move.step * np.minimum(1.0, trust / np.maximum(np.abs(move.step).max(axis=1), TINY))[:, None]
+    room = np.where(step > 0, (box.upper - x) / box.unit, (x - box.lower) / box.unit)
+    share = np.where(np.abs(step) > TINY, room / np.maximum(np.abs(step), TINY), np.inf)
+    share[move.pressed] = np.inf
+    reach = np.minimum(1.0, share.min(axis=1))
+    hit = (share <= reach[:, None]) & (share < 1.0)
+    trial = np.clip(x + np.where(move.pressed, 0.0, step * reach[:, None]) * box.unit, box.lower, box.upper)
+    trial = np.where(hit & (step > 0), box.upper, np.where(hit & (step < 0), box.lower, trial))
+    for _ in range(2):  # back onto the position, with the Jacobian of before
+        missed = (goal[:, :3, 3] - position(arm, trial)) / arm.reach
+        trial = np.clip(trial + np.einsum("mna,ma->mn", move.back, missed) * box.unit, box.lower, box.upper)
+    return trial, hit
+
+
+def descend(arm: Arm, box: Box, q: Array, target: Array) -> State:
+    """Newton's method along the postures at a position, from each of them to its local minimum."""
+    q, M = q.copy(), len(q)
+    held = np.zeros(q.shape, bool)
+    trust = np.full(M, 0.5)
+    done = np.zeros(M, bool)
+    active = np.arange(M)
+    for _ in range(STEPS):
+        if not len(active):
+            break
+        x, goal, hold = q[active], target[active], held[active]
+        at = _local(arm, box, x, goal)
+        move = _move(box, at, x, hold)
+        done[active[move.rest]] = True
+        held[active] = hold
+        trial, hit = _tried(arm, box, x, goal, move, trust[active])
+        T = fk(arm, trial)
+        missed = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
+        f = 0.5 * (3.0 - np.einsum("mij,mij->m", T[:, :3, :3], goal[:, :3, :3]))
+        before = at.f + 10.0 * np.linalg.norm(at.missed, axis=1)
+        better = (f + 10.0 * missed <= before + SOLUTION * SAME) & ~move.rest & ~move.leaves
+        better &= ~(move.blocked & move.flat)
+        go = active[better]
+        q[go] = trial[better]
+        held[go] |= hit[better]
+        trust[go] = np.minimum(2.0 * trust[go], 0.5)
+        refused = active[~better & ~move.rest & ~move.blocked & ~move.leaves]
+        trust[refused] *= 0.25
+        active = active[~move.rest & (trust[active] > SOLUTION)]
+    return State(q, done)
+
+
+def flat_minima(arm: Arm, q: Array, target: Array) -> Bool:
+    """Whether minima (M, n) of one target lie on a curve of such."""
+    if not len(q):
+        return np.zeros(0, bool)
+    box = box_of(arm)
+    at = _local(arm, box, q, np.broadcast_to(target, (len(q), 4, 4)))
+    held = (q <= box.lower) | (q >= box.upper)
+    tangent = _tangent(at, held)
+    values, vectors = np.linalg.eigh(tangent.H)
+    inside = np.linalg.norm(tangent.P @ vectors, axis=1) > 0.5
+    flat: Bool = (inside & (np.abs(values) <= LEVEL_CURVATURE)).any(axis=1)
+    return flat
