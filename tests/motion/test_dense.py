@@ -10,7 +10,7 @@ import pytest
 import armkin
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
-from armkin.motion import branch_path, fitting
+from armkin.motion import branch_path, fitting, shown
 from armkin.motion.b_spline import banded
 from armkin.motion.path_plan import PathPlan
 
@@ -276,3 +276,28 @@ def test_an_empty_cell_of_blend_or_speed_leaves_it_to_what_is_said_of_all(three_
     file.write_text("x,y,z,blend\n390,80,,\n390,100,300,2\n")
     with pytest.raises(UsageError, match=r"corners\.csv:2: '' is no number"):
         armkin.path(three_dof, file)
+
+
+def test_a_way_shown_with_too_few_samples_is_shown_best_where_it_bends_most(three_dof: Arm) -> None:
+    plan = armkin.path(three_dof, np.concatenate([[CENTRE - [0, 240, 0]], circle(60, 20.0)]), corners="tolerance")
+    begins = plan.motion.begins.tolist()
+    whole, off = shown.times(three_dof, plan, begins, 0.02, 10_000)
+    assert off <= 0.02
+    few, worse = shown.times(three_dof, plan, begins, 0.02, len(whole) // 2)
+    assert len(few) == len(whole) // 2
+    assert worse <= 6 * off  # halves are off by a quarter as much
+
+
+def test_noise_in_a_tight_bend_is_no_corner() -> None:
+    """Points 0.1 mm apart about a bend of 1 mm: seen from afar the way turns, from point to point the noise does."""
+    a = np.linspace(0, np.pi, 32)
+    bend = np.stack([np.cos(a), np.sin(a)], axis=1)
+    legs = np.linspace(10, 0.1, 100)[:, None]
+    way = np.concatenate([[1, 0] - legs * [0, 1], bend, [-1, 0] - legs[::-1] * [0, 1]])
+    found = 0
+    for seed in range(5):
+        noise = np.random.default_rng(seed).uniform(-0.02, 0.02, way.shape)
+        found += int(fitting.corners(way + noise, 0.05).sum())
+    assert found <= 20  # 42 where it is seen from afar alone
+    sharp = np.concatenate([np.linspace([0, 0], [10, 0], 100), np.linspace([10, 0], [10, 10], 100)[1:]])
+    assert np.flatnonzero(fitting.corners(sharp, 0.05)).tolist() == [99]

@@ -18,7 +18,7 @@ from armkin.motion.chords import CORNER, Chords, turns
 from armkin.motion.least_knots import Rows, least_knots
 
 REVERSAL = np.deg2rad(160.0)  # a larger one is a stop
-_SCALE = 16.0  # tolerances: from so far off a corner is still one
+_SCALES = (4.0, 16.0)  # tolerances: from so far off a corner is still one, and a recorder's noise is none
 _BETWEEN = 6  # places of each cubic that are held to its chords in the end
 _TRIES = 5  # after which a curve that leaves its chords is given up
 
@@ -50,15 +50,15 @@ def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
     sharp = np.flatnonzero(turns(y) > CORNER) + 1
     length = np.linalg.norm(np.diff(y, axis=0), axis=1)
     u = np.concatenate([[0.0], np.cumsum(length)])
-    off = _SCALE * tolerance
     ends = np.array([0, len(y) - 1]) if stop is None else np.flatnonzero(stop)
-    next_ = np.searchsorted(ends, sharp, side="right")
-    before = np.maximum(u[sharp] - np.maximum(off, length[sharp - 1]), u[ends[next_ - 1]])
-    after = np.minimum(u[sharp] + np.maximum(off, length[sharp]), u[ends[next_]])
-    sides = [np.stack([np.interp(at, u, y[:, k]) for k in range(y.shape[1])], axis=1) for at in (before, after)]
-    if len(sharp):
+    for off in _SCALES if len(sharp) else ():
+        next_ = np.searchsorted(ends, sharp, side="right")
+        before = np.maximum(u[sharp] - np.maximum(off * tolerance, length[sharp - 1]), u[ends[next_ - 1]])
+        after = np.minimum(u[sharp] + np.maximum(off * tolerance, length[sharp]), u[ends[next_]])
+        sides = [np.stack([np.interp(at, u, y[:, k]) for k in range(y.shape[1])], axis=1) for at in (before, after)]
         far = turns(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
-        found[sharp[far > CORNER]] = True
+        sharp = sharp[far > CORNER]
+    found[sharp] = True
     found[ends[1:-1]] = True
     return found
 

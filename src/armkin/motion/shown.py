@@ -20,6 +20,7 @@ _INSIDE = (0.21, 0.5, 0.79)  # where between two samples it is looked at
 def times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int) -> tuple[Array, float]:
     """Times [s] between which the tip drawn is off by `close` [mm] at most, or by what `most` of them leave; how much.
 
+    Where they are too few, those intervals are divided first that leave the most.
     Drawn: joints that go evenly between two times, and the tip's way as its chord. begins: times that are among them.
     """
     count = int(min(most / 4, plan.duration / _FIRST)) + 2
@@ -31,10 +32,9 @@ def times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int
     while len(a):
         off = _off(arm, plan, a, b)
         bad = (off > close) & (b - a > 1e-3)
+        if bad.sum() > (room := max(most - total, 0)):
+            bad[np.argsort(np.where(bad, -off, 0.0), kind="stable")[room:]] = False
         worst = max(worst, float(off[~bad].max(initial=0.0)))
-        if total + bad.sum() > most:
-            worst = max(worst, float(off.max()))
-            break
         middle = (a[bad] + b[bad]) / 2
         done.append(middle)
         total += len(middle)
