@@ -19,6 +19,8 @@ from armkin.compiled import toolchain
 from armkin.inverse import solve as solving
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
+from armkin.model.build import build
+from armkin.robot_file import parse
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 CLOSED = ["three_dof", "puma560", "ur5e", "labvolt_5150", "cobra600", "stanford"]
@@ -343,3 +345,21 @@ def test_roots_that_solutions_share_are_taken_apart_in_c(robot: str, monkeypatch
     assert sum(asked) <= 1
     assert own.valid.sum() > 100
     found_by_elimination(found, own)
+
+
+def test_an_arm_off_its_class_is_solved_in_c_and_named_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A calibrated UR5e: all of its targets were solved in Python, 0.2 ms each."""
+    arm = build(parse((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 90,", "alpha: 89.99,", 1)))
+    target = questions(arm, "random", 60)
+    own, one, asked, solve = armkin.ik(arm, target), armkin.ik(arm, target[0]), [], solving.ik
+
+    def counted(some: armkin.Arm, targets: np.ndarray, *words: Any, **more: Any) -> armkin.Solutions:
+        asked.append(len(targets))
+        return solve(some, targets, *words, **more)
+
+    monkeypatch.setattr(solving, "ik", counted)
+    found = armkin.compile(arm).ik(target)
+    assert sum(asked) <= 1
+    assert "flip" in found.names[0]
+    found_by_elimination(found, own)
+    found_by_elimination(armkin.compile(arm).ik(target[0]), one)

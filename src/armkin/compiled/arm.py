@@ -16,6 +16,7 @@ from armkin.compiled import source, toolchain
 from armkin.compiled.one_target import Single
 from armkin.compiled.results import Results
 from armkin.errors import UsageError
+from armkin.export.c import program
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.inverse import solve
@@ -114,7 +115,10 @@ class _CompiledTask:
     def __init__(self, arm: Arm, task: str | None) -> None:
         self.arm, self.name, self.n = arm, task, arm.n
         self.turned = actual(arm)  # formulas are those of actual joint values
-        library = source.library(arm, self.turned, *_class_of(self.turned, task))
+        which, form = _class_of(self.turned, task)
+        if which is not None and form is not None:  # an elimination named after a class is that elimination in C
+            form = program.plain_form(self.turned, which, form) if form.places is not None else form
+        library = source.library(arm, self.turned, which, form)
         code = toolchain.load(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self._poses, self._points = code.arm_poses, code.arm_points
@@ -228,7 +232,7 @@ class _CompiledTask:
 
     def _quick(self, call: Any) -> Single | None:
         """The short way of one target, for arms whose branches and joint values need no more than C gives."""
-        if self.turned is not self.arm:
+        if self.turned is not self.arm or self.geometry.places is not None:
             return None
         names = None if self.geometry.pairs is not None else self._names
         same = {"arm": self.arm, "task": self.task, "names": self.names, "complete": self.geometry.complete}
@@ -270,10 +274,24 @@ class _CompiledTask:
         if left and not read and (out.state == UNREAD).any():
             return None
         out.complete[...] = self.geometry.complete
+        if self.geometry.places is not None:
+            self._place(out, target)
         if left:
             rows = np.flatnonzero(out.state.view(np.bool_))  # all targets have been read: 0 or 1, which is quicker told
             out.write(rows, solve.ik(self.arm, target[rows], self.name, near=each[rows] if step else each[0]))
         return out
+
+    def _place(self, out: Results, target: Array) -> None:
+        """Branches that C has found in the order and with the indices of the class that they are named after."""
+        assert self.geometry.places is not None
+        done = np.flatnonzero(out.state == 0)
+        wide = int(out.valid[done].sum(axis=1).max(initial=0))  # branches stand in the first columns
+        q, valid, within = out.q[done, :wide], out.valid[done, :wide], out.within[done, :wide]
+        branch = self.geometry.places(q, target[done])
+        order = np.argsort(np.where(valid, branch, np.iinfo(np.int8).max), axis=1, kind="stable")
+        out.q[done, :wide] = np.take_along_axis(q, order[:, :, None], axis=1)
+        for values, new in ((out.within, within), (out.branch, branch)):
+            values[done, :wide] = np.take_along_axis(new, order, axis=1)
 
     def _in_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
         """As `_solved`, for an elimination: block by block, in no more columns than the batch needs."""
@@ -286,6 +304,8 @@ class _CompiledTask:
                 return None
             found.narrow()
             out.write(rows, found)
+        if self.geometry.places is not None:
+            out.widen(max(self.geometry.branches or 0, int(out.branch.max(initial=-1)) + 1))
         return out
 
     def _commanded(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None) -> Solutions:

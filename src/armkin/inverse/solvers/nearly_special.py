@@ -18,6 +18,7 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
@@ -111,18 +112,21 @@ def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geome
         return None
     if method.left_open(general_.elimination) > SICK:
         return None
-    solve = general_.rows
+    solve, named = general_.rows, math.prod(2 if label else 1 for label in alike.labels)
+
+    def places(q: Array, target: Array) -> NDArray[np.intp]:
+        starts = range(0, max(len(target), 1), CHUNK)
+        parts = [slice(k, k + CHUNK) for k in starts]
+        return np.concatenate([_places(arm, task, alike, off, q[some], target[some]) for some in parts])
 
     def rows(target: Array) -> Rows:
         found = solve(target)
-        starts = range(0, max(len(target), 1), CHUNK)
-        parts = [_placed(arm, task, alike, off, found.q[k : k + CHUNK], target[k : k + CHUNK]) for k in starts]
-        q = np.full((len(target), max(part.shape[1] for part in parts), arm.n), np.nan)
-        for k, part in zip(starts, parts, strict=True):
-            q[k : k + len(part), : part.shape[1]] = part
+        numbers = places(found.q, target)
+        row, column = np.nonzero(numbers >= 0)
+        q = np.full((len(target), max(int(numbers.max(initial=-1)) + 1, named), arm.n), np.nan)
+        q[row, numbers[row, column]] = found.q[row, column]
         return found._replace(q=q)
 
-    sizes = [2 if label else 1 for label in alike.labels]
     return Geometry(
         general_.name,
         f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class",
@@ -130,29 +134,29 @@ def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geome
         rows=rows,
         labels=alike.labels,
         ordered=alike.ordered,
-        branches=int(np.prod(sizes)) if sizes else None,
+        branches=named if alike.labels else None,
+        places=places,
     )
 
 
-def _placed(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target: Array) -> Array:
-    """Branches (N, M, n) in the places of the similar arm's branches that they are nearest to, the others behind."""
+def _places(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target: Array) -> NDArray[np.intp]:
+    """Indices (N, M) of branches (N, M, n): the similar arm's that each is nearest to, others count on, -1 of none."""
     seed, miss, _ = recorded(arm, task, alike).rows(target)
-    N, B, n = seed.shape
-    if not q.size:
-        return np.full((N, B, n), np.nan)
-    with np.errstate(invalid="ignore"):
-        away = newton.wrapped_distance(arm, q[:, None], seed[:, :, None])  # (N, B, M)
-        real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
-    away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
-    nearest, back = away.argmin(axis=2), away.argmin(axis=1)
-    row, place = np.nonzero(
-        (np.take_along_axis(back, nearest, axis=1) == np.arange(B)) & (away.min(axis=2, initial=np.inf) < APART)
-    )
-    out = np.full((N, B, n), np.nan)
-    rest = q.copy()
-    out[row, place] = q[row, nearest[row, place]]
-    rest[row, nearest[row, place]] = np.nan
-    return _packed(np.concatenate([out, rest], axis=1), B)
+    B = seed.shape[1]
+    there = ~np.isnan(q[:, :, 0])
+    numbers = np.full(there.shape, -1)
+    if q.size:
+        with np.errstate(invalid="ignore"):
+            away = newton.wrapped_distance(arm, q[:, None], seed[:, :, None])  # (N, B, M)
+            real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
+        away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
+        nearest, back = away.argmin(axis=2), away.argmin(axis=1)
+        row, place = np.nonzero(
+            (np.take_along_axis(back, nearest, axis=1) == np.arange(B)) & (away.min(axis=2, initial=np.inf) < APART)
+        )
+        numbers[row, nearest[row, place]] = place
+    rest = there & (numbers < 0)
+    return np.where(rest, B - 1 + rest.cumsum(axis=1), numbers)
 
 
 def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
