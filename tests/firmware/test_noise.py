@@ -6,6 +6,7 @@ A computer that has nothing else to do begins a motion at once, and its queue is
 from __future__ import annotations
 
 from functools import cache
+from itertools import count
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from emulator import EmulatedBoard
 from stepped_port import SteppedPort
 
 import armkin
-from armkin.board.firmware import streaming
+from armkin.board.firmware import session, streaming
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
 
@@ -25,7 +26,10 @@ WAY = [[100, 60, -90], [-100, 10, -20]]  # deg; 5.7 s
 def seconds(who: str, *line: str) -> float:
     """How long the way takes, what is done to the line included; the counts are checked, and the pins."""
     with EmulatedBoard(speed="step", reset_on_open=False) as board, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(streaming, "_load", lambda session: LOADS[who])
+        patch.setattr(streaming, "_load", lambda _: LOADS[who])
+        patch.setattr(
+            session, "_nonce", count(0x12340001).__next__
+        )  # at random, the line would damage other bytes each time
         port = SteppedPort(board, 0.0005)
         port.wait(0.02)
         machine = Machine(port, ARM, configure(ARM))
@@ -50,13 +54,13 @@ def clean(who: str) -> float:
 
 
 @pytest.mark.parametrize(
-    ("who", "noises"), [("quiet", [(0.001, 2), (0.01, 1), (0.01, 4), (0.0125, 1)]), ("busy", [(0.01, 2)])]
+    ("who", "noises"), [("quiet", [(0.001, 2), (0.01, 24), (0.01, 4), (0.0125, 1)]), ("busy", [(0.01, 2)])]
 )
 def test_noise_costs_a_twentieth_and_ends_at_exact_counts(who: str, noises: list[tuple[float, int]]) -> None:
-    """Of these quiet ones three are held on their first degree, and gone on with: the worst takes 1.05 or 1.10."""
+    """The quiet ones of 1 % are held on their first degree, and gone on with, one of them twice: it takes 1.075."""
     took = np.array([seconds(who, f"noise flip {rate} seed {seed}") for rate, seed in noises]) / clean(who)
     assert took.mean() < 1.05
-    assert took.max() < 1.15
+    assert took.max() < 1.1
 
 
 @pytest.mark.parametrize("who", LOADS)

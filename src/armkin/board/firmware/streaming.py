@@ -89,20 +89,29 @@ def carry_out(
             late = session.port.now() - since > _LEAD_MOST + _BEGUN
             if error.error != Error.DRY or late or len(first) != 1 or least == _LEAD_MOST:
                 raise
-            status = session.rest()
-            counts = [status.counts[axis] for axis in axes]
-            left: Cut | None = first[0]
-            if counts != first[0].start.tolist():
-                known = all(status.known >> axis & 1 for axis in axes)
-                left = onwards(first[0], counts) if known and session.line.damaged else None
+            left = _left_of(session, first[0], axes, onwards)
             if left is None:
                 raise
             session.reopen()
             total = begun = done = 0.0
-            # a line of which it is known by now is given a bad one's lead, and only then the longest
-            least = _LEAD_BAD if session.line.damaged and not least else _LEAD_MOST
+            # a line of which it is known by now is given a bad one's lead, then four times that, and then the longest
+            least = min(max(_LEAD_BAD, 4 * least), _LEAD_MOST) if session.line.damaged else _LEAD_MOST
             first.clear()
             todo = chain([left], source)
+
+
+def _left_of(
+    session: Session, plan: Cut, axes: Sequence[int], onwards: Callable[[Cut, list[int]], Cut | None]
+) -> Cut | None:
+    """What is left of a plan whose beginning ran dry: all before its first step; behind it None on a good line."""
+    status = session.rest()
+    if status.bad and not session.line.damaged:  # the board alone knows of it yet
+        session.line.resent += 1
+    counts = [status.counts[axis] for axis in axes]
+    if counts == plan.start.tolist():
+        return plan
+    known = all(status.known >> axis & 1 for axis in axes)
+    return onwards(plan, counts) if known and session.line.damaged else None
 
 
 def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
