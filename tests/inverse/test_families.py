@@ -211,8 +211,20 @@ def test_the_arm_angle_knows_all_families_of_a_class_whatever_its_zeros_and_elbo
 def test_where_an_arm_without_a_closed_form_has_no_answer_nothing_is_traced() -> None:
     """kinova_gen3 alone, at values of J7 that have no answer, ended in a traceback."""
     arm = armkin.load("kinova_gen3")
-    far = np.eye(4)[None] + np.array([0, 0, 0, 3000.0])[:, None] * np.eye(4)[3]
+    far = np.eye(4)[None].copy()
+    far[:, 2, 3] = 3000.0
     assert (armkin.ik(arm, far).status == Status.UNREACHABLE).all()
+
+
+@pytest.mark.parametrize("near", [np.zeros(7), None])
+def test_a_stretched_arm_without_a_closed_form_stands_there(near: np.ndarray | None) -> None:
+    """All answers of this target are one posture, which no value that the elimination is asked at has."""
+    arm = armkin.load("kinova_gen3")
+    s = armkin.ik(arm, armkin.fk(arm, np.zeros(7)), near=near)
+    assert s.status == Status.EXACT
+    assert not s.complete
+    assert s.residual()[0][s.best] <= 1e-9 * arm.reach
+    assert near is None or s.motion[s.best] <= 1e-9
 
 
 def test_traced_intervals_end_where_their_arm_has_one_posture_less() -> None:

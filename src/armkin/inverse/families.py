@@ -19,12 +19,14 @@ from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.arcs import PLANES
 from armkin.inverse.arm_angle import Turning, arm_angle
+from armkin.inverse.branches.turns import nearest_row
 from armkin.inverse.followed import SAMPLES, Followed, Follower, Ik
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import PROBE, SAME
+from armkin.inverse.numeric.many_starts import many_starts
+from armkin.inverse.numeric.tolerances import PROBE, SAME, SOLUTION
 from armkin.inverse.pieces import Curves, Pieces, motion
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
-from armkin.inverse.tasks.task import read_near, read_targets, shaped
+from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
 from armkin.inverse.traced import Traced
 from armkin.keep_out.clearance import clear
 from armkin.model import units
@@ -67,6 +69,7 @@ def families(
         else:
             find = Follower(ik, true, turned, goal[k : k + some], each[k : k + some])
             rows.add(k, Followed.along(find) if turned.labelled else Traced.along(find))
+    rows.add_points(task, goal, not turned.labelled)
     q, interval, legal, branch = rows.stacked()
     valid = branch >= 0
     B = valid.shape[1]
@@ -139,18 +142,39 @@ class _Rows:
         interval = np.where(whole[:, None], [-np.pi, np.pi], ends)[order]
         self.parts.append((begin + pieces.row[order], q[order], interval, pieces.legal[order], pieces.branch[order]))
 
+    def add_points(self, task: Task, target: Array, search: bool) -> None:
+        """Of targets (N, ...) without a piece a posture that solves them: near, or, to search, what many starts find.
+
+        All postures of a stretched arm may lie within less than a sample, or be one.
+        """
+        known = [part[0] for part in self.parts]
+        lost = ~np.isin(np.arange(len(target)), np.concatenate([np.zeros(0, np.intp), *known]))
+        sought = lost & ~self.stands & search & (self.arm.prismatic.any() | (distance(self.arm, task, target) <= 1.0))
+        for k in np.flatnonzero(lost & (self.stands | sought)).tolist():
+            q, goal = self.near[k][None], target[[k]]
+            if not self.stands[k]:
+                q = many_starts(self.arm, task, goal, np.ones(1, bool))[0]
+                q = q[~np.isnan(q[:, 0])]
+                q = q[newton.missing(self.arm, task, q, np.repeat(goal, len(q), axis=0)) <= SOLUTION]
+            if len(q):
+                q, legal = nearest_row(self.arm, q, np.broadcast_to(self.near[k], q.shape))
+                best = int(np.lexsort((motion(self.arm, q, self.near[k]), ~legal))[0])
+                value = np.full((1, 2), q[best, self.joint])
+                self.parts.append((np.array([k]), q[[best]], value, legal[[best]], np.zeros(1, np.intp)))
+
     def stacked(self) -> tuple[Array, Array, Bool, NDArray[np.int8]]:
         """q (N, B, n), intervals (N, B, 2), whether legal and the branch (N, B), -1 where there is no row."""
         N, n = self.near.shape
         row = np.concatenate([np.zeros(0, np.intp), *(part[0] for part in self.parts)])
+        order = np.argsort(row, kind="stable")
         count = np.bincount(row, minlength=N)
         B = int(count.max(initial=0))
-        where = row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        where = row[order], np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
         q, interval = np.full((N, B, n), np.nan), np.full((N, B, 2), np.nan)
         legal, branch = np.zeros((N, B), bool), np.full((N, B), -1, np.int8)
         if len(row):
             for k, out in enumerate((q, interval, legal, branch), 1):
-                out[where] = np.concatenate([part[k] for part in self.parts])
+                out[where] = np.concatenate([part[k] for part in self.parts])[order]
         return q, interval, legal, branch
 
 
