@@ -27,7 +27,7 @@ ROOMS = ("singular", "answers", "run")
 STEPS = {
     *("NEARBY", "SEED", "HOPELESS", "ARRIVED", "STALLED", "SMOOTH", "FINEST"),  # of Newton's method, of polynomials
     *("ACROSS", "OFF_CURVE", "CROSSING", "SHORTEST_STEP"),  # of the walker
-    *("FOLD_WAY", "BENT", "APART_ROOTS", "NO_BLOCK", "NO_JOINT"),  # gates: what they let pass is decided otherwise
+    *("FOLD_WAY", "BENT", "APART_ROOTS"),  # gates: what they let pass is decided otherwise
     *("TINY", "NO_SIZE", "FAR"),
     *("EQUAL", "DECIMAL", "FLOAT32", "FEW_DIGITS"),  # of printed numbers
 }

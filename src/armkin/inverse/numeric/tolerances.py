@@ -28,7 +28,6 @@ FOLDED = (2.0 * SOLUTION * CURVATURE) ** 0.5  # smallest singular value from whi
 MOVING = 2.0 * SOLUTION / REACH  # and below which it is asked whether joints can move
 GROWTH = SOLUTION / REACH  # residual a radian along a self-motion
 CLOSE_BY = REACH / 2.0  # branches this close are one if the posture between them solves the target, too
-BESIDE = 2.0 * REACH  # postures of self-motions this close are asked whether they are one
 
 # ---- what is worth correcting
 NEARBY = 1e-6  # residual up to which a closed form's candidate is worth correcting
@@ -113,8 +112,6 @@ STALE = 1e-3  # share of the last residual above which polishing stands still
 ANSWERED = 1e-12  # residual of an answer that was moved onto its target
 ROUNDED_ANSWER = 1e-14  # residual that no answer falls below
 AT_LEAST = 1e-6  # singular value below which no branch is steady
-NO_JOINT = 1e-3  # entry of a projection that is zero: the joint does not move alone
-NO_BLOCK = 1e-10  # determinant of a block of it that loses a direction
 NOISE = 1e-13  # relative size of noise that makes a matrix regular
 LEFT_OUT = 1e-10  # singular value that a step of least norm leaves out
 CONVERGING = 1e-11  # residual below which a step has to halve it

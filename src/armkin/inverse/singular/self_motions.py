@@ -16,15 +16,12 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
-    BESIDE,
     CLOSE_BY,
     CLOSED,
     DRIFT,
     GROWTH,
     HIGH,
     MOVED,
-    NO_BLOCK,
-    NO_JOINT,
     SAME,
     SOLUTION,
     STALLED,
@@ -119,10 +116,7 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
     most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
     slow = ~held & (most > TURNED) & (most < DRIFT)
     held |= np.equal(j, 0)  # `near` stands for all that meet there
-    close = np.flatnonzero(size.max(axis=1) < BESIDE)
-    between = at[close] + 0.5 * apart[close] * unit
-    same[close] = newton.missing(arm, task, between, target[k[close]]) <= SOLUTION
-    open_ = np.flatnonzero(held & ~same)
+    open_ = np.flatnonzero(held)
     same[open_] = _straight(arm, task, at[open_], apart[open_], target[k[open_]])
     for p in np.flatnonzero(slow & ~same):
         joints = curve[k[p], i[p]] | (size[p] > SAME)
@@ -266,8 +260,7 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
     """The same in parts, some of them several times.
 
     In a null space of several dimensions a self-motion may hide between the basis vectors: there every joint
-    is pushed as far as the null space lets it, pairs of joints that do without the others are, and in a plane
-    of them every joint is held.
+    is pushed as far as the null space lets it, and in a plane of them every joint is held.
     """
     for index in range(int(nullity.max())):
         who = np.flatnonzero(nullity > index)
@@ -282,15 +275,6 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
             yield plane[some], hold[some] / size[some, None]
     many = np.flatnonzero(nullity > 1)
     in_null = np.arange(n) >= n - nullity[many][:, None]
-    rest = np.eye(n) - np.einsum("mij,mi,mik->mjk", V[many], in_null, V[many])  # projection out of the null space
-    for i, j in itertools.combinations(range(n) if len(many) else (), 2):
-        # two joints alone, about one line: the eigenvector of the 2 x 2 block that the projection leaves nothing of
-        a, b, c = rest[:, i, i], rest[:, j, j], rest[:, i, j]
-        some = (a * b - c * c < NO_BLOCK) & (a + b > NO_JOINT) & (np.abs(c) > NO_JOINT)
-        if some.any():
-            push = np.zeros((int(some.sum()), n))
-            push[:, i], push[:, j] = b[some], -c[some]
-            yield many[some], push / np.linalg.norm(push, axis=1, keepdims=True)
     for joint in range(n if len(many) else 0):
         push = np.einsum("mi,mij->mj", np.where(in_null, V[many, :, joint], 0.0), V[many])
         size = np.linalg.norm(push, axis=1)
