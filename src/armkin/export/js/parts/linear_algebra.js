@@ -46,8 +46,11 @@ function decompose(A) {
         square[k] = b + t * c;
       }
   }
+  /** @type {number[][]} */
   const U = [];
+  /** @type {number[]} */
   const S = [];
+  /** @type {number[][]} */
   const V = [];
   for (let j = 0; j < n; j++) {
     const u = Array.from(W.subarray(all * j, all * j + m));
