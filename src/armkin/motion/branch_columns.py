@@ -81,7 +81,7 @@ class Columns:
         )
 
 
-@dataclass(frozen=True)
+@dataclass
 class Samples:
     """What solves a route at samples; near: joint values (n,) for joints that are free; length: [mm] of the route."""
 
@@ -90,6 +90,7 @@ class Samples:
     task: str | None
     near: Array
     length: float
+    stays: bool = False  # whether all of the route is singular: free joints then stay
 
     def first(self, s: Array) -> Columns:
         """All branches at the first samples (N,), increasing.
@@ -101,6 +102,9 @@ class Samples:
             return self.solved(s)
         few = np.append(np.arange(0, len(s) - 1, _APART), len(s) - 1)
         found = self.solved(s[few])
+        if (found.status == Status.SINGULAR).all():
+            self.stays = True
+            return self.solved(s)
         out = found.status == Status.UNREACHABLE
         between = np.setdiff1d(np.arange(len(s)), few)
         nobody = (out[:-1] & out[1:])[np.searchsorted(few, between) - 1]
@@ -134,7 +138,7 @@ class Samples:
             within[singular[good]] = _widened(beside.within_limits, B, 0)[good]
             q[singular[good]] = _widened(beside.q, B)[good]
             name[singular[good]] = _widened(beside.branch.astype(np.int16), B, -1)[good]
-            if len(stay := singular[~good]):
+            if self.stays and len(stay := singular[~good]):
                 q[stay] = self._staying(q[stay], self.targets(s[stay]), found.free[stay], within[stay])
         return _in_columns(found, s, q, name, within)
 

@@ -92,6 +92,7 @@ class _Linking:
         rows = np.stack([np.maximum(steps - 1, 0), steps, steps + 1], axis=1).ravel()
         given = self.samples
         part = _Linking(given.arm, given.targets, given.task, self.tolerance, given.near, self.length)
+        part.samples = given
         part.columns = c.rows(rows)
         part.columns.partner = c.partner[rows[:-1]]
         part.columns.partner[2::3] = -1  # between the groups
