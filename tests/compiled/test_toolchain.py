@@ -6,6 +6,7 @@ import os
 import stat
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -168,3 +169,6 @@ def test_a_compiler_that_takes_too_long_to_optimise_does_not(
     assert toolchain.load(source, "slow").half(84) == 42
     assert toolchain.load(source, "slow").half(84) == 42, "kept, and not waited for again"
     assert said == ["built"]
+    monkeypatch.setattr(time, "time", lambda now=time.time: now() + 86_400)
+    assert toolchain.load(source, "slow").half(84) == 42
+    assert said == ["built"] * 2, "tried again the next day"

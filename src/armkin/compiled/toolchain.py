@@ -18,6 +18,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+import time
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -28,6 +29,7 @@ from armkin.errors import FileError, MissingExtraError
 # set and no floating-point trap is awaited lets loops with square roots and comparisons become vectors.
 FLAGS = ["-std=c99", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
 FLAGS += ["-shared", "-fPIC"]
+_DAY = 86_400.0  # [s]
 LONGEST = 60.0  # [s] that optimising may take; three_dof takes 2, an arm by elimination 8
 
 
@@ -75,7 +77,9 @@ def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
     folder, commands = _folder(), {}
     for way in dict.fromkeys((level, 0)):
         command = [*compiler(), f"-O{way}", *FLAGS]
-        key = "\0".join([source, *command, _version(command[0]), _processor()])
+        # a busy computer may have been too slow to optimise: one that did not is tried again the next day
+        day = [] if way == level else [str(int(time.time() // _DAY))]
+        key = "\0".join([source, *command, _version(command[0]), _processor(), *day])
         commands[name := hashlib.sha256(key.encode()).hexdigest()] = command
         if folder is not None and (found := _kept(folder, name, content)) is not None:
             return found
