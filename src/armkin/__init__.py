@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from armkin.inverse.answers.closest import closest as closest
     from armkin.inverse.answers.solutions import Solutions as Solutions
     from armkin.inverse.answers.solutions import Status as Status
-    from armkin.inverse.branches.turns import turns as turns
+    from armkin.inverse.branches.whole_turns import turns as turns
     from armkin.inverse.solve import ik as ik
     from armkin.inverse.solvers.recognise import method as method
     from armkin.keep_out.clearance import Clearance as Clearance
@@ -75,7 +75,7 @@ _HOME = {
     "frames": "forward",
     "jacobian": "forward",
     "manipulability": "forward",
-    "turns": "inverse.branches.turns",
+    "turns": "inverse.branches.whole_turns",
     "Closest": "inverse.answers.closest",
     "closest": "inverse.answers.closest",
     "method": "inverse.solvers.recognise",

@@ -30,8 +30,8 @@ from armkin.keep_out.shapes.box import Box
 from armkin.keep_out.shapes.capsule import Capsule
 from armkin.keep_out.shapes.floor import Floor
 from armkin.model.arm import Arm
-from armkin.motion.free import proved
-from armkin.motion.plan import plan
+from armkin.motion.joint_moves import plan
+from armkin.motion.proved_free import proved
 from armkin.motion.trajectory import Trajectory
 
 ARMS = ("three_dof", "ur5e", "ar4", "cobra600")

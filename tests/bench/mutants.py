@@ -35,8 +35,9 @@ MUTANTS = [
     Mutant("motors.py", "(0.5 + slack)", "slack", "test_motors.py"),
     Mutant("robot_file/strict_yaml.py", "    if text in parent.items:", "    if text in parent.items and False:",
            "robot_file"),
-    Mutant("inverse/branches/turns.py", "(value >= low) & (value <= high)", "(value >= low)", "inverse/test_turns.py"),
-    Mutant("inverse/branches/turns.py", "upper >= first + TURN) or low", "upper >= first) or low",
+    Mutant("inverse/branches/whole_turns.py", "(value >= low) & (value <= high)", "(value >= low)",
+           "inverse/test_turns.py"),
+    Mutant("inverse/branches/whole_turns.py", "upper >= first + TURN) or low", "upper >= first) or low",
            "inverse/test_turns.py inverse/test_single.py"),
     Mutant("board/firmware/framing.py", " if struct.unpack(\"<I\", data[-4:])[0] == zlib.crc32(payload) else None", "",
            "board/test_protocol.py board/test_board_sim.py"),
@@ -56,7 +57,7 @@ MUTANTS = [
            "columns test_doctests.py cli"),
     Mutant("calibration/fit.py", "np.asarray((1.0 + u2 / K**2) ** -2)", "np.ones_like(u2)", "calibration"),
     Mutant("compiled/toolchain.py", "return owner and not", "return not", "compiled"),
-    Mutant("cli/failures.py", "LINK = 1, 2, 3, 4, 5", "LINK = 1, 2, 4, 3, 5",
+    Mutant("cli/exit_codes.py", "LINK = 1, 2, 3, 4, 5", "LINK = 1, 2, 4, 3, 5",
            "cli/test_cli_errors.py cli/test_cli_commands.py"),
 ]  # fmt: skip
 QUICK = ["-m", "not slow and not emulator"]

@@ -12,7 +12,7 @@ import pytest
 import armkin
 from armkin.board.firmware.session import Session
 from armkin.errors import LinkError, PathFileError, UsageError
-from armkin.motion.plan import check_rates
+from armkin.motion.joint_moves import check_rates
 from command_line import THREE_DOF, run
 
 DOF = THREE_DOF

@@ -12,7 +12,7 @@ from oracle import goal
 from test_every_branch import NAMES, shipped
 
 import armkin
-from armkin.inverse.branches.turns import nearest_copy, nearest_number
+from armkin.inverse.branches.whole_turns import nearest_copy, nearest_number
 from armkin.inverse.run import single as one_target
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import Arm

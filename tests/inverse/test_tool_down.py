@@ -11,7 +11,7 @@ from test_every_branch import shipped
 
 import armkin
 from armkin import Arm
-from armkin.inverse.elimination import method, pencil, plans, roots
+from armkin.inverse.elimination import choose_variable, method, pencil, roots
 from armkin.inverse.elimination.joint_order import roles
 from armkin.model.build import build
 from armkin.model.rotation import inverse, rotation_about
@@ -98,7 +98,7 @@ def test_a_wide_pencil_has_the_joints_of_its_pose(hidden: int) -> None:
     for wide in (False, True):
         off = []
         for role in roles(closed.prismatic, 0, (hidden,), wide):
-            one = pencil.build(role, closed.links, closed.prismatic, plans.PSI[0])
+            one = pencil.build(role, closed.links, closed.prismatic, choose_variable.PSI[0])
             seed = roots.seeds(one, inverse(goal), 0.02, part=True)
             for pose, q in enumerate(known_q):
                 step = q[~np.isnan(q[:, 0])][:, None] - seed.q[seed.pose == pose]
@@ -111,7 +111,9 @@ def test_a_wide_pencil_has_the_joints_of_its_pose(hidden: int) -> None:
 def test_only_what_stands_so_is_special() -> None:
     arm, _ = known("jaco_j2n6s300")
     elimination = method.prepare(arm.link, arm.prismatic)
-    for kind, wanted in (("parallel", plans.Kind.PARALLEL), ("meeting", plans.Kind.MEETING)):
-        assert (plans.kinds(elimination.loop, elimination.loop.goal(targets(arm, kind, 50))) == wanted).all()
+    for kind, wanted in (("parallel", choose_variable.Kind.PARALLEL), ("meeting", choose_variable.Kind.MEETING)):
+        assert (choose_variable.kinds(elimination.loop, elimination.loop.goal(targets(arm, kind, 50))) == wanted).all()
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (500, 6))
-    assert (plans.kinds(elimination.loop, elimination.loop.goal(armkin.fk(arm, q))) == plans.Kind.PLAIN).mean() > 0.95
+    assert (
+        choose_variable.kinds(elimination.loop, elimination.loop.goal(armkin.fk(arm, q))) == choose_variable.Kind.PLAIN
+    ).mean() > 0.95

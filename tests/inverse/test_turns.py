@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import armkin
-from armkin.inverse.branches.turns import nearest_copy, nearest_number, turns
+from armkin.inverse.branches.whole_turns import nearest_copy, nearest_number, turns
 from armkin.model.arm import from_links
 
 ROBOTS = Path(__file__).parents[2] / "robots"

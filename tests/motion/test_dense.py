@@ -10,7 +10,7 @@ import pytest
 import armkin
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
-from armkin.motion import branch_path, fitting, shown
+from armkin.motion import branch_path, fitting, playback
 from armkin.motion.b_spline import banded
 from armkin.motion.path_plan import PathPlan
 
@@ -281,9 +281,9 @@ def test_an_empty_cell_of_blend_or_speed_leaves_it_to_what_is_said_of_all(three_
 def test_a_way_shown_with_too_few_samples_is_shown_best_where_it_bends_most(three_dof: Arm) -> None:
     plan = armkin.path(three_dof, np.concatenate([[CENTRE - [0, 240, 0]], circle(60, 20.0)]), corners="tolerance")
     begins = plan.motion.begins.tolist()
-    whole, off = shown.times(three_dof, plan, begins, 0.02, 10_000)
+    whole, off = playback.times(three_dof, plan, begins, 0.02, 10_000)
     assert off <= 0.02
-    few, worse = shown.times(three_dof, plan, begins, 0.02, len(whole) // 2)
+    few, worse = playback.times(three_dof, plan, begins, 0.02, len(whole) // 2)
     assert len(few) == len(whole) // 2
     assert worse <= 6 * off  # halves are off by a quarter as much
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from armkin.model import build as arms
 from armkin.model.arm import Arm, from_links
-from armkin.motion.plan import plan
+from armkin.motion.joint_moves import plan
 from armkin.motion.profile import trapezoid
 from armkin.motion.trajectory import Straight
 

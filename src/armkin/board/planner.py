@@ -16,7 +16,7 @@ from armkin.forward import fk
 from armkin.model import units
 from armkin.motion.corners import rounded
 from armkin.motion.curve import Curve
-from armkin.motion.planned import HOLD
+from armkin.motion.path_planner import HOLD
 from armkin.motors import joints, motor_names, pulse_units, pulses
 
 if TYPE_CHECKING:

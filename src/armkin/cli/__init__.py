@@ -1,6 +1,6 @@
 """The command line: one file a command; each parses, calls, renders and exits.
 
-app.py             the group of commands, and what runs a command line; failures.py: errors -> exit codes
+app.py             the group of commands, and what runs a command line; exit_codes.py: errors -> exit codes
 advice.py          the next step after an error
 commands/          one file a command, and the table of them
 answers/           the JSON of every command, as types

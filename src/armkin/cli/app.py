@@ -78,13 +78,13 @@ class Commands(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str, Any, list[str]]:
         """The command that the first word names, in place of its entry in the list."""
-        from armkin.cli import failures
+        from armkin.cli import exit_codes
 
         name = args[0]
         if name not in COMMANDS and ctx.resilient_parsing:  # Tab was pressed: no command, no complaint
             return name, None, args[1:]
         if name not in COMMANDS:
-            raise failures.no_command(name, args[1:])
+            raise exit_codes.no_command(name, args[1:])
         return name, load(name), args[1:]
 
 
@@ -150,9 +150,9 @@ def _exit_code(command: Callable[[], Any]) -> int:
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 1
     except Exception as error:
-        from armkin.cli import failures
+        from armkin.cli import exit_codes
 
-        return failures.exit_code(error)
+        return exit_codes.exit_code(error)
 
 
 def _flush() -> None:
@@ -181,8 +181,8 @@ def _closed_pipes() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        from armkin.cli import failures
+        from armkin.cli import exit_codes
 
-        if failures.is_closed_pipe(error):
-            raise failures.ClosedPipe from None
+        if exit_codes.is_closed_pipe(error):
+            raise exit_codes.ClosedPipe from None
         raise

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.branches.turns import nearest_copy, nearest_row
+from armkin.inverse.branches.whole_turns import nearest_copy, nearest_row
 from armkin.inverse.closed.wrist import meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
 from armkin.inverse.pieces import Int, Pieces, best_samples, none, runs

@@ -22,8 +22,8 @@ from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.closest import closest_each as nearest_poses
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
-from armkin.inverse.branches.turns import nearest_row
-from armkin.inverse.branches.turns import turns as copies_of
+from armkin.inverse.branches.whole_turns import nearest_row
+from armkin.inverse.branches.whole_turns import turns as copies_of
 from armkin.inverse.families import intervals_out
 from armkin.inverse.held import arm_without, others, redundant_alone
 from armkin.inverse.numeric.tolerances import EQUAL, HELD, SOLUTION

@@ -19,7 +19,7 @@ from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.arcs import PLANES
 from armkin.inverse.arm_angle import Turning, arm_angle
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.followed import SAMPLES, Followed, Follower, Ik
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.numeric.tolerances import ACCEPTED, REACH, SOLUTION
 from armkin.inverse.pieces import Pieces, best_samples, motion, runs

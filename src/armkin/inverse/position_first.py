@@ -20,7 +20,7 @@ from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.minima import Box, box_of, descend, flat_minima
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (

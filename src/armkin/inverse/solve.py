@@ -21,7 +21,7 @@ from armkin.inverse.answers.batch import Batch, Goals, empty, pack, replaced
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination.merge import projection
 from armkin.inverse.families import families

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.arcs import Points, curves_of, onto
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.followed import Follower
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CONVERGING, REACH

@@ -1,7 +1,7 @@
 """Waypoints and paths to a trajectory: joint values over time.
 
-The way of a path (`path.py`, `armkin.path`, which asks `planned.py`, of arms with a redundant joint `redundant.py`;
-`walk.py` goes through its moves, `moves.py` says what each kind does):
+The way of a path (`path.py`, `armkin.path`, which asks `path_planner.py`, of arms with a redundant joint
+`redundant.py`; `walk.py` goes through its moves, `moves.py` says what each kind does):
 
 path_numbers.py     the moves of a path file, in degrees, as joint values and targets
 placing.py          where a drawing stands, and how the tool is held on it
@@ -18,18 +18,19 @@ wrist_turn.py       past a wrist singularity with the tool turned a little; wind
 branch_path.py      the branch that is taken: joint values along the route
 grid.py             exact at grid points, fine enough in between
 time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)
-fastest.py          what bounds it; cubics.py: on a way of cubics; scan.py: passes along it
+speed_bounds.py     what bounds it; cubics.py: on a way of cubics; scan.py: passes along it
 hold_cap.py         how fast it may be for a hold on it
-path_plan.py        the answer; branch_report.py: what is said of its branches; held.py: joints held; shown.py: as drawn
+path_plan.py        the answer; branch_report.py: what is said of its branches; held.py: joints held
+playback.py         a plan as it is drawn
 jog_line.py         the line of one axis that a held button moves the tip along
 
 The way of waypoints:
 
-plan.py             straight moves of all joints; profile.py: their law, speed up, cruise, slow down
+joint_moves.py      straight moves of all joints; profile.py: their law, speed up, cruise, slow down
 corners.py          waypoints without a stop
 
 What both make, and boards take:
 
 trajectory.py       stretches from rest to rest; curve.py: a curved one; remainder.py: the rest of one that was held
-free.py             proofs that one hits nothing
+proved_free.py      proofs that one hits nothing
 """

@@ -17,9 +17,9 @@ from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
 from armkin.motion.branch_columns import Columns, Int
-from armkin.motion.free import hit_samples as motion_hits
 from armkin.motion.joint_steps import turns_of
 from armkin.motion.linked_branches import ENDS
+from armkin.motion.proved_free import hit_samples as motion_hits
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -10,8 +10,8 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion.branch_chains import Chain, why_ended
-from armkin.motion.free import hits_said
 from armkin.motion.path_plan import Branch, PathPlan, PathRun, Reconfiguration
+from armkin.motion.proved_free import hits_said
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -15,7 +15,7 @@ from armkin.motion.branch_path import coupled
 from armkin.motion.cubics import Knots
 from armkin.motion.curve import Curve
 from armkin.motion.hold_cap import hold_cap
-from armkin.motion.plan import check_rates
+from armkin.motion.joint_moves import check_rates
 from armkin.motion.time_optimal import Bounds, optimal
 from armkin.motion.trajectory import Trajectory
 

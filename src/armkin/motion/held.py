@@ -16,10 +16,10 @@ from armkin.model.lock import lock, unlock
 from armkin.motion import path_numbers
 from armkin.motion.cubics import Knots
 from armkin.motion.curve import Curve, Smoothed
-from armkin.motion.free import checked
+from armkin.motion.joint_moves import approach, check_jerk, check_rates, straight
 from armkin.motion.path_plan import PathPlan
-from armkin.motion.plan import approach, check_jerk, check_rates, straight
-from armkin.motion.planned import planned
+from armkin.motion.path_planner import planned
+from armkin.motion.proved_free import checked
 from armkin.motion.trajectory import Straight, Stretch
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.motion.cubics import Knots
-from armkin.motion.fastest import TINY, in_parts
+from armkin.motion.speed_bounds import TINY, in_parts
 from armkin.motion.trajectory import BRAKE
 from armkin.motors import motor_accel
 

@@ -15,8 +15,8 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import clearance
 from armkin.model import units
 from armkin.model.units import radian_or_reach
+from armkin.motion.joint_moves import check_rates
 from armkin.motion.path import path
-from armkin.motion.plan import check_rates
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array
 from armkin.motion.branch_path import Pace
 from armkin.motion.geometry import line
 from armkin.motion.moves import MOVES
-from armkin.motion.planned import TOLERANCE, corners_wished
+from armkin.motion.path_planner import TOLERANCE, corners_wished
 from armkin.motion.route import joined
 from armkin.motion.walk import Walk, Wishes
 

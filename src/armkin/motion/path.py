@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.motion import path_numbers
+from armkin.motion.joint_moves import check_rates
 from armkin.motion.path_plan import PathPlan
-from armkin.motion.plan import check_rates
-from armkin.motion.planned import HOLD, planned
+from armkin.motion.path_planner import HOLD, planned
 from armkin.motion.redundant import path_redundant
 
 if TYPE_CHECKING:

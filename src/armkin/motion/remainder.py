@@ -9,7 +9,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.motion.cubics import Knots
 from armkin.motion.curve import Curve
-from armkin.motion.plan import straight
+from armkin.motion.joint_moves import straight
 from armkin.motion.profile import at_rest, trapezoid
 from armkin.motion.trajectory import Straight
 from armkin.motors import motor_accel, pulses

@@ -13,7 +13,7 @@ from armkin.forward import as_joints, position
 from armkin.motion.branch_path import coupled
 from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.hold_cap import hold_cap
-from armkin.motion.plan import check_rates
+from armkin.motion.joint_moves import check_rates
 from armkin.motion.time_optimal import Bounds, finer, knots, optimal
 from armkin.motion.trajectory import Trajectory
 

@@ -127,7 +127,7 @@ class Trajectory:
         """Joint values at times t [s], those at the ends outside: (...,) -> (..., n) [rad | mm].
 
         >>> import armkin, numpy as np
-        >>> from armkin.motion.plan import plan
+        >>> from armkin.motion.joint_moves import plan
         >>> arm = armkin.load("robots/three_dof.yaml")
         >>> p = plan(arm, np.deg2rad([0, 90, -90]), np.deg2rad([60, 90, -90]))
         >>> p.duration, np.rad2deg(p.q([0, 0.75, 1.5]))[:, 0].round(6).tolist()

@@ -25,9 +25,9 @@ from armkin.motion.curve import Curve, Smoothed, way_of, ways_of
 from armkin.motion.dense import FIT, PLAN, Polyline
 from armkin.motion.geometry import Piece, Spot
 from armkin.motion.grid import deviation, missed
+from armkin.motion.joint_moves import approach, straight
 from armkin.motion.path_numbers import OF_JOINTS
 from armkin.motion.path_plan import Marker, PathPlan
-from armkin.motion.plan import approach, straight
 from armkin.motion.profile import at_rest
 from armkin.motion.route import Reduced, joined
 from armkin.motion.trajectory import Straight, Stretch

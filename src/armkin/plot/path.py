@@ -9,7 +9,7 @@ import numpy as np
 from armkin.forward import position
 from armkin.model import units
 from armkin.motion.branch_report import closeness
-from armkin.motion.shown import times
+from armkin.motion.playback import times
 from armkin.plot.canvas import flat, picture, space, true_proportions
 from armkin.view.skeleton import skeleton
 

@@ -58,7 +58,7 @@ def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
 
 def unplanned(arm: Arm) -> str:
     """Why no path of an arm can be planned: the joints' rates that its file lacks; "" where it has them."""
-    from armkin.motion.plan import check_rates
+    from armkin.motion.joint_moves import check_rates
 
     try:
         check_rates(arm)

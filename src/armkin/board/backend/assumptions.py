@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.model.units import DEGREE
-from armkin.motion.plan import missing_rates
+from armkin.motion.joint_moves import missing_rates
 from armkin.motors import undriven
 from armkin.robot_file import Motor
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.starting import Laid
-from armkin.motion.plan import plan
+from armkin.motion.joint_moves import plan
 from armkin.motion.trajectory import brake
 from armkin.motors import joints, pulses
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from armkin import installed_kinds
 from armkin.board_kinds import BOARDS, DRIVERS
 from armkin.errors import UsageError
-from armkin.motion.plan import missing_rates, rate_lines
+from armkin.motion.joint_moves import missing_rates, rate_lines
 from armkin.motors import joints_per_pulse, undriven
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armkin.board.ports import LOG
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.limits import SLACK, fields, said
-from armkin.motion.free import check_free, free_way
+from armkin.motion.proved_free import check_free, free_way
 from armkin.motion.trajectory import Straight
 from armkin.motors import joints, pulses, resolution, settled
 

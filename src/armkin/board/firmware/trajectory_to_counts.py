@@ -22,8 +22,8 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.model.limits import check_limits
-from armkin.motion.plan import check_rates
-from armkin.motion.plan import plan as plan_joints
+from armkin.motion.joint_moves import check_rates
+from armkin.motion.joint_moves import plan as plan_joints
 from armkin.motion.trajectory import Straight, brake
 from armkin.motors import joints as joints_of
 from armkin.motors import motor_names, pulses
@@ -129,7 +129,7 @@ def plan(
     """Moves from counts through joint targets, stopping at each, where the motors' steps put them.
 
     start: (motors,) counts; targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
-    Raises as `armkin.motion.plan.plan` and `cut` do.
+    Raises as `armkin.motion.joint_moves.plan` and `cut` do.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from armkin.export.c.text import part
 from armkin.formula import c_and_js_code, recording
+from armkin.inverse.elimination.choose_variable import Kind
 from armkin.inverse.elimination.merge import _WEIGHTS, MOST
 from armkin.inverse.elimination.method import Elimination
 from armkin.inverse.elimination.passes import REGULAR, TILT, shaken_goal
-from armkin.inverse.elimination.plans import Kind
 from armkin.inverse.elimination.roots import STEADY
 from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES

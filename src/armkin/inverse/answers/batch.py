@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_row
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

@@ -1,7 +1,7 @@
 """The general six-joint arm, from the chain to the branches.
 
 method.py          the method, why it is complete, `solve`
-plans.py           `prepare`: which eigenvalue problems an arm's poses are solved by, one after the other
+choose_variable.py `prepare`: which eigenvalue problems an arm's poses are solved by, one after the other
 passes.py          one of these over poses: their answers, and which it leaves open
 closed_loop.py     the chain closed and scaled
 joint_order.py     where the loop is cut, which way it is walked: which joint plays which part

@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array, Bool, Entry, Truth
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
-from armkin.inverse.branches.turns import nearest_copy
+from armkin.inverse.branches.whole_turns import nearest_copy
 from armkin.inverse.closed.candidates import Recorded, entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY

@@ -19,7 +19,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import point_numbers
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.branches.turns import TURN, nearest_number
+from armkin.inverse.branches.whole_turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, NO_SIZE, THERE
 from armkin.inverse.singular.near_itself import room

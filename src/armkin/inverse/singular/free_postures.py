@@ -12,7 +12,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.batch import Batch, Goals
 from armkin.inverse.answers.solutions import Status
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import SOLUTION, WEAK
 from armkin.inverse.singular.curves import Curves

@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Batch, Goals, named, wider, write
 from armkin.inverse.answers.closest import thorough
 from armkin.inverse.answers.solutions import Status
-from armkin.inverse.branches.turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, CLOSED, SAME, SOLUTION
 from armkin.inverse.singular import components
