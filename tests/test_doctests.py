@@ -8,7 +8,7 @@ import pytest
 
 MODULES = [
     "forward", "model.limits", "model.rotation", "model.lock", "formula.arrays", "inverse.solve",
-    "inverse.branches.turns", "inverse.branches.names", "inverse.answers.closest", "inverse.closed.subproblems",
+    "inverse.branches.whole_turns", "inverse.branches.names", "inverse.answers.closest", "inverse.closed.subproblems",
 ]  # fmt: skip
 
 
