@@ -36,7 +36,7 @@ def in_order(
     Chunks are taken as they are needed. Raises what `work` raises; ClusterError; UsageError for both kinds of engine.
     """
     if engine.cluster is not None and engine.workers != 1:
-        raise UsageError("--workers and --cluster: the cluster has workers of its own; leave one of the two away")
+        raise UsageError("workers and a cluster: the cluster has workers of its own; leave one of the two away")
     if engine.cluster is not None:
         from armkin.engines import cluster
 
