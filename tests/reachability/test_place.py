@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.errors import UsageError
+from armkin.errors import NoSolutionError, UsageError
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.reachability import from_place, planning
 from armkin.reachability import place as places
-from armkin.reachability.standing import Around
+from armkin.reachability.standing import Around, standing
 from command_line import ROOT, run
 from interrupted import interrupted
 
@@ -147,6 +147,53 @@ def test_a_path_is_carried_from_the_places_that_plan_it(name: str, tmp_path: Pat
             at = (float(found.x[i]), float(found.y[j]), 0.0)
             asked = planning.plan(arm, Around(), (i, j, k), at, float(found.yaw[k]), file)
             assert (asked.plan is not None) == whole[i, j, k], asked.refused
+
+
+LINE = """
+moves:
+  - point: [400, -100, 400, 180, 0, 0]
+  - line: [400, 100, 400, 180, 0, 0]
+"""
+
+
+@pytest.mark.parametrize(("said", "step"), [("", 600.0), ("\n  - joint: {J7: 100}", 400.0)])
+def test_a_path_of_seven_joints_is_carried_where_path_plans_it(said: str, step: float, tmp_path: Path) -> None:
+    """Some places of a coarse grid against `armkin.path` of the arm that stands there."""
+    path = tmp_path / "path.yaml"
+    path.write_text(LINE.replace("moves:", f"moves:{said}"))
+    arm = replace(armkin.load("panda"), max_accel=np.ones(7))
+    [found] = armkin.place(arm, path, step=step, yaw=np.pi / 2)
+    whole = found.reached == found.of
+    assert found.reached[found.best] == found.of
+    assert {one.refused for one in found.planned} == {""}
+    assert found.held == found.planned[0].plan.held  # type: ignore[union-attr]
+    assert found.postures.shape == (found.of, 7)
+    assert np.unique(found.postures[:, 6]) == pytest.approx(list(found.held.values()))
+    if said:
+        assert found.held["J7"] == pytest.approx(np.radians(100.0))
+    rng = np.random.default_rng(2)
+    for some in (np.argwhere(whole), np.argwhere(~whole & (found.reached > 0))):
+        assert len(some)
+        for i, j, k in rng.permutation(some)[:4].tolist():
+            stands = standing(arm, Around(), (float(found.x[i]), float(found.y[j]), 0.0), float(found.yaw[k]))
+            try:
+                armkin.path(stands, path)
+                planned = True
+            except NoSolutionError:
+                planned = False
+            assert planned == whole[i, j, k]
+
+
+def test_the_command_tells_where_the_redundant_joint_is_held(tmp_path: Path) -> None:
+    path, scene = tmp_path / "path.yaml", tmp_path / "scene.yaml"
+    path.write_text(LINE)
+    scene.write_text("keep_out:\n  - box: {min: [-600, 200, 0], max: [-500, 300, 900]}\n    name: post\n")
+    words = ("place", "panda", path, "--step", 400, "--yaw", 180, "--area", "-100,0,0,0")
+    best = run(*words, "--json").json["robots"][0]["best"]
+    assert best["reached"] == best["of"]
+    said = run(*words, "--scene", scene)  # which is not in the way
+    assert f"panda, held there: J7 at {best['held']['J7']:.4g}\n" in said.out
+    assert "have no max_accel" in said.err
 
 
 def test_a_path_in_a_scene_is_asked_yaw_by_yaw_and_planned_in_it(

@@ -67,6 +67,23 @@ def path_redundant(
     raise refused
 
 
+def values_to_hold(arm: Arm, file: PathFile, spare: Redundancy) -> tuple[float, ...]:
+    """Values of the redundant joint at which a path from home may be carried [rad]: the nearest to its start first."""
+    if (said := _said(arm, file, spare.joint, arm.home)) is not None:
+        return (said,)
+    begin = _begin(arm, file, arm.home)
+    close = float((arm.home if begin is None else begin)[spare.joint])
+    t = _over_range(arm, spare.joint, close)
+    return tuple(np.unique(t)[np.argsort(np.abs(np.unique(t) - close), kind="stable")].tolist())
+
+
+def _over_range(arm: Arm, joint: int, close: float) -> Array:
+    """Values over a joint's range [rad], and the one that it had best have, within it."""
+    low, high = float(arm.lower[joint]), float(arm.upper[joint])
+    low, high = (low if np.isfinite(low) else close - np.pi), (high if np.isfinite(high) else close + np.pi)
+    return np.append(np.linspace(low, high, VALUES), close if low <= close <= high else low)
+
+
 def _begin(arm: Arm, file: PathFile, here: Array) -> Array | None:
     """The posture (n,) that the file's start fixes, if it does."""
     value = file.start if file.start is None or isinstance(file.start, str) else file.start.joints
@@ -127,14 +144,12 @@ def _values(arm: Arm, file: PathFile, task: str | None, close: float, stands: fl
     spare = redundancy(turned, task or file.task)
     assert spare is not None
     j = spare.joint
-    low, high = (float(bound[j]) for bound in (arm.lower, arm.upper))
-    low, high = (low if np.isfinite(low) else close - np.pi), (high if np.isfinite(high) else close + np.pi)
     try:
         _, ways = routes(arm, file.model_copy(update={"task": task or file.task}), STEP * arm.reach)
     except UsageError:  # what is wrong with it, if anything, is said by its plan
         yield stands
         return
-    t = np.append(np.linspace(low, high, VALUES), close if low <= close <= high else low)
+    t = _over_range(arm, j, close)
     missing = np.zeros(len(t), int)
     for every in ways:
         way = every[np.unique(np.linspace(0, len(every) - 1, ASKED).astype(int))]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,6 +14,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.solve import ik, isolated
 from armkin.inverse.tasks.task import Task
+from armkin.model.lock import lock, unlock
 from armkin.model.rotation import rotation_about
 from armkin.reachability import carrying
 from armkin.reachability.answers import TURN, arc, inside
@@ -25,6 +29,13 @@ BLOCK = 8_192  # targets that are asked together: what is known of them stays in
 BEYOND = 1e-6  # reaches: farther away nothing solves a target
 
 
+class Held(NamedTuple):
+    """An arm, and which of its joints are held at which values [rad]."""
+
+    arm: Arm
+    joints: dict[str, float]
+
+
 class Question(NamedTuple):
     """Targets of one arm, in the targets' frame."""
 
@@ -36,6 +47,9 @@ class Question(NamedTuple):
     z: float
     around: Around = Around()
     ways: tuple[int, ...] = ()  # of a path: how many targets each way has that one branch is to carry
+    spare: str = ""  # the redundant joint, which a path's plan holds,
+    values: tuple[float, ...] = ()  # and where it may [rad], the best first
+    whole: Held | None = None  # where one of the values is chosen
 
     @property
     def arcs(self) -> bool:
@@ -59,10 +73,67 @@ def positions_of(task: Task, targets: Array) -> Array:
 
 
 def counted(question: Question, at: Array) -> NDArray[np.int64]:
-    """How many targets are reached from positions (P, 2) at each yaw: (P, K)."""
+    """How many targets are reached from positions (P, 2) at each yaw: (P, K); of values to hold, at the best one."""
+    if question.values:
+        return _most(question, at)
     at_once = max(BLOCK // len(question.targets), 1)
     blocks = [at[start : start + at_once] for start in range(0, len(at), at_once)]
     return np.concatenate([_counted(question, block, _legal_yaws(question, block)) for block in blocks])
+
+
+def _most(question: Question, at: Array) -> NDArray[np.int64]:
+    """The same of a redundant joint's values: the most of what is reached with it held at each of its values.
+
+    Keep-outs only take away: a place is asked among them where more is reached without them than is known.
+    """
+    counts, blocked = np.zeros((len(at), question.yaws), np.int64), question.arm.keep_out or question.around.keep_out
+    bare = question._replace(arm=_bare(question.arm), around=Around())
+    left = np.arange(len(at))
+    for one, without in zip(each_value(question), each_value(bare), strict=True):
+        found = counted(without, at[left])
+        if blocked:
+            more = left[(found > counts[left]).any(axis=1)]
+            counts[more] = np.maximum(counts[more], counted(one, at[more])) if len(more) else counts[more]
+        else:
+            counts[left] = np.maximum(counts[left], found)
+        left = left[(counts[left] < len(question.targets)).any(axis=1)]
+        if not len(left):
+            break
+    return counts
+
+
+def each_value(question: Question) -> Iterator[Question]:
+    """The question with the redundant joint held at each value; itself where there is none to hold."""
+    if not question.values:
+        yield question
+    for value in question.values:
+        whole = Held(question.arm, {question.spare: value})
+        yield question._replace(arm=_rest(question.arm, question.spare, value), values=(), whole=whole)
+
+
+def at_value(question: Question, at: Array, turn: float) -> Question:
+    """The question with the redundant joint held at the first value at which most is reached from one place."""
+    if not question.values:
+        return question
+    k, most, best = round(turn / question.step), -1, question
+    for one in each_value(question):
+        if (count := int(counted(one, at[None])[0, k])) > most:
+            most, best = count, one
+        if most == len(question.targets):
+            break
+    return best
+
+
+@lru_cache(maxsize=4)
+def _bare(arm: Arm) -> Arm:
+    """The arm without its keep-outs."""
+    return replace(arm, keep_out=()) if arm.keep_out else arm
+
+
+@lru_cache(maxsize=256)
+def _rest(arm: Arm, joint: str, value: float) -> Arm:
+    """The arm with a joint held: one and the same for each value, so that its solver is prepared once."""
+    return lock(arm, {joint: value})
 
 
 def _counted(question: Question, at: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -179,7 +250,8 @@ def free_from(question: Question, at: Array, turn: float, within: bool = True) -
         legal = legal & s.clear
     if question.around.keep_out and legal.any():
         place, q = (float(at[0]), float(at[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
-        legal = legal & free(question.arm, question.around, place, turn, q)
+        arm, joints = question.whole or Held(question.arm, {})
+        legal = legal & free(arm, question.around, place, turn, unlock(arm, joints, q))
     return s, np.asarray(legal)
 
 

@@ -5,7 +5,8 @@ plane of the targets' frame, and a yaw about its z axis. Where joint 1's axis is
 1 alone: one solve a target and position answers all yaws as an arc. Other arms are asked yaw by yaw.
 
 A path is reached where one branch carries each of its ways between joint moves (`carrying`); the best places are then
-planned (`planning`).
+planned (`planning`). An arm with a redundant joint is asked with that held at each of the values that `armkin.path`
+asks, and reaches what it reaches at the best of them.
 
 The robot's own keep-outs move with it; those of a scene stand with the targets.
 """
@@ -14,8 +15,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -29,10 +31,11 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import read_targets
+from armkin.model.lock import unlock
 from armkin.reachability import keeping, planning
 from armkin.reachability.answers import TURN, limit_margin
 from armkin.reachability.cells import STRAIGHT
-from armkin.reachability.from_place import Question, counted, free_from, positions_of
+from armkin.reachability.from_place import Question, at_value, counted, each_value, free_from, positions_of
 from armkin.reachability.planning import Planned
 from armkin.reachability.standing import apart
 
@@ -42,6 +45,7 @@ if TYPE_CHECKING:
 
 MOST = 10**7  # places
 SOLVES = 40_000  # of a chunk
+Room = Callable[[int, int, int], float]  # of a place by its index: how far its joints stay from limits, as a share
 FEW, TRIES = 3, 12  # places that a path is planned from, and most that are tried for them
 
 
@@ -53,7 +57,8 @@ class Place:
     distance to the nearest place of the grid, continued outside the area, at the same yaw, that does not reach all.
     best: index of the best place; ties by margin, then by the least distance to a joint limit. positions: (N, 2 or 3)
     of the targets; postures: (M, n) [rad | mm] for those of them that are reached from the best place. Of a path,
-    targets are points along it; planned: the best places, with their plans; unplanned: why there are none.
+    targets are points along it; planned: the best places, with their plans; unplanned: why there are none; held: where
+    a redundant joint is held [rad] at the best place.
     """
 
     arm: Arm
@@ -69,6 +74,7 @@ class Place:
     postures: Array
     planned: tuple[Planned, ...] = ()
     unplanned: str = ""
+    held: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def reach_all(self) -> int:
@@ -157,30 +163,40 @@ def each(
         every = np.concatenate(mine).reshape(len(axes[0]), len(axes[1]), one.yaws)
         margin, reached = _margins(every == len(one.targets), settings["step"])[inner], every[inner]
         x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(one.yaws) * settings["yaw"]
-        best = _best(one, reached, margin, x, y, yaws)
+        room = _rooms(one, x, y, yaws)
+        best = _best(room, reached, margin)
         where, none = positions_of(one.task, one.targets), np.zeros((0, one.arm.n))
         place = Place(one.arm, x, y, yaws, one.z, reached, margin, len(one.targets), best, where, none)
         file = paths[i]
-        place = place if file is None else _planned(one, place, file)
-        found.append(replace(place, postures=_postures(one, place)))
+        place = place if file is None else _planned(one, place, file, room)
+        found.append(_with_postures(one, place))
     return found
 
 
-def _postures(question: Question, place: Place) -> Array:
-    """For each target reached from the best place, the legal posture that is nearest to home."""
-    s, legal = free_from(question, place.xyz[:2], float(place.yaw[place.best[2]]))
+def _with_postures(question: Question, place: Place) -> Place:
+    """The same with, for each target reached from the best place, the legal posture that is nearest to home."""
+    at, turn = place.xyz[:2], float(place.yaw[place.best[2]])
+    plan = next((one.plan for one in place.planned if one.index == place.best and one.plan is not None), None)
+    if plan is not None and plan.held:
+        question = question._replace(values=tuple(plan.held.values()))
+    one = at_value(question, at, turn)
+    s, legal = free_from(one, at, turn)
     row = np.flatnonzero(legal.any(axis=1))
-    return np.asarray(s.q[row, np.where(legal, s.motion, np.inf)[row].argmin(axis=1)]) if len(row) else place.postures
+    q = s.q[row, np.where(legal, s.motion, np.inf)[row].argmin(axis=1)] if len(row) else place.postures
+    if one.whole is None:
+        return replace(place, postures=np.asarray(q))
+    held = one.whole.joints
+    return replace(place, postures=unlock(question.arm, held, q) if len(row) else place.postures, held=held)
 
 
-def _planned(question: Question, place: Place, file: PathFile) -> Place:
+def _planned(question: Question, place: Place, file: PathFile, room: Room) -> Place:
     """The same with the best places planned; one that cannot be planned does not reach all."""
     if why := planning.unplanned(question.arm):
         return replace(place, unplanned=why)
     tried: list[Planned] = []
     left = place.reached.copy()
     while left.max() == place.of and len(tried) < TRIES and sum(one.plan is not None for one in tried) < FEW:
-        i, j, k = _best(question, left, place.margin, place.x, place.y, place.yaw)
+        i, j, k = _best(room, left, place.margin)
         at = (float(place.x[i]), float(place.y[j]), place.z)
         tried.append(planning.plan(question.arm, question.around, (i, j, k), at, float(place.yaw[k]), file))
         left[i, j, k] = -1
@@ -188,7 +204,7 @@ def _planned(question: Question, place: Place, file: PathFile) -> Place:
             place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
     best = next((one.index for one in tried if one.plan is not None), None)
     if best is None:
-        best = _best(question, place.reached, place.margin, place.x, place.y, place.yaw)
+        best = _best(room, place.reached, place.margin)
     return replace(place, best=best, planned=tuple(tried))
 
 
@@ -197,15 +213,17 @@ def _question(
 ) -> Question:
     """What is asked of one arm: its own keep-outs apart from those of a scene."""
     ways: tuple[int, ...] = ()
+    spare, held = "", tuple[float, ...]()
     if file is None:
         task = task_for(arm, None)
     else:
         task, each_way = planning.ways(arm, file)
         targets, ways = np.concatenate(each_way), tuple(map(len, each_way))
+        spare, held = planning.held(arm, file)
     arm, around = apart(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
     values = read_targets(task, targets).values
-    return Question(arm, task, values, yaws, settings["yaw"], settings["z"], around, ways)
+    return Question(arm, task, values, yaws, settings["yaw"], settings["z"], around, ways, spare, held)
 
 
 def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.PathLike[str] | None) -> Parts | None:
@@ -213,7 +231,9 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
     if out is None:
         return None
     files.check(os.fspath(out))
-    robots = [[one.arm.sha256, one.around.sha256, digest(one.targets.tobytes()), *one.ways] for one in questions]
+    robots = [
+        [one.arm.sha256, one.around.sha256, digest(one.targets.tobytes()), *one.ways, *one.values] for one in questions
+    ]
     asked = {"command": "place", "armkin": __version__, "robots, scene and targets": robots, **settings}
     return Parts(os.fspath(out), asked)
 
@@ -243,7 +263,9 @@ def _axes(
 
 
 def _blocks(question: Question, at: Array) -> Iterator[Array]:
-    count = max(SOLVES // (len(question.targets) * (1 if question.arcs else question.yaws)), 1)
+    one = next(each_value(question))
+    solves = len(one.targets) * (1 if one.arcs else one.yaws) * max(len(question.values), 1)
+    count = max(SOLVES // solves, 1)
     for start in range(0, len(at), count):
         yield at[start : start + count]
 
@@ -275,22 +297,30 @@ def _along(good: NDArray[np.bool_]) -> Array:
     return np.asarray(np.minimum(ahead, behind))
 
 
-def _best(
-    question: Question, reached: NDArray[np.int64], margin: Array, x: Array, y: Array, yaws: Array
-) -> tuple[int, int, int]:
+def _best(room: Room, reached: NDArray[np.int64], margin: Array) -> tuple[int, int, int]:
     """The place that reaches most, by the greatest margin, then by the greatest distance to a joint limit."""
     most = reached == reached.max()
     tied = np.argwhere(most & (margin >= margin[most].max() - 1e-9))
     if len(tied) > 1 and reached.max():
         spread = tied[:: max(len(tied) // 200, 1)]  # of very many alike, some
-        room = [_room(question, np.array([x[i], y[j]]), float(yaws[k])) for i, j, k in spread]
-        tied = spread[int(np.argmax(room)) :]
+        tied = spread[int(np.argmax([room(*index) for index in spread.tolist()])) :]
     i, j, k = tied[0].tolist()
     return i, j, k
 
 
+def _rooms(question: Question, x: Array, y: Array, yaws: Array) -> Room:
+    """`_room` of places by their index, each asked once."""
+
+    @cache
+    def room(i: int, j: int, k: int) -> float:
+        return _room(question, np.array([x[i], y[j]]), float(yaws[k]))
+
+    return room
+
+
 def _room(question: Question, at: Array, turn: float) -> float:
     """The least, over the targets reached, of the best branch's distance to a limit, as a share of the range."""
+    question = at_value(question, at, turn)
     s, legal = free_from(question, at, turn)
     margins = np.where(legal, limit_margin(question.arm, s.q), -np.inf).max(axis=1, initial=-np.inf)
     there = margins[np.isfinite(margins)]

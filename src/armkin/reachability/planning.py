@@ -56,6 +56,15 @@ def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
     return task, [np.asarray(each) for each in found]
 
 
+def held(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
+    """The joint that a path's plan holds, and where it may [rad], as `armkin.path` asks them; "": none."""
+    from armkin.inverse.solvers.redundant import redundancy
+    from armkin.motion.redundant import values_to_hold
+
+    spare = redundancy(arm, file.task)
+    return ("", ()) if spare is None else (arm.joint_names[spare.joint], values_to_hold(arm, file, spare))
+
+
 def unplanned(arm: Arm) -> str:
     """Why no path of an arm can be planned: the joints' rates that its file lacks; "" where it has them."""
     from armkin.motion.joint_moves import check_rates

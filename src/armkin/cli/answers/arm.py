@@ -140,6 +140,7 @@ class BestPlace(TypedDict):
     reached: Annotated[int, "targets; of a path, points along it"]
     of: int
     margin_mm: Annotated[float, "to the nearest place of the grid, at this yaw, that does not reach all"]
+    held: Annotated[NotRequired[dict[str, float]], "of a path: the redundant joint, and where it is held [deg]"]
 
 
 class PlannedPlace(TypedDict):

@@ -118,11 +118,20 @@ def _answer(found: Place) -> PlacedRobot:
         "of": found.of,
         "margin_mm": float(found.margin[i, j, k]),
     }
+    if found.held:
+        best["held"] = _held(found)
     counts = {"places": found.reached.size, "reach_all": found.reach_all}
     answer = cast("PlacedRobot", {**render.head(found.arm), "best": best, **counts})
     if found.planned:
         answer["planned"] = [_planned(found, one) for one in found.planned]
     return answer
+
+
+def _held(found: Place) -> dict[str, float]:
+    """Where the redundant joint is held at the best place [deg]."""
+    from armkin.model.units import DEGREE
+
+    return {name: round(float(value / DEGREE), 9) for name, value in found.held.items()}
 
 
 def _planned(found: Place, one: Planned) -> PlannedPlace:
@@ -154,6 +163,10 @@ def _text(found: Sequence[Place]) -> str:
             ]
         )
     text = render.table(rows, indent="") + "\n"
+    for one in found:
+        if one.held:
+            joints = ", ".join(f"{name} at {value:.4g}" for name, value in _held(one).items())
+            text += f"{one.arm.name}, held there: {joints}\n"
     if any(one.planned for one in found):
         rows = [["planned from", "x/mm", "y/mm", "yaw/deg", "margin/mm", "s", ""]]
         for one in found:
