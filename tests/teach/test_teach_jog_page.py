@@ -35,6 +35,7 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         page.keyboard.down("Space")
         jogs()
         until(page, "document.querySelectorAll('#live polyline').length === 6")
+        until(page, "document.querySelector('#live-keys').textContent.includes('apart')")
         until(page, f"!{_AT}.includes('q2 90.00')")
         page.keyboard.up("Space")
         jogs(ends=True)
@@ -42,7 +43,6 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         stands, stood = joints(), page.text_content("#position")
         assert stands[0] == 0  # along x, the first joint rests
         assert stands[1] > 90
-        assert "apart" in (page.text_content("#live-keys") or "")
         assert page.get_attribute("#live", "aria-label")
 
         # The gamepad is off until it is switched on, and moves nothing without a held shoulder button.
@@ -61,7 +61,17 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         page.evaluate("() => { pad.buttons[5].pressed = false; }")
         jogs(ends=True)
         assert joints()[1] < stands[1]  # forwards again
-        page.evaluate("() => { pad.buttons[5].pressed = true; }")
-        jogs()
-        page.evaluate("() => { pad.buttons[1].pressed = true; pad.buttons[5].pressed = false; }")
-        until(page, "document.querySelector('#arrived').textContent.startsWith('stopped')")
+        # STOP with the shoulder button still held: the jog does not begin again. On a busy computer the jog may end by
+        # itself, for want of signs of life, before the request arrives.
+        for _ in range(20):
+            page.evaluate("() => { pad.buttons[1].pressed = false; pad.buttons[5].pressed = true; }")
+            jogs()
+            page.evaluate("() => { pad.buttons[1].pressed = true; }")
+            jogs(ends=True)
+            until(page, "document.querySelector('#arrived').textContent !== ''")
+            if (page.text_content("#arrived") or "").startswith("stopped"):
+                break
+        stood = page.text_content("#position")
+        page.wait_for_timeout(300)
+        assert (page.text_content("#arrived") or "").startswith("stopped")
+        assert page.text_content("#position") == stood

@@ -94,8 +94,9 @@ export class Jog {
   poll() {
     const found = Array.from(navigator.getGamepads?.() ?? []).find((one) => one?.connected);
     if (found) get("pad").textContent = `${found.id.slice(0, 60)}: hold a shoulder button and push a stick; B is STOP.`;
-    if (found?.buttons[CROSSED]?.pressed) get("stop").click();
-    const fields = found && !document.hidden && document.hasFocus() ? this.asked(found) : null;
+    const stop = found?.buttons[CROSSED]?.pressed;
+    if (stop) get("stop").click();
+    const fields = found && !stop && !document.hidden && document.hasFocus() ? this.asked(found) : null;
     const wanted = fields ? JSON.stringify(fields) : "";
     if (this.pushed && wanted !== this.pushed) {
       this.pushed = "";
