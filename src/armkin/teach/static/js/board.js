@@ -78,7 +78,7 @@ export class Board {
   /** @param {string} name @param {object} [fields] */
   async ask(name, fields = {}) {
     // Before it is asked for: what the board says of it may come sooner than the answer.
-    if (name !== "jog" || !this.jog.beating) {
+    if (name !== "jog" || this.jog.fresh) {
       this.page.begun();
       get("arrived").textContent = "";
     }

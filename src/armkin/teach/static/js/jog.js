@@ -13,12 +13,15 @@ const STICKS = /** @type {[number, string, number][]} */ ([[1, "x", -1], [0, "y"
 export class Jog {
   /**
    * @param {import("./types.js").Arm} arm
-   * @param {{ask: (name: string, fields?: object) => void, busy: () => boolean}} board
+   * @param {{ask: (name: string, fields?: object) => Promise<void>, busy: () => boolean}} board
    */
   constructor(arm, board) {
     this.arm = arm;
     this.board = board;
     this.beating = 0;
+    this.fresh = false; // nothing of this jog has been asked for yet
+    /** @type {Promise<unknown>} */
+    this.answered = Promise.resolve(); // when all that was asked for has been answered
     this.polling = 0;
     this.pushed = ""; // what the gamepad asks for
     this.select = /** @type {HTMLSelectElement} */ (get("jog-joint"));
@@ -47,15 +50,21 @@ export class Jog {
   /** @param {object} fields */
   begin(fields) {
     if (this.beating) return;
-    const beat = () => this.board.ask("jog", fields);
-    beat();
+    const beat = () => {
+      if (!this.beating) return;
+      this.answered = Promise.all([this.answered, this.board.ask("jog", fields)]);
+      this.fresh = false;
+    };
+    this.fresh = true;
     this.beating = setInterval(beat, BEAT);
+    this.answered.then(beat);
   }
 
   end() {
     if (!this.beating) return;
     this.stopped();
-    this.board.ask("jog_end");
+    // Not before the server has had every sign of life: one that came after the end would begin another jog.
+    this.answered = this.answered.then(() => this.board.ask("jog_end"));
   }
 
   /** Nothing is asked for any more. */
