@@ -106,7 +106,7 @@ def _ranked(key: Array, valid: Bool, within: Bool, free: Bool) -> NDArray[np.int
 def _motion(q: Array, near: Array, scale: Array) -> Array:
     """Sums of |change| from near (n,), each joint by its scale: (N, B, n) -> (N, B), as numpy would add them up."""
     if q.shape[-1] > 7:
-        return np.asarray((np.abs(q - near) / scale).sum(axis=-1))
+        return _sum(np.abs(q - near) / scale)
     total = np.zeros(q.shape[:-1])
     for i, (start, unit) in enumerate(zip(near, scale, strict=True)):
         away = q[..., i] - start  # joint by joint: no array of all of them

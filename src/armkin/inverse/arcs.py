@@ -8,20 +8,17 @@ curve that turns back is followed round its turn.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.followed import Follower
+from armkin.inverse.followed import Follower, over_a_turn
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import CONVERGING, SAME_SEED, SHORTEST_ARC
 from armkin.inverse.pieces import Int
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    pass
 
 PLANES = 60  # values of the redundant joint that the elimination answers
 LONGEST = 0.1  # [rad, reaches] step along a curve
@@ -81,7 +78,7 @@ def _seeds(find: Follower, row: Int, plane: Int, q: Array) -> _Seeds:
 
 def _answers(find: Follower) -> _Seeds:
     """Of every target those on all planes."""
-    N, t = len(find.target), _planes()
+    N, t = len(find.target), over_a_turn(PLANES)
     q = find.found(np.repeat(np.arange(N), PLANES), np.tile(t, N))
     place, branch = np.nonzero(~np.isnan(q[:, :, 0]))
     row, plane, q = place // PLANES, place % PLANES, q[place, branch]
@@ -93,10 +90,6 @@ def _answers(find: Follower) -> _Seeds:
     points = onto(find, row, q, last, True)
     good = points.miss <= CONVERGING
     return _seeds(find, row[good], plane[good], points.q[good])
-
-
-def _planes() -> Array:
-    return np.asarray(-np.pi + (np.arange(PLANES) + 0.5) * (2 * np.pi / PLANES))
 
 
 class _Arcs(NamedTuple):
@@ -114,7 +107,7 @@ def _trace(find: Follower, seeds: _Seeds, ray: Int, side: Int) -> _Arcs:
     row, plane = seeds.row[ray], seeds.plane[ray]
     now = seeds.points.of(ray)
     now = now._replace(tangent=now.tangent * side[:, None])
-    low = _planes()[plane]
+    low = over_a_turn(PLANES)[plane]
     h = np.full(len(ray), LONGEST)
     end, out = np.full((len(ray), find.arm.n), np.nan), np.zeros(len(ray), np.intp)
     passed: list[tuple[Int, Points]] = []
@@ -137,7 +130,7 @@ def _trace(find: Follower, seeds: _Seeds, ray: Int, side: Int) -> _Arcs:
             share = (np.where(far, wide, 0.0) - before) / np.where(depth[left] == before, 1.0, depth[left] - before)
             guess = here.q[left] + np.clip(share, 0.0, 1.0)[:, None] * moved[left] * unit
             out[some] = np.where(far, (plane[some] + side[some]) % PLANES, plane[some])
-            guess[:, j] = _planes()[out[some]]
+            guess[:, j] = over_a_turn(PLANES)[out[some]]
             held = np.zeros_like(guess)
             held[:, j] = 1.0
             there = onto(find, row[some], guess, held, True)

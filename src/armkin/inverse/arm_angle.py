@@ -20,7 +20,7 @@ from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.branches.whole_turns import nearest_copy, nearest_row
 from armkin.inverse.closed.wrist import meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
-from armkin.inverse.pieces import Int, Pieces, best_samples, none, runs
+from armkin.inverse.pieces import Int, Pieces, best_samples, holding_none, none, runs
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
@@ -264,9 +264,7 @@ def _pieces(of: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     between, point = s.between.reshape(-1, K), s.point.reshape(-1, K)
     found = [runs(between, of_curves), (*np.nonzero(point), np.zeros(point.sum(), np.intp))]
     other, begin, count = runs(np.ones_like(between), of_curves)
-    so_far = np.cumsum(np.tile(between | point, 2), axis=1)
-    so_far = np.concatenate([np.zeros((len(between), 1), int), so_far], axis=1)
-    empty = so_far[other, begin + count] == so_far[other, begin]
+    empty = holding_none(between | point, other, begin, count)
     found.append((other[empty], begin[empty], count[empty]))
     legal = np.repeat([True, True, False], [len(curve) for curve, *_ in found])
     curve, first, length = (np.concatenate(column) for column in zip(*found, strict=True))

@@ -38,6 +38,11 @@ class Postures(NamedTuple):
     legal: Bool
 
 
+def over_a_turn(count: int) -> Array:
+    """Values of a joint (count,) [rad], evenly over a turn, half a step from its ends."""
+    return np.asarray(-np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count))
+
+
 class Follower(NamedTuple):
     """Answers of some targets (N, ...) at any value of the redundant joint; near: (N, n)."""
 
@@ -117,7 +122,7 @@ class Followed(NamedTuple):
     def along(cls, find: Follower, finer: int = 1) -> Followed:
         """Of some targets; one without an answer is asked again: all of a nearly stretched arm lie within a degree."""
         K = SAMPLES * finer
-        t = np.asarray(-np.pi + (np.arange(K) + 0.5) * (2 * np.pi / K), np.float64)
+        t = over_a_turn(K)
         found = find.along(t)
         pieces, short = _pieces(find, t, found), _all_short(find, found)
         if finer == 1:

@@ -96,6 +96,13 @@ def runs(good: Bool, new: Bool) -> tuple[Int, Int, Int]:
     return row, first, length
 
 
+def holding_none(good: Bool, row: Int, first: Int, length: Int) -> Bool:
+    """Which runs hold none of the good samples (M, K): (R,); they may go round the end of the last axis."""
+    so_far = np.cumsum(np.tile(good, 2), axis=1)
+    so_far = np.concatenate([np.zeros((len(good), 1), int), so_far], axis=1)
+    return np.asarray(so_far[row, first + length] == so_far[row, first])
+
+
 def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
     """Of each run the least costly sample, counted from its first one: cost (M, K), a run goes round the end."""
     begin = np.cumsum(count) - count

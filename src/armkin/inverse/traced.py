@@ -12,7 +12,7 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.followed import Follower
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CONVERGING, REACH
-from armkin.inverse.pieces import Int, Pieces, best_samples, motion, none, runs
+from armkin.inverse.pieces import Int, Pieces, best_samples, holding_none, motion, none, runs
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
@@ -174,10 +174,10 @@ class _Nodes(NamedTuple):
         """The pieces of the curve."""
         K = len(self.at)
         turns = (self.up != np.roll(self.up, 1))[None]
-        _, first, length = runs((self.legal & self.alive)[None], turns)
-        _, begin, count = runs(self.alive[None], turns)
-        so_far = np.concatenate([[0], np.cumsum(np.tile(self.legal & self.alive, 2))])
-        empty = so_far[begin + count] == so_far[begin]
+        good = (self.legal & self.alive)[None]
+        _, first, length = runs(good, turns)
+        empty_of, begin, count = runs(self.alive[None], turns)
+        empty = holding_none(good, empty_of, begin, count)
         legal = np.repeat([True, False], [len(first), int(empty.sum())])
         first, length = np.concatenate([first, begin[empty]]), np.concatenate([length, count[empty]])
         best = best_samples(self.cost, legal.astype(np.intp), first, length + 1)

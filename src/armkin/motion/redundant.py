@@ -73,8 +73,8 @@ def values_to_hold(arm: Arm, file: PathFile, spare: Redundancy) -> tuple[float, 
         return (said,)
     begin = _begin(arm, file, arm.home)
     close = float((arm.home if begin is None else begin)[spare.joint])
-    t = _over_range(arm, spare.joint, close)
-    return tuple(np.unique(t)[np.argsort(np.abs(np.unique(t) - close), kind="stable")].tolist())
+    t = np.unique(_over_range(arm, spare.joint, close))
+    return tuple(t[np.argsort(np.abs(t - close), kind="stable")].tolist())
 
 
 def _over_range(arm: Arm, joint: int, close: float) -> Array:

@@ -90,12 +90,11 @@ def _most(question: Question, at: Array) -> NDArray[np.int64]:
     bare = question._replace(arm=_bare(question.arm), around=Around())
     left = np.arange(len(at))
     for one, without in zip(each_value(question), each_value(bare), strict=True):
-        found = counted(without, at[left])
+        some, found = left, counted(without, at[left])
         if blocked:
-            more = left[(found > counts[left]).any(axis=1)]
-            counts[more] = np.maximum(counts[more], counted(one, at[more])) if len(more) else counts[more]
-        else:
-            counts[left] = np.maximum(counts[left], found)
+            some = left[(found > counts[left]).any(axis=1)]
+        if len(some):
+            counts[some] = np.maximum(counts[some], counted(one, at[some]) if blocked else found)
         left = left[(counts[left] < len(question.targets)).any(axis=1)]
         if not len(left):
             break

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armkin.motion.path_plan import PathPlan
 
 SHOWN = 0.2  # [mm] that the tip shown may be off where it is looked at, so that it is less than 0.5 in between
-MOST = 160_000  # about 80 bytes each; samples; a plan that needs more is shown less exactly, and the page says so
+MOST = 160_000  # samples of some 80 bytes; a plan that needs more is shown less exactly, and the page says so
 
 
 def played(arm: Arm, plan: PathPlan) -> dict[str, Any]:

@@ -34,10 +34,8 @@ _SEEN = 64  # segments of a beginning, whose way to the board is reckoned: both 
 _STARTING = (
     (2, 3, 3, 3, 4),
     (2, 3, 4),
-)  # segments of its first frames: short ones are there soon, few need few answers
-_FAR = (
-    0.005  # [s] of the slowest answer, from where the queue holds too few segments to wait for credit in a short move
-)
+)  # segments of its first frames: short ones are there soon, few need few acks
+_FAR = 0.005  # [s] of the slowest answer, from where on the queue is too short to wait for credit in a short move
 _BUSY = 0.0005  # [s] that a board is busy with a segment
 _ACK = 16  # [bytes] of an answer
 _BEGUN = 0.1  # [s] after its longest pause, until which a motion that has made no step may begin again

@@ -120,12 +120,11 @@ ARM_INLINE void arm_times_lanes(const arm_many *a, const arm_many *b, arm_many *
 
 ARM_INLINE void arm_link_lanes(const arm_many *a, const double *b, arm_many *out)
 {
-    int i, j;
-    for (i = 0; i < 3; i++)
-        for (j = 0; j < 4; j++) {
-            const arm_many sum = a[4 * i] * b[j] + a[4 * i + 1] * b[4 + j] + a[4 * i + 2] * b[8 + j];
-            out[4 * i + j] = j == 3 ? sum + a[4 * i + 3] : sum;
-        }
+    arm_many all[12];
+    int i;
+    for (i = 0; i < 12; i++)
+        all[i] = arm_all(b[i]);
+    arm_times_lanes(a, all, out);
 }
 
 ARM_INLINE void arm_move_lanes(const arm_many *a, arm_many c, arm_many s, arm_many *out)

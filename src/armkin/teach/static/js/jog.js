@@ -52,7 +52,7 @@ export class Jog {
     if (this.beating) return;
     const beat = () => {
       if (!this.beating) return;
-      this.answered = Promise.all([this.answered, this.board.ask("jog", fields)]);
+      this.answered = Promise.all([this.answered, this.board.ask("jog", fields)]).then(() => {}); // not one list in another
       this.fresh = false;
     };
     this.fresh = true;
