@@ -83,7 +83,7 @@ def test_real_roots_are_as_many_in_lanes() -> None:
             re, im = np.empty((2, lanes, n))
             assert not library.in_lanes(np.ascontiguousarray(some).ctypes, n, re.ctypes, im.ctypes)
             for k in range(lanes):
-                padded, x, y = np.zeros((24, 24)), np.empty(24), np.empty(24)
+                padded, x, y = np.zeros((24, 24)), np.zeros(24), np.zeros(24)
                 padded[:n, :n] = some[k]
                 library.one_by_one(padded.ctypes, n, x.ctypes, y.ctypes)
                 assert (im[k] == 0).sum() == (y[:n] == 0).sum()
