@@ -13,6 +13,15 @@ window.pad = {id: 'Pad <b>1</b>', connected: true, mapping: 'standard', axes: [0
               buttons: Array.from({length: 17}, () => ({pressed: false}))};
 navigator.getGamepads = () => [window.pad, null];
 """
+# Answers to a jog that are late: the arm stops for want of signs of life before the page can say that it shall.
+_LATE = """
+const ask = window.fetch;
+window.fetch = async (what, how) => {
+  const answer = await ask(what, how);
+  if (String(what).endsWith('/api/jog')) await new Promise((done) => setTimeout(done, 1000));
+  return answer;
+};
+"""
 _AT = "document.querySelector('#position').textContent"
 
 
@@ -75,3 +84,16 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         page.wait_for_timeout(300)
         assert (page.text_content("#arrived") or "").startswith("stopped")
         assert page.text_content("#position") == stood
+
+
+def test_a_jog_that_ended_before_the_page_could_end_it_stays_told() -> None:
+    with served(board="sim") as server, chromium() as browser, opened(browser, server.address, script=_LATE) as page:
+        until(page, f"{_AT}.startsWith('It stands')")
+        page.locator("#jog-up").focus()
+        with page.expect_response("**/api/jog_end") as ending:
+            page.keyboard.down("Space")
+            until(page, "document.querySelector('#standing').textContent.startsWith('jog')")
+            page.keyboard.up("Space")
+            until(page, "document.querySelector('#arrived').textContent === 'jog: done'")
+        assert ending.value.ok
+        assert page.text_content("#arrived") == "jog: done"

@@ -25,6 +25,7 @@ export class Board {
     this.lost = false; // the server does not answer
     this.jog = new Jog(arm, {
       ask: (name, fields) => this.ask(name, fields),
+      tell: (name, fields) => this.tell(name, fields),
       busy: () => this.state?.doing !== "" || !this.state.connected || this.lost,
     });
     this.live = new Live(arm);
@@ -52,7 +53,7 @@ export class Board {
       this.ask("assume_home", { consent: checked("consent") });
       /** @type {HTMLInputElement} */ (get("consent")).checked = false;
     });
-    get("follow").addEventListener("change", () => (checked("follow") ? this.follow() : this.ask("follow", { on: false })));
+    get("follow").addEventListener("change", () => (checked("follow") ? this.follow() : this.tell("follow", { on: false })));
   }
 
   /** From where it stands: what is shown instead was not dragged. */
@@ -68,20 +69,23 @@ export class Board {
     if (!this.state?.follows) return;
     this.state.follows = false; // it is asked for once
     this.follows();
-    this.ask("follow", { on: false });
+    this.tell("follow", { on: false });
   }
 
   follows() {
     /** @type {HTMLInputElement} */ (get("follow")).checked = this.state?.follows ?? false;
   }
 
-  /** @param {string} name @param {object} [fields] */
-  async ask(name, fields = {}) {
+  /** Something new. @param {string} name @param {object} [fields] */
+  ask(name, fields = {}) {
     // Before it is asked for: what the board says of it may come sooner than the answer.
-    if (name !== "jog" || this.jog.fresh) {
-      this.page.begun();
-      get("arrived").textContent = "";
-    }
+    this.page.begun();
+    get("arrived").textContent = "";
+    return this.tell(name, fields);
+  }
+
+  /** What goes on, or ends: the board may have said meanwhile how it ended. @param {string} name @param {object} [fields] */
+  async tell(name, fields = {}) {
     try {
       await act(name, fields);
     } catch (error) {

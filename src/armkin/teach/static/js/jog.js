@@ -13,13 +13,12 @@ const STICKS = /** @type {[number, string, number][]} */ ([[1, "x", -1], [0, "y"
 export class Jog {
   /**
    * @param {import("./types.js").Arm} arm
-   * @param {{ask: (name: string, fields?: object) => Promise<void>, busy: () => boolean}} board
+   * @param {{ask: (name: string, fields?: object) => Promise<void>, tell: (name: string, fields?: object) => Promise<void>, busy: () => boolean}} board
    */
   constructor(arm, board) {
     this.arm = arm;
     this.board = board;
     this.beating = 0;
-    this.fresh = false; // nothing of this jog has been asked for yet
     /** @type {Promise<unknown>} */
     this.answered = Promise.resolve(); // when all that was asked for has been answered
     this.polling = 0;
@@ -50,12 +49,13 @@ export class Jog {
   /** @param {object} fields */
   begin(fields) {
     if (this.beating) return;
+    let asked = false;
     const beat = () => {
       if (!this.beating) return;
-      this.answered = Promise.all([this.answered, this.board.ask("jog", fields)]).then(() => {}); // not one list in another
-      this.fresh = false;
+      const sent = asked ? this.board.tell("jog", fields) : this.board.ask("jog", fields);
+      asked = true;
+      this.answered = Promise.all([this.answered, sent]).then(() => {}); // not one list in another
     };
-    this.fresh = true;
     this.beating = setInterval(beat, BEAT);
     this.answered.then(beat);
   }
@@ -64,7 +64,7 @@ export class Jog {
     if (!this.beating) return;
     this.stopped();
     // Not before the server has had every sign of life: one that came after the end would begin another jog.
-    this.answered = this.answered.then(() => this.board.ask("jog_end"));
+    this.answered = this.answered.then(() => this.board.tell("jog_end"));
   }
 
   /** Nothing is asked for any more. */
