@@ -23,13 +23,15 @@ def postures(arm: armkin.Arm, task: str | None, count: int, seed: int) -> tuple[
 def held_answers(arm: armkin.Arm, joint: int, value: float, target: np.ndarray, task: str | None) -> np.ndarray:
     """Legal postures (B, n) with the redundant joint held: the arm is built anew, as `--lock` does.
 
-    What stands between two roots that have just vanished misses its target by 1e-9 to 1e-8: it is none.
+    Neither what stands between two roots that have just vanished is one, which misses its target by 1e-12 and more (an
+    answer by 1e-14), nor what lies beyond a limit within its slack of 1e-9 rad: an interval ends where the limit is.
     """
     held = {arm.joint_names[joint]: value}
     s = armkin.ik(armkin.lock(arm, held), target, task, examine=False)
     mm, rad = s.residual()
-    exact = s.within_limits & (np.maximum(mm / arm.reach, np.nan_to_num(rad)) <= 1e-10)
-    return np.asarray(armkin.unlock(arm, held, s.q[exact]))
+    exact = s.within_limits & (np.maximum(mm / arm.reach, np.nan_to_num(rad)) <= 1e-13)
+    q = armkin.unlock(arm, held, s.q[exact])
+    return np.asarray(q[((q >= arm.lower - 1e-12) & (q <= arm.upper + 1e-12)).all(axis=1)])
 
 
 def covers(arm: armkin.Arm, intervals: np.ndarray, value: float, slack: float = 1e-8) -> np.ndarray:

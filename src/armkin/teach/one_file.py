@@ -92,8 +92,7 @@ def _data(arm: Arm, task_name: str | None, plan: PathPlan | None, meshes: dict[s
         "arm": drawn | {"locks": False, "meshes": meshes},
         "solver": solver,
         "plan": None if plan is None else played(arm, plan),
-        # of the task that fits the arm; while a joint is held all targets may be singular, and take half a minute
-        "slice": None if task_name or solver["held"] else reach_slice(arm),
+        "slice": None if task_name else reach_slice(arm),  # of the task that fits the arm
     }
     return "".join(f"export const {name} = {_json(value)};\n" for name, value in values.items())
 

@@ -5,38 +5,81 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from armkin.model.lock import lock
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.inverse.solve import ik
+from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
+from armkin.inverse.tasks.task import distance
+from armkin.keep_out.clearance import clear
+from armkin.model.arm import actual
 from armkin.reachability import voxels
+from armkin.reachability.cells import Grid
 from armkin.reachability.map import reach
-from armkin.teach.scene import first_lock
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 ACROSS = 12  # voxels from joint 1's axis to the end of the reach
 DIRECTIONS = 12  # of the tool's z axis, in each voxel
+VALUES = 12  # of the redundant joint over its range, where the others have a closed form; else it stays at home
 
 
 @lru_cache(maxsize=4)
 def reach_slice(arm: Arm) -> dict[str, Any]:
     """size [mm]; frame: the reach frame (4, 4); centres in it [mm], three numbers a voxel; shares above 0; of: how
-    many orientations a voxel was asked for; held: the joint that stays at home, of an arm with one more than its task.
+    many orientations a voxel was asked for; held: the redundant joint, of an arm with one more than its task, else
+    None; values: of how many of its values one at least must reach.
 
     Raises UsageError for an arm without a task of its own.
     """
-    held = first_lock(arm)
-    asked = arm if held is None else lock(arm, {held: float(arm.home[arm.joint_names.index(held)])})
-    found = reach(
-        asked, grid=arm.reach / ACROSS, azimuths=2, directions=DIRECTIONS, rolls=1, measures=False
-    )  # azimuths 0 and 180 degrees alone: the plane
-    plane = voxels.section(found.grid)
-    share = found.columns["share"][plane.row]
+    true = actual(arm)
+    free = redundancy(true, None)
+    step = arm.reach / ACROSS
+    if free is None:  # azimuths 0 and 180 degrees alone: the plane
+        found = reach(arm, grid=step, azimuths=2, directions=DIRECTIONS, rolls=1, measures=False)
+        grid, shares, values = found.grid, found.columns["share"], 0
+    else:
+        grid = Grid(true, step, 2, DIRECTIONS, 1, False)
+        at = _values(true, free)
+        shares, values = _shares(grid, free, at), len(at)
+    plane = voxels.section(grid)
+    share = shares[plane.row]
     there = share > 0
     return {
-        "size": found.grid.step,
-        "frame": found.grid.frame.tolist(),
+        "size": grid.step,
+        "frame": grid.frame.tolist(),
         "centres": plane.centres[there].round(3).ravel().tolist(),
         "shares": share[there].round(4).tolist(),
-        "of": found.orientations,
-        "held": held,
+        "of": grid.orientations,
+        "held": None if free is None else arm.joint_names[free.joint],
+        "values": values,
     }
+
+
+def _values(arm: Arm, free: Redundancy) -> Array:
+    """Values of the redundant joint that are asked [rad], home first."""
+    low, high, home = (float(limit[free.joint]) for limit in (arm.lower, arm.upper, arm.home))
+    if not free.labelled:
+        return np.array([home])
+    low, high = (low if np.isfinite(low) else home - np.pi), (high if np.isfinite(high) else home + np.pi)
+    return np.append(home, np.linspace(low, high, VALUES - 1))
+
+
+def _shares(grid: Grid, free: Redundancy, values: Array) -> Array:
+    """Of each cell the share of orientations that are reached at one of the values, free of hits."""
+    arm, j = grid.arm, free.joint
+    M, count = grid.azimuths, grid.orientations
+    at = np.repeat(grid.rings, M * count, axis=0)
+    azimuth = np.tile(np.repeat(np.arange(M) * (2 * np.pi / M), count), len(grid.rings))
+    target = grid.targets(at, azimuth, np.arange(len(at)) % count, np.zeros(len(at)))
+    reached = np.zeros(len(target), bool)
+    near_enough = distance(arm, free.task, target) <= 1.0
+    for value in values:
+        left = np.flatnonzero(near_enough & ~reached)
+        s = ik(free.rest, moved(arm, free, target[left], np.full(len(left), value)), free.task.name, examine=False)
+        good = s.within_limits
+        if arm.keep_out:
+            good = good & clear(arm, np.insert(np.where(good[:, :, None], s.q, np.nan), j, value, axis=2))
+        reached[left] = good.any(axis=1)
+    return np.asarray(reached.reshape(-1, count).mean(axis=1))

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from armkin.export.c.text import part
 from armkin.formula import c_and_js_code, recording
+from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.elimination.choose_variable import Kind
 from armkin.inverse.elimination.merge import _WEIGHTS, MOST
 from armkin.inverse.elimination.method import Elimination
@@ -21,11 +22,13 @@ from armkin.inverse.elimination.roots import STEADY
 from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
 from armkin.inverse.solvers import tool_axis
+from armkin.inverse.solvers.redundant import moved_entries
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.inverse.elimination.pencil import Pencil
+    from armkin.inverse.solvers.redundant import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -68,10 +71,18 @@ def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list
     return list(every.values()), [[place[pencil.role, pencil.psi] for pencil in plans] for plans in kinds]
 
 
-def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PASSES, lanes: str = "") -> str:
+def candidates(
+    arm: Arm,
+    task: Task,
+    elimination: Elimination,
+    passes: int = PASSES,
+    lanes: str = "",
+    held: Redundancy | None = None,
+) -> str:
     """`arm_candidates` of an arm that the elimination solves, and all that it needs.
 
-    lanes: C in which `arm_first_pass` takes several poses at once, where there are vectors and no slides.
+    lanes: C in which `arm_first_pass` takes several poses at once, where there are vectors and no slides. held: the
+    joint that stands where near has it, of an arm that has one to spare; the elimination is that of the others.
     """
     kinds = plans_of(elimination, passes)
     pencils, numbers_of = pencils_of(kinds)
@@ -111,6 +122,9 @@ def candidates(arm: Arm, task: Task, elimination: Elimination, passes: int = PAS
     text = part("pencil") + "\n".join(lines) + "\n" + "".join(map(part, _METHOD)) + first + part("candidates")
     if task.orientation == "axis":
         text = text.replace("arm_candidates", "arm_six_candidates") + _with_virtual_joint()
+    if held is not None:
+        text = text.replace("ARM_JOINTS", str(arm.n - 1)).replace("arm_candidates", "arm_other_candidates")
+        text += _with_held_joint(arm, held)
     return text
 
 
@@ -173,6 +187,19 @@ def _with_virtual_joint() -> str:
     code = c_and_js_code.write(recording.record(tool_axis.pose_of, 6), [f"axis[{k} * ARM_LANES + i]" for k in range(6)])
     lines = [*code.lines, *(f"goal[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
     return part("virtual_joint").replace("@lines@", "\n        ".join(lines))
+
+
+def _with_held_joint(arm: Arm, held: Redundancy) -> str:
+    """`arm_candidates` of a whole arm whose redundant joint is held where near has it."""
+    size = 12 if held.task.orientation == "full" else len(held.task.labels)
+    inputs = [f"goal[{k} * ARM_LANES + i]" for k in range(size)]
+    own = f"near[{held.joint} * ARM_LANES + i]"
+    inputs += [f"ARM_COS({own})", f"ARM_SIN({own})"]
+    recorded = recording.record(lambda x: moved_entries(arm, held, x[:size], Pair(*x[size:])), len(inputs))
+    code = c_and_js_code.write(recorded, inputs)
+    lines = [*code.lines, *(f"others[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
+    text = part("held_joint").replace("@lines@", "\n        ".join(lines))
+    return text.replace("@held@", str(held.joint)).replace("@others@", str(arm.n - 1)).replace("@goal@", str(size))
 
 
 def frame(motion: ArrayLike) -> np.ndarray:

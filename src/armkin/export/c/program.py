@@ -23,6 +23,7 @@ from armkin.model.arm import actual
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
+    from armkin.inverse.solvers.redundant import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -46,9 +47,14 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
     """
     turned = actual(arm)  # branches are found, and limits hold, in actual joint values
-    task, named = _class_of(turned, task_name)
-    geometry = plain_form(turned, task, named)
-    solve, branches = candidates(turned, task, geometry, single)
+    spare = redundancy(turned, task_name)
+    task, named = solver(turned, task_name) if spare is None else (spare.task, spare.geometry)
+    geometry = plain_form(turned if spare is None else spare.rest, task, named)
+    numbered = geometry is named
+    if spare is not None:
+        spare = spare._replace(geometry=geometry)
+        geometry = held_by_near(turned, spare)
+    solve, branches = candidates(turned, task, geometry, single, held=spare)
     names = branch_names(turned, task, geometry, branches)
     prefix = identifier(arm.name)
     units = ["mm" if slides else "rad" for slides in arm.prismatic]
@@ -96,24 +102,23 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         part("source_tail"),
         *([keep_outs.clearances(arm, single), keep_outs.free(arm)] if arm.keep_out else []),
     ]
-    texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, geometry is named))
+    texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, numbered))
     return Program(*(filled(_named(filled(text, fields), prefix), words) for text in texts))
 
 
-def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
-    """The task and the class; of an arm with a redundant joint that of the others, that joint where near has it."""
-    spare = redundancy(arm, task_name)
-    if spare is None or spare.geometry.pairs is None:
-        return solver(arm, task_name)
-    return spare.task, held_by_near(arm, spare)
-
-
 def candidates(
-    arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True, lanes: str = ""
+    arm: Arm,
+    task: Task,
+    geometry: Geometry,
+    single: bool = False,
+    prefer: bool = True,
+    lanes: str = "",
+    held: Redundancy | None = None,
 ) -> tuple[str, int]:
     """The function `arm_candidates` of an arm's class, and how many branches it has.
 
-    lanes: see `elimination.candidates`. Raises UsageError if the class has no form in C, or none in single precision.
+    lanes, held: see `elimination.candidates`; a closed form has the held joint in
+    it. Raises UsageError if the class has no form in C, or none in single precision.
     """
     if geometry.pairs is not None:
         return kernel.candidates(arm, task, geometry, single, prefer)
@@ -124,7 +129,7 @@ def candidates(
         )
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
-    return elimination.candidates(arm, task, geometry.elimination, lanes=lanes), elimination.BRANCHES
+    return elimination.candidates(arm, task, geometry.elimination, lanes=lanes, held=held), elimination.BRANCHES
 
 
 def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:

@@ -81,24 +81,24 @@ def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
 
 
 def held_by_near(arm: Arm, free: Redundancy) -> Geometry:
-    """The closed form of the rest as one of the whole arm: the redundant joint is where the preferred motion has it."""
+    """The class of the rest as one of the whole arm: the redundant joint is where the preferred motion has it."""
     r, rest = free.joint, free.geometry.pairs
-    assert rest is not None
+    why = f"{free.geometry.why}; {arm.joint_names[r]} is redundant and held where near has it"
+    if rest is None:
+        return replace(free.geometry, why=why)
 
     def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
         own = prefer[r]
         assert own is not None
-        found = rest(_moved_entries(arm, free, goal, own), [*prefer[:r], *prefer[r + 1 :]])
+        found = rest(moved_entries(arm, free, goal, own), [*prefer[:r], *prefer[r + 1 :]])
         angles = [*(found.angles or [None] * len(found.pairs))]
         angles.insert(r, None)
         return found._replace(pairs=[*found.pairs[:r], own, *found.pairs[r:]], angles=angles)
 
-    name = arm.joint_names[r]
-    why = f"{free.geometry.why}; {name} is redundant and held where near has it"
     return replace(free.geometry, pairs=pairs, why=why, doubts=None)
 
 
-def _moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], own: Pair) -> list[Entry]:
+def moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], own: Pair) -> list[Entry]:
     """`moved` of one target's entries, for the cosine and sine of the redundant joint."""
     c, s = own
     if free.joint:

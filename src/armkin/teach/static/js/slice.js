@@ -52,7 +52,7 @@ export class Slice {
       button.disabled = true;
       /** @type {import("./types.js").ReachSlice} */
       const found = await act("reach").finally(() => (button.disabled = false));
-      const held = found.held ? `, ${found.held} at home` : "";
+      const held = found.held ? `, ${found.held} ${found.values > 1 ? `at one of ${found.values} values` : "at home"}` : "";
       this.about = `; voxels of ${Math.round(found.size)} mm: share of ${found.of} orientations, dark 0, yellow all${held}`;
       this.cubes = voxels(found);
       this.view.scene.add(this.cubes);

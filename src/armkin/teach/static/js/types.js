@@ -24,6 +24,6 @@
  *   undo: number, redo: number}} ProgramState
  * @typedef {{duration_s: number, approach_s: number, length_mm: number, shown_mm: number, time: number[], joints: number[][], tips: number[][],
  *   shares: number[][], stops: number[], refused?: string, hit?: number[]}} Played
- * @typedef {{size: number, frame: number[][], centres: number[], shares: number[], of: number, held: string|null}} ReachSlice
+ * @typedef {{size: number, frame: number[][], centres: number[], shares: number[], of: number, held: string|null, values: number}} ReachSlice
  */
 export {};
