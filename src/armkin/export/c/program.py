@@ -47,13 +47,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
     """
     turned = actual(arm)  # branches are found, and limits hold, in actual joint values
-    spare = redundancy(turned, task_name)
-    task, named = solver(turned, task_name) if spare is None else (spare.task, spare.geometry)
-    geometry = plain_form(turned if spare is None else spare.rest, task, named)
-    numbered = geometry is named
-    if spare is not None:
-        spare = spare._replace(geometry=geometry)
-        geometry = held_by_near(turned, spare)
+    task, geometry, spare, numbered = _class_of(turned, task_name)
     solve, branches = candidates(turned, task, geometry, single, held=spare)
     names = branch_names(turned, task, geometry, branches)
     prefix = identifier(arm.name)
@@ -104,6 +98,19 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     ]
     texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, numbered))
     return Program(*(filled(_named(filled(text, fields), prefix), words) for text in texts))
+
+
+def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry, Redundancy | None, bool]:
+    """The task; the class, of an arm with a redundant joint that of the others, that joint where near has it; this joint;
+    whether branches have the numbers that Python gives them."""
+    spare = redundancy(arm, task_name)
+    if spare is None:
+        task, named = solver(arm, task_name)
+        geometry = plain_form(arm, task, named)
+        return task, geometry, None, geometry is named
+    geometry = plain_form(spare.rest, spare.task, spare.geometry)
+    spare, numbered = spare._replace(geometry=geometry), geometry is spare.geometry
+    return spare.task, held_by_near(arm, spare), spare, numbered
 
 
 def candidates(
