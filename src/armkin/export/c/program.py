@@ -101,8 +101,8 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
 
 
 def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry, Redundancy | None, bool]:
-    """The task; the class, of an arm with a redundant joint that of the others, that joint where near has it; this joint;
-    whether branches have the numbers that Python gives them."""
+    """The task; the class, of an arm with a redundant joint that of the others, that joint where near has it; this
+    joint; whether branches have the numbers that Python gives them."""
     spare = redundancy(arm, task_name)
     if spare is None:
         task, named = solver(arm, task_name)
