@@ -6,11 +6,13 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pytest
 
 import armkin
 from armkin.model import units
 from armkin.teach.pose_answers import Question, look
+from armkin.teach.quick_ik import QuickIk
 from armkin.teach.scene import first_lock, scene
 from command_line import ROOT, run
 
@@ -117,3 +119,31 @@ def test_moves_start_where_the_arm_stands() -> None:
     answer = asked("three_dof", [-30, 5, -5], stands=(-1000, 0, 0))
     assert answer["motors"]["moves"] == [-67, -10144, 5667]
     assert answer["motors"]["from"] == "arm"
+
+
+@pytest.mark.parametrize(("robot", "held"), [("jaco_j2n6s300", ()), ("kinova_gen3", ("J7",))])
+def test_an_elimination_is_answered_by_machine_code_as_soon_as_that_is_built(robot: str, held: tuple[str, ...]) -> None:
+    one = arm(robot)
+    pose = units.home_out(one) + np.linspace(9, 3, one.n)
+    question = Question(units.joints_in(one, pose), held=held)
+    slow, quick = look(one, question), QuickIk()
+    look(one, question, quick)
+    assert quick.ready.wait(120)
+    assert quick.built
+    here = look(one, Question(question.q, slow["target"], held), quick)
+    assert [b["name"] for b in here["branches"]] == [b["name"] for b in slow["branches"]]
+    for mine, other in zip(here["branches"], slow["branches"], strict=True):
+        assert mine["joints"] == pytest.approx(other["joints"], abs=1e-6)
+    # another arm, as with another joint held, is none that was built
+    other = look(one, Question(question.q, held=(one.joint_names[3],)), quick)
+    assert other == look(one, Question(question.q, held=(one.joint_names[3],)))
+
+
+def test_without_a_compiler_an_elimination_is_answered_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    one, quick = arm("xarm6"), QuickIk()
+    monkeypatch.setenv("CC", "/nowhere/cc")
+    question = Question(units.joints_in(one, [10.0, 20, -30, 40, 50, 60]))
+    assert look(one, question, quick) == look(one, question)
+    assert quick.ready.wait(120)
+    assert not quick.built
+    assert look(one, question, quick) == look(one, question)

@@ -16,6 +16,7 @@ from armkin.teach.tabs import Action, Fields, Tab, Tabs
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.teach.board import BoardActions
+    from armkin.teach.quick_ik import QuickIk
 
 
 class Actions:
@@ -33,6 +34,7 @@ class Actions:
         self.tabs = Tabs(self._abandoned)
         self._solving = threading.Lock()  # one question at a time: two cores are not many
         self._shown: dict[str, Any] = {}
+        self._quick: QuickIk | None = None
         self.program_actions = ProgramActions(arm, self.stands, lambda state: self.tabs.tell("program", state))
         self.for_control: dict[str, Action] = {"look": self._look, **self.program_actions.actions()}  # by name
         if port is not None:
@@ -103,6 +105,7 @@ class Actions:
         from there would take the arm along to what nobody dragged.
         """
         from armkin.teach.pose_answers import Question, look  # the solver: imported while the browser loads the page
+        from armkin.teach.quick_ik import QuickIk
 
         arm = self.arm
         q = units.joints_in(arm, request_checks.numbers(fields, "q", arm.n))
@@ -123,7 +126,8 @@ class Actions:
             self.stands(),
         )
         with self._solving:
-            answer = look(arm, question)
+            self._quick = self._quick or QuickIk()
+            answer = look(arm, question, self._quick)
         before, self._shown = self._shown, answer
         self.tabs.tell("look", answer, but=tab)
         if self.board is None:

@@ -12,6 +12,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.forward import fk
 from armkin.inverse import choose
+from armkin.inverse.solve import ik
 from armkin.inverse.solvers import recognise
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
+    from armkin.teach.quick_ik import QuickIk
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,9 @@ class Question:
     stands: tuple[int, ...] | None = None  # pulses where the arm stands; None: not known
 
 
-def look(arm: Arm, question: Question) -> dict[str, Any]:
-    """The answer, as JSON in mm and degrees."""
-    solved = _solved(arm, question)
+def look(arm: Arm, question: Question, quick: QuickIk | None = None) -> dict[str, Any]:
+    """The answer, as JSON in mm and degrees; quick: what solves, if not Python alone; it is built for what is asked."""
+    solved = _solved(arm, question, quick)
     q = solved.pop("q", question.q)
     T = fk(arm, q) + 0.0  # no -0.0
     return {
@@ -88,14 +90,17 @@ def _task(arm: Arm) -> tuple[Task | None, str]:
         return None, str(error)
 
 
-def _solved(arm: Arm, question: Question) -> dict[str, Any]:
+def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, Any]:
     """Every branch of the target; `q` is the pose to show."""
     shown = units.joints_out(arm, question.q).tolist()
     held = {name: shown[arm.joint_names.index(name)] for name in question.held}
-    request = choose.Request(arm=arm, near=shown, held=held)
-    task, why = _task(choose.prepared(request))
+    request = choose.Request(arm=arm, near=shown, held=held, ik=quick.ik if quick else ik)
+    prepared = choose.prepared(request)
+    task, why = _task(prepared)
     if task is None:
         return {"task": None, "why": why, "branches": [], "status": None}
+    if quick:
+        quick.build(prepared, task.name)
     kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
     if question.target is None:
         goal = targets_of(task, fk(arm, question.q)[None], question.q[None, kept])[0]

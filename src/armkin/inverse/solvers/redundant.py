@@ -49,6 +49,8 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
         return None
     if arm.n != task.constraints + 1 or arm.n < 3:
         return None
+    if task_name is None:
+        return redundancy(arm, task.name)  # the same rest, prepared once
     found = []
     for joint in ([arm.n - 1] if task.orientation == "full" else []) + [0]:
         if arm.prismatic[joint]:
