@@ -74,8 +74,8 @@ MAY_IMPORT: dict[str, str] = {
     "flash": "errors board_kinds board/ports board/firmware",
     "board": "keep_out keep_out/shapes errors signals formula model forward motors motion board/ports board/backend",
     "teach": "keep_out keep_out/shapes"
-    " errors files formula robot_file model forward inverse inverse/tasks inverse/branches inverse/solvers motors"
-    " motion path_file reachability view board board/ports board/backend board/kinds board/sim"
+    " errors files formula robot_file model forward inverse inverse/tasks inverse/branches inverse/answers"
+    " inverse/solvers motors motion path_file reachability view board board/ports board/backend board/kinds board/sim"
     " export/js compiled",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them

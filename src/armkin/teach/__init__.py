@@ -9,6 +9,7 @@ program.py          moves recorded one after another, in the words of a path fil
 scene.py            what the page draws: links, bodies, limits
 meshes.py           what the bodies look like, from a URDF; mesh_files.py: triangles of STL and Collada files
 pose_answers.py     one pose or one target: branches, limits, pulses
+quick_ik.py         machine code for an arm whose answers take long
 board.py            the actions on the board; board_thread.py: the thread that owns the port
 one_file.py         the page without a server, in one HTML file; local/: what answers in the server's place
 reach_slice.py      where it reaches in the plane of its links, for the page
