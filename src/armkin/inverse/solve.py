@@ -214,11 +214,8 @@ def _rows(
     if examine and len(doubted):
         solve = geometry.rows
 
-        def candidates(some: NDArray[np.intp]) -> Seeds:
-            found = q[doubted[some]]
-            if guesses is not None:
-                found = np.concatenate([found, guesses[doubted[some]]], axis=1)
-            return Seeds.of(found, np.arange(found.shape[1]) % max(out.q.shape[1], 1))
+        found = q[doubted] if guesses is None else np.concatenate([q[doubted], guesses[doubted]], axis=1)
+        seeds = Seeds.of(found, np.arange(found.shape[1]) % max(B, 1))
 
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
             """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.
@@ -233,7 +230,7 @@ def _rows(
             return found, np.arange(found.shape[1]) % max(B, 1)
 
         unsettled = np.zeros(len(target), bool) if lost is None else lost
-        out = examined(goals, out, doubted, candidates, others, unsettled)
+        out = examined(goals, out, doubted, seeds, others, unsettled)
         order = projection(arm.prismatic, out.q[doubted]).argsort(axis=1)  # one order, whatever was found first
         for array in (out.q, out.valid, out.within, out.branch):
             some = array[doubted]

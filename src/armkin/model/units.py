@@ -126,11 +126,14 @@ def scale(arm: Arm) -> Array:
     return np.where(arm.prismatic, 1.0, DEGREE)
 
 
+@lru_cache(maxsize=256)
 def radian_or_reach(arm: Arm) -> Array:
-    """What motions of joints are compared in: a radian, of a sliding joint the arm's reach [mm]: (n,)."""
+    """What motions of joints are compared in: a radian, of a sliding joint the arm's reach [mm]: (n,), read-only."""
     import numpy as np
 
-    return np.where(arm.prismatic, arm.reach, 1.0)
+    unit = np.where(arm.prismatic, arm.reach, 1.0)
+    unit.flags.writeable = False
+    return unit
 
 
 def _label_scale(labels: Sequence[str]) -> list[float]:

@@ -9,7 +9,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position, tip_and_jacobian
 from armkin.inverse.numeric.linalg import damped_steps
-from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
+from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.model.units import radian_or_reach
 from armkin.motion.cubics import Knots
 from armkin.motion.joint_steps import chord_bound, levers
@@ -174,7 +174,7 @@ def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps
         q, wanted = out[open_], target[open_]
         T, J = tip_and_jacobian(arm, q)
         r = np.multiply(residual(task, T, q * arm.ratio, wanted).T, scale[:, None], order="C")
-        J = axis_projected(task, task_jacobian(task, J), T)
+        J = task_jacobian(task, J, T)
         step = damped_steps(np.multiply(J.transpose(2, 1, 0), each, order="C"), r, (damping / arm.reach) ** 2)
         size = np.abs(step).max(axis=0)
         step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)

@@ -39,15 +39,7 @@ class Batch(NamedTuple):
     complete: Bool
 
     def part(self, rows: slice) -> Batch:
-        return Batch(
-            self.q[rows],
-            self.valid[rows],
-            self.within[rows],
-            self.branch[rows],
-            self.status[rows],
-            self.free[rows],
-            self.complete[rows],
-        )
+        return Batch(*(array[rows] for array in self))
 
 
 def empty(N: int, B: int, n: int) -> Batch:

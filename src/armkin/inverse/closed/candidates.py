@@ -92,8 +92,9 @@ class Recorded:
     def with_values(self, target: Array, values: Array) -> Array:
         """Candidates of targets N for values (N, n) of the joints that are free, (N, B, n + 1): the last their squared
         residuals."""
-        goal, prefer = entries(self.task, target), preferred(self.arm, values)
-        flat = [*goal, *(x for pair in prefer for x in pair if x is not None)]
+        flat = entries(self.task, target)
+        for v, slides in zip(np.ascontiguousarray(values.T), self.arm.prismatic, strict=True):
+            flat += [v] if slides else [np.cos(v), np.sin(v)]
         found = list(self._preferring.run(flat, self._preferring.workspace(len(target))))
         return as_rows(found[: self.arm.n + 1], len(target))
 
@@ -209,12 +210,6 @@ def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 8, 1.0)
     _, miss, _ = recorded(arm, task, geometry).rows(fk(arm, q))
     return int((miss.min(axis=1) <= ACCEPTED**2).sum()) >= 15
-
-
-def preferred(arm: Arm, near: Array) -> list[Pair]:
-    """What a free joint is given: near (N, n), or (n,) for all."""
-    values = list(np.ascontiguousarray(near.T))
-    return [Pair(v, None) if p else Pair(np.cos(v), np.sin(v)) for v, p in zip(values, arm.prismatic, strict=True)]
 
 
 def as_rows(values: Sequence[ArrayLike], count: int) -> Array:

@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array, wrapped
 from armkin.forward import fk, tip_and_jacobian
 from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import CONVERGING, LEFT_OUT, ROUNDING, TINY, WEAK
-from armkin.inverse.tasks.residuals import axis_projected, residual, task_jacobian
+from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -26,7 +26,7 @@ def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     """
     T, slopes = tip_and_jacobian(arm, q)
     r = residual(task, T, q, target)
-    J = axis_projected(task, task_jacobian(task, slopes), T)
+    J = task_jacobian(task, slopes, T)
     r[:, : task.position] /= arm.reach
     J = J * radian_or_reach(arm)
     J[:, : task.position] /= arm.reach

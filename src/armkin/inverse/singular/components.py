@@ -84,7 +84,7 @@ class Seeds(NamedTuple):
     """Candidate branches of K targets.
 
     q: (K, B, n), nan where there is none. loose: (K, B) those that depend on a value preferred for a free joint.
-    label: (B,) or (K, B) of the solver's own numbering. sure: (K, B, n) joints that move along those that are known to
+    label: (K, B) of the solver's own numbering. sure: (K, B, n) joints that move along those that are known to
     lie on a self-motion, one posture of each.
     """
 
@@ -96,11 +96,8 @@ class Seeds(NamedTuple):
     @classmethod
     def of(cls, q: Array, label: Int, loose: Bool | None = None) -> Seeds:
         """Candidates of which no self-motion is known; by default none is loose."""
-        return cls(q, np.zeros(q.shape[:2], bool) if loose is None else loose, label, np.zeros(q.shape, bool))
-
-    def part(self, rows: Int) -> Seeds:
-        """Those of some targets, of labels (K, B)."""
-        return Seeds(self.q[rows], self.loose[rows], self.label[rows], self.sure[rows])
+        label, loose = np.broadcast_to(label, q.shape[:2]), np.zeros(q.shape[:2], bool) if loose is None else loose
+        return cls(q, loose, label, np.zeros(q.shape, bool))
 
 
 def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None) -> Examined:
@@ -153,13 +150,14 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
     """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
     arm, task, target, _ = goals
     at, missed, beyond = _onto(goals, seeds, most)
+    rests: Bool = np.zeros(at.size.shape, bool)
     lost = lost_directions(arm, task, at.q, (at.size <= SOLUTION) & ~at.sure.any(axis=2), target)
     if (lost.nullity[:, 1:] > 1).any():
-        more = meetings.ways_out(goals, at.q, at.label, at.size, lost.V, lost.nullity, OWN)
-        wider = more[0].shape[1] - at.q.shape[1]
-        at = _Candidates(*more, np.pad(at.sure, ((0, 0), (0, wider), (0, 0))))
-        lost = lost_directions(arm, task, at.q, (at.size <= SOLUTION) & ~at.sure.any(axis=2), target)
-    groups = _Groups(goals, at, lost)
+        *more, rests = meetings.ways_out(goals, at.q, at.label, at.size, lost.V, lost.nullity, OWN)
+        if wider := rests.shape[1] - at.q.shape[1]:
+            at = _Candidates(*more, np.pad(at.sure, ((0, 0), (0, wider), (0, 0))))
+            lost = lost_directions(arm, task, at.q, (at.size <= SOLUTION) & ~at.sure.any(axis=2), target)
+    groups = _Groups(goals, at, lost, rests)
     groups.find()
     return groups.settled(missed, beyond)
 
@@ -179,8 +177,9 @@ class _Candidates(NamedTuple):
 class _Groups:
     """Which candidates are one, and what: a candidate of each target at a time leads those that are one with it."""
 
-    def __init__(self, goals: Goals, at: _Candidates, lost: Lost) -> None:
-        self.goals, self.at, self.lost = goals, at, lost
+    def __init__(self, goals: Goals, at: _Candidates, lost: Lost, rests: Bool) -> None:
+        """rests: (K, M) those that no push takes along a self-motion."""
+        self.goals, self.at, self.lost, self.rests = goals, at, lost, rests
         K, M, n = at.q.shape
         self.valid: Bool = np.asarray(at.size <= SOLUTION)
         on: Bool = np.asarray(at.sure.any(axis=2))
@@ -266,7 +265,7 @@ class _Groups:
             self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
             ways = newton.difference(arm, q[i], q[i, c][:, None])
             self.component = np.concatenate([self.component, members(at, np.arange(len(i)), ways)])
-        rest = ~self.known[k, b] & (self.lost.sigma[k, b] < MOVING)
+        rest = ~self.known[k, b] & ~self.rests[k, b] & (self.lost.sigma[k, b] < MOVING)
         if rest.any():
             k, b = k[rest], b[rest]
             lost = np.maximum(nullity[k, b], 1)
@@ -369,7 +368,7 @@ def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool, B
     there = ~np.isnan(seeds.q).any(axis=2)
     order = np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]
     q = np.concatenate([near[:, None], np.take_along_axis(seeds.q, order[:, :, None], axis=1)], axis=1)
-    label = np.take_along_axis(np.broadcast_to(seeds.label, there.shape), order, axis=1)
+    label = np.take_along_axis(seeds.label, order, axis=1)
     label = np.insert(label, 0, OWN, axis=1)
     sure = np.pad(np.take_along_axis(seeds.sure, order[:, :, None], axis=1), ((0, 0), (1, 0), (0, 0)))
     loose = np.take_along_axis(seeds.loose, order, axis=1)

@@ -31,13 +31,12 @@ class Linkages(NamedTuple):
     """What is known of K targets.
 
     known: (K,) whether all self-motions of loose candidates are; lacking: (K,) more candidates may tell. q: (K, M, n)
-    postures, of which listed (K, M) stand for a self-motion each, named label (M,), that moves joints (K, M, n).
+    a posture of each self-motion, else nan; label: (M,) their columns; joints: (K, M, n) those that they move.
     """
 
     known: Bool
     lacking: Bool
     q: Array
-    listed: Bool
     label: Int
     joints: Bool
 
@@ -56,29 +55,20 @@ class _Motions(NamedTuple):
 
 
 def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
-    """Candidates q (K, S, B, n) for S values of the joints that are free; loose: (K, B) those that these change.
+    """Candidates q (K, S, B, n) of full poses for S values of the joints that are free; loose: (K, B) those that these
+    change.
 
     The first value is that of `near`, the second 1 rad more.
     """
     arm, task, target, near = goals
     K, S, B, n = q.shape
-    found = Linkages(
-        known=np.zeros(K, bool),
-        lacking=np.zeros(K, bool),
-        q=q.reshape(K, S * B, n).copy(),
-        listed=np.zeros((K, S * B), bool),
-        label=np.tile(np.arange(B), S),
-        joints=np.zeros((K, S * B, n), bool),
-    )
-    if not (task.constraints == n and task.orientation == "full"):
-        return found
     asked = ~np.isnan(q[..., 0]) & loose[:, None]
     size = np.full(asked.shape, np.inf)
     size[asked] = newton.missing(arm, task, q[asked], np.repeat(target, asked.sum(axis=(1, 2)), axis=0))
     there, own = size < CLOSED, newton.missing(arm, task, near, target)
     known, motions = _motions(goals, q, there, loose)
-    found.lacking[...] = (loose & (there.sum(axis=1) < 2)).any(axis=1)
-    known &= ~found.lacking & ~((own > CLOSED) & (own <= SOLUTION))
+    lacking = np.asarray((loose & (there.sum(axis=1) < 2)).any(axis=1))
+    known &= ~lacking & ~((own > CLOSED) & (own <= SOLUTION))
     one, apart = _columns(arm, motions, loose)
     known &= apart
     circuit = np.zeros((K, S, B), bool)
@@ -87,17 +77,25 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
         circuit[k, s, b] = four_bars.sides(arm, q[k, s, b], motions.d[k, b] != 0.0, motions.joint[k, b])
     there[:, 1:] &= ~motions.line[:, None]  # of a line the posture at the first value is the nearest
     key = np.where(there, 2 * one[:, None] + circuit, 2 * B).reshape(K, -1)
-    lacks = _one_circuit(key, motions.joint, B)
-    found.lacking[...] |= known & lacks
-    known &= ~lacks
+    # a self-motion of two circuits may have candidates on one of them alone
+    seen = (key[:, :, None] == np.arange(2 * B)).any(axis=1).reshape(-1, B, 2)
+    half = known & ((motions.joint >= 0) & (seen.sum(axis=2) == 1)).any(axis=1)
+    known &= ~half
+    # of each circuit the posture with the least motion is listed
+    q = q.reshape(K, S * B, n).copy()
     with np.errstate(invalid="ignore"):
-        motion = np.abs(newton.difference(arm, found.q, near[:, None])).sum(axis=2)
-    listed = _nearest(key, motion) & (key < 2 * B)
-    known &= _replaced(goals, found.q, listed, key, motions, one, loose, known & (own <= CLOSED))
-    known &= _one_direction(goals, found.q, listed & known[:, None], key)
-    found.known[...], found.listed[...] = known, listed & known[:, None]
-    found.joints[...] = found.listed[:, :, None] & np.tile(motions.d != 0.0, (1, S, 1))
-    return found
+        motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
+    order = np.lexsort((motion, key))
+    first, listed = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1) != 0, np.zeros(key.shape, bool)
+    np.put_along_axis(listed, order, first, axis=1)
+    listed &= key < 2 * B
+    if (stands := known & (own <= CLOSED)).any():
+        known &= _replaced(goals, q, listed, key, motions, one, loose, stands)
+    known &= _one_direction(goals, q, listed & known[:, None], key)
+    listed &= known[:, None]
+    q[~listed] = np.nan
+    joints = listed[:, :, None] & np.tile(motions.d != 0.0, (1, S, 1))
+    return Linkages(known, lacking | half, q, np.tile(np.arange(B), S), joints)
 
 
 def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _Motions]:
@@ -150,22 +148,6 @@ def _columns(arm: Arm, at: _Motions, loose: Bool) -> tuple[Int, Bool]:
     same = pair & alike & (held < TURNED)
     apart = ~(pair & ~same & ~(held > APART_ROOTS)).any(axis=(1, 2))
     return np.where(same, np.arange(B), B).min(axis=2, initial=B).clip(max=np.arange(B)), np.asarray(apart)
-
-
-def _one_circuit(key: Int, joint: Int, B: int) -> Bool:
-    """Of which targets (K,) a self-motion of two circuits has candidates on one of them alone."""
-    seen = (key[:, :, None] == np.arange(2 * B)).any(axis=1).reshape(-1, B, 2)
-    return np.asarray(((joint >= 0) & (seen.sum(axis=2) == 1)).any(axis=1))
-
-
-def _nearest(key: Int, motion: Array) -> Bool:
-    """Of candidates (K, M) the one of each key with the least motion."""
-    order = np.argsort(motion, axis=1, kind="stable")
-    order = np.take_along_axis(order, np.argsort(np.take_along_axis(key, order, 1), axis=1, kind="stable"), 1)
-    first, out = np.ones(key.shape, bool), np.zeros(key.shape, bool)
-    first[:, 1:] = np.diff(np.take_along_axis(key, order, axis=1), axis=1) != 0
-    np.put_along_axis(out, order, first, axis=1)
-    return out
 
 
 def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:

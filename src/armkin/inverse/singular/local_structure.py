@@ -106,8 +106,9 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
         some = left[on]
         out.x[:, some], out.g[:, some] = x[:, on], g[:, on]
         _decide(out, some)
-        # where two directions are all but lost no shorter curve stays at hand
-        left = left[~out.known[left] & (out.second[left] > HIGH)]
+        # a component that leaves a span leaves shorter ones, too; and where two directions are all but lost no shorter
+        # curve stays at hand
+        left = left[~out.known[left] & ~on & (out.second[left] > HIGH)]
         if not len(left):
             break
         out.span[left] /= SHRINK

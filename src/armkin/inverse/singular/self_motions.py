@@ -165,14 +165,14 @@ def follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
 
 
-def _stays(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Int, Array]:
-    """Which postures (M, n), a step (M,) away along push (M, n) and pulled back, are still away; and their growth."""
+def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Array, Array, Array]:
+    """Postures (M, n), a step (M,) away along push (M, n), pulled back: they, what they miss, and how much more than
+    q that is a step's length; infinite for those that fell back.
+    """
     unit = radian_or_reach(arm)
     there, size = follow(arm, task, q + step[:, None] * push * unit, target)
-    size -= newton.missing(arm, task, q, target)
     far = (np.abs(there - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
-    some = np.flatnonzero(far & (size <= GROWTH * step))
-    return some, size[some]
+    return there, size, np.where(far, size - newton.missing(arm, task, q, target), np.inf) / step
 
 
 def _slow(grown: Array) -> Bool:
@@ -205,13 +205,15 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     # Most candidates fall back at once. Where several directions are lost, a short step is drawn back to the meeting.
     several = nullity[who] > 1
     first = np.where(several, 10 * STEP, STEP)
-    some, grown = _stays(arm, task, q[who], first, push, target[who])
+    _, _, grown = pushed(arm, task, q[who], first, push, target[who])
+    some = np.flatnonzero(grown <= GROWTH)
     # of those that lose one direction most do not stay on a longer way
-    one = np.flatnonzero(~several[some] & (grown > CLOSED))
-    if len(one):
+    one = ~several[some] & (grown[some] * first[some] > CLOSED)
+    if one.any():
         at = some[one]
-        on, _ = _stays(arm, task, q[who[at]], 10 * first[at], push[at], target[who[at]])
-        some = np.delete(some, np.delete(one, on))
+        _, _, grown = pushed(arm, task, q[who[at]], 10 * first[at], push[at], target[who[at]])
+        one[one] = ~(grown <= GROWTH)
+        some = some[~one]
     if not len(some):
         return moving, joints
     who, push, several = who[some], push[some], several[some]

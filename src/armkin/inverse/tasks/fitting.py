@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import RedundantArmError, UsageError
 from armkin.formula.arrays import Array
-from armkin.inverse.tasks.residuals import axis_projected, task_jacobian
+from armkin.inverse.tasks.residuals import task_jacobian
 from armkin.inverse.tasks.task import LABELS, Task
 from armkin.model.chain import Chain, axes
 from armkin.model.units import radian_or_reach
@@ -74,7 +74,7 @@ def rank(arm: Arm, task: Task, tolerance: float = INDEPENDENT) -> int:
     from armkin.forward import fk, jacobian
 
     q = np.random.default_rng(1).uniform(-2.0, 2.0, (4, arm.n)) * np.where(arm.prismatic, arm.reach / 4, 1.0)
-    Jt = axis_projected(task, task_jacobian(task, jacobian(arm, q)), fk(arm, q))
+    Jt = task_jacobian(task, jacobian(arm, q), fk(arm, q))
     Jt[:, : task.position] /= arm.reach
     Jt = Jt * radian_or_reach(arm)
     return int(max(np.linalg.matrix_rank(Jt, tol=tolerance)))

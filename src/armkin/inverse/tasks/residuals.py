@@ -17,56 +17,51 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
 
     T: (M, 4, 4) the tool's poses; q: (M, n); target: (M, m) or (M, 4, 4).
     """
-    parts = []
     if task.orientation == "full":
-        parts.append(target[:, :3, 3] - T[:, :3, 3])
-        R, Rt = T[:, :3, :3], target[:, :3, :3]
+        out = np.empty((len(T), 6))
+        out[:, :3] = target[:, :3, 3] - T[:, :3, 3]
         # half the sum of the columns' vector products is the rotation vector to third order
-        C = np.ascontiguousarray(R) @ np.ascontiguousarray(
-            np.swapaxes(Rt, 1, 2)
+        C = np.ascontiguousarray(T[:, :3, :3]) @ np.ascontiguousarray(
+            np.swapaxes(target[:, :3, :3], 1, 2)
         )  # of views it takes three times as long
-        w = 0.5 * np.stack([C[:, 1, 2] - C[:, 2, 1], C[:, 2, 0] - C[:, 0, 2], C[:, 0, 1] - C[:, 1, 0]], axis=1)
+        for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+            out[:, 3 + k] = 0.5 * (C[:, i, j] - C[:, j, i])
         far = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - SMALL_TURN
         if far.any():
-            w[far] = _rotation_vector(np.swapaxes(C[far], 1, 2))
+            out[far, 3:] = _rotation_vector(np.swapaxes(C[far], 1, 2))
+        return out
+    parts = [target[:, : task.position] - T[:, : task.position, 3]]
+    if len(task.sums):
+        wanted = target[:, task.position : task.position + len(task.sums)]
+        angle = wanted - q @ task.sums.T - task.offsets
+        parts.append(wrapped(angle))
+    if task.orientation == "axis":
+        z = T[:, :3, 2]
+        w = np.cross(z, target[:, 3:])
+        sine = np.linalg.norm(w, axis=1)
+        cosine = np.einsum("mi,mi->m", z, target[:, 3:])
+        angle = np.arctan2(sine, cosine)
+        w = np.where(sine[:, None] > NO_DIRECTION, w * (angle / np.maximum(sine, TINY))[:, None], w)
+        half = (sine <= NO_DIRECTION) & (cosine < 0)  # opposed: any axis across will do
+        w[half] = np.pi * T[half][:, :3, 0]
         parts.append(w)
-    else:
-        parts.append(target[:, : task.position] - T[:, : task.position, 3])
-        if len(task.sums):
-            wanted = target[:, task.position : task.position + len(task.sums)]
-            angle = wanted - q @ task.sums.T - task.offsets
-            parts.append(wrapped(angle))
-        if task.orientation == "axis":
-            z = T[:, :3, 2]
-            w = np.cross(z, target[:, 3:])
-            sine = np.linalg.norm(w, axis=1)
-            cosine = np.einsum("mi,mi->m", z, target[:, 3:])
-            angle = np.arctan2(sine, cosine)
-            w = np.where(sine[:, None] > NO_DIRECTION, w * (angle / np.maximum(sine, TINY))[:, None], w)
-            half = (sine <= NO_DIRECTION) & (cosine < 0)  # opposed: any axis across will do
-            w[half] = np.pi * T[half][:, :3, 0]
-            parts.append(w)
     return np.concatenate(parts, axis=1)
 
 
-def task_jacobian(task: Task, J: Array) -> Array:
-    """Rows of the task: (M, 6, n) geometric Jacobians -> (M, rows, n), in the order of `residual`."""
-    parts = [J[:, : task.position, :]]
+def task_jacobian(task: Task, J: Array, T: Array) -> Array:
+    """Rows of the task: (M, 6, n) geometric Jacobians at poses T (M, 4, 4) -> (M, rows, n), in the order of `residual`.
+
+    Of a task that prescribes an axis without the turn about the tool's z axis.
+    """
+    if task.orientation == "full":
+        return J
+    parts = [J[:, : task.position]]
     if len(task.sums):
         parts.append(np.broadcast_to(task.sums, (len(J), *task.sums.shape)))
-    if task.orientation != "none":
-        parts.append(J[:, 3:, :])
+    if task.orientation == "axis":
+        z = T[:, :3, 2]
+        parts.append(J[:, 3:] - z[:, :, None] * np.einsum("mi,min->mn", z, J[:, 3:])[:, None])
     return np.concatenate(parts, axis=1)
-
-
-def axis_projected(task: Task, Jt: Array, T: Array) -> Array:
-    """For tasks that prescribe an axis: take the turn about the tool's z axis out of the angular rows."""
-    if task.orientation != "axis":
-        return Jt
-    z = T[:, :3, 2]
-    out = Jt.copy()
-    out[:, -3:, :] -= z[:, :, None] * np.einsum("mi,min->mn", z, Jt[:, -3:, :])[:, None, :]
-    return out
 
 
 def _rotation_vector(R: Array) -> Array:
