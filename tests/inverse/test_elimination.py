@@ -21,7 +21,7 @@ from general_arms import (
 import armkin
 from armkin.inverse.elimination import method
 from armkin.inverse.elimination.polish import refine, shrink
-from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.newton import nudged
 
 
 def jacobian(arm: Arm, q: Array) -> Array:

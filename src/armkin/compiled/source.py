@@ -11,7 +11,7 @@ from armkin.export.c import elimination, formulas, keep_outs, kernel, program
 from armkin.export.c.text import part
 from armkin.formula.c_and_js_code import number
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, THERE
-from armkin.inverse.singular.near_itself import room
+from armkin.inverse.singular.near_itself import ROOM
 from armkin.inverse.tasks.task import LARGEST
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
@@ -86,7 +86,7 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
         "target": str(program.target_size(task)),
         "goal": str(formulas.goal_size(task)),
         "accepted": number(accepted),
-        "room": number(room(arm)),
+        "room": number(ROOM * arm.reach),
         "close": ", ".join(number(THERE * unit) for unit in radian_or_reach(arm).tolist()),
         "slides": ", ".join(str(int(slides)) for slides in arm.prismatic.tolist()),
         "lowest": ", ".join(number(v - SLACK) for v in arm.lower.tolist()),

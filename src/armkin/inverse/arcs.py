@@ -15,7 +15,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.followed import Follower, over_a_turn
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import CONVERGING, SAME_SEED, SHORTEST_ARC
 from armkin.inverse.pieces import Int
 from armkin.model.units import radian_or_reach

@@ -126,7 +126,8 @@ def _answered(
         goals = Goals(arm, definition, target, each)
         if not out.within.any(axis=1).all():
             out = legal_postures.with_legal_postures(goals, out)
-        out = near_itself.stand(goals, out, most)
+        if most.max(initial=0.0) > near_itself.ROUNDED:
+            out = near_itself.stand(goals, out, most)
         if arm.keep_out:
             out = free_postures.with_free_postures(goals, out)
     if arm.prismatic.any():
@@ -240,9 +241,9 @@ def _rows(
 
 def _solved(solve: Callable[[Array], Rows], target: Array, workers: int) -> Rows:
     """What threads find, together: columns that only some need are nan in the others."""
+    if workers == 1:
+        return solve(target)
     parts = shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
-    if len(parts) == 1:
-        return parts[0]
     columns = list(zip(*parts, strict=True))
     q, doubt, complete, lost, guesses = (
         None if column[0] is None else _stacked([np.asarray(part) for part in column]) for column in columns

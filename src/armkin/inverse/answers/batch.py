@@ -39,7 +39,8 @@ class Batch(NamedTuple):
     complete: Bool
 
     def part(self, rows: slice) -> Batch:
-        return Batch(*(array[rows] for array in self))
+        arrays: tuple[NDArray[Any], ...] = self
+        return Batch(*(array[rows] for array in arrays))
 
 
 def empty(N: int, B: int, n: int) -> Batch:
@@ -57,14 +58,18 @@ def empty(N: int, B: int, n: int) -> Batch:
 def write(
     arm: Arm, out: Batch, rows: NDArray[np.intp], q: Array, valid: Bool, label: NDArray[np.int64], near: Array
 ) -> None:
-    """Write branches (K, W, n) of some targets at their nearest legal copies, nan behind."""
-    width = q.shape[1]
+    """Write branches (K, W, n) of some targets, with labels (K, W) as `named`, at their nearest legal copies, nan
+    behind."""
+    width, label = q.shape[1], np.where(valid, label, -1)
+    ordered = np.sort(label, axis=1)
+    if ((label < 0) & valid).any() or ((np.diff(ordered) == 0) & (ordered[:, 1:] >= 0)).any():
+        label = named(label, valid)
     copies, inside = nearest_row(arm, np.nan_to_num(q), near[:, None, :])
     out.q[rows], out.valid[rows], out.within[rows], out.branch[rows] = np.nan, False, False, -1
     out.q[rows, :width] = np.where(valid[:, :, None], copies, np.nan)
     out.valid[rows, :width] = valid
     out.within[rows, :width] = inside & valid
-    out.branch[rows, :width] = np.where(valid, label, -1)
+    out.branch[rows, :width] = label
 
 
 def named(label: NDArray[np.int64], valid: Bool) -> NDArray[np.int64]:

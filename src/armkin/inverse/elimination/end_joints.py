@@ -15,7 +15,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import line_features
 from armkin.inverse.elimination.joint_order import Role
-from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import RANK, TINY
 from armkin.model.rotation import inverse
 

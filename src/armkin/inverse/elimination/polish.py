@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import CONVERGED, ELIMINATED, SLOWLY, STALE
 
 LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for

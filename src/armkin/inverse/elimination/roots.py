@@ -13,7 +13,7 @@ from armkin.inverse.elimination import equal_roots, line_features
 from armkin.inverse.elimination.end_joints import eliminate
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import advance, turn
-from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import (
     APART_VECTORS,
     EQUAL_ROOTS,

@@ -3,5 +3,4 @@
 tolerances.py  every tolerance
 newton.py      corrections of joint values for any arm and task
 many_starts.py a search, for targets that no method settled
-linalg.py      linear algebra that outlives one singular member of a stack
 """

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, wrapped
+from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.forward import fk, tip_and_jacobian
-from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import CONVERGING, LEFT_OUT, ROUNDING, TINY, WEAK
+from armkin.inverse.numeric.tolerances import CONVERGING, FOLDED, LEFT_OUT, NOISE, ROUNDING, TINY, WEAK
 from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -41,12 +41,8 @@ def residuals(arm: Arm, task: Task, q: Array, target: Array) -> Array:
 
 
 def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
-    """Size of the residual (M,), lengths in units of the arm's reach."""
-    return _sizes(residuals(arm, task, q, target))
-
-
-def _sizes(r: Array) -> Array:
-    """Norms (M,) of residuals (M, r); infinite where they are not known."""
+    """Size of the residual (M,), lengths in units of the arm's reach; infinite where it is not known."""
+    r = residuals(arm, task, q, target)
     size: Array = np.sqrt((r * r).sum(axis=1))
     return np.where(np.isnan(size), np.inf, size)
 
@@ -77,7 +73,8 @@ def correct(
             r, J = scaled(arm, task, q[active], target[active])
         else:
             r = residuals(arm, task, q[active], target[active])
-        size = _sizes(r)
+        size = np.sqrt((r * r).sum(axis=1))
+        size[np.isnan(size)] = np.inf
         before = best_size[active]
         better = size < before
         best[active[better]], best_size[active[better]] = q[active[better]], size[better]
@@ -140,3 +137,56 @@ def null_space_of(arm: Arm, task: Task, J: Array) -> tuple[Array, Array, NDArray
     count = min(task.constraints, arm.n)
     nullity = arm.n - (full > WEAK).sum(axis=1)
     return full[:, count - 1], Vt, nullity - (arm.n - count)
+
+
+class Lost(NamedTuple):
+    """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many
+    directions they lose (K, M) and right singular vectors (K, M, n, n)."""
+
+    sigma: Array
+    nullity: NDArray[np.int64]
+    V: Array
+
+
+def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) -> Lost:
+    """What the candidates q (K, M, n) lose that are asked (K, M), which solve their targets; others nothing."""
+    K, M, n = q.shape
+    out = Lost(np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n)))
+    k, b = np.nonzero(asked)
+    if not len(k):
+        return out
+    _, J = scaled(arm, task, q[k, b], target[k])
+    if J.shape[1] == n == task.constraints:
+        # the Frobenius norm of the inverse is no smaller than its largest singular value
+        inverse = nudged(np.linalg.inv, J)
+        out.sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
+        weak = bound < FOLDED
+        k, b, J = k[weak], b[weak], J[weak]
+    if len(k):
+        out.sigma[k, b], out.V[k, b], out.nullity[k, b] = null_space_of(arm, task, J)
+    return out
+
+
+def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Array:
+    """``function(matrix, *arguments)``, with noise of rounding size added to members that are singular.
+
+    Numpy raises for a whole stack of matrices if one of them has a zero pivot. The others are left as they are: what
+    becomes of a member does not depend on its neighbours.
+
+    Args:
+        function: `np.linalg.inv`, `np.linalg.solve` and the like.
+        matrix: (M, k, k).
+    """
+    try:
+        return np.asarray(function(matrix, *arguments))
+    except np.linalg.LinAlgError:
+        noise, nudge = np.random.default_rng(0), matrix.copy()
+        size = NOISE * (1 + np.abs(matrix).max(axis=(1, 2), keepdims=True))
+        for _ in range(8):  # the noise may itself cancel what is left of a pivot
+            singular = np.linalg.slogdet(nudge).sign == 0
+            nudge[singular] = (matrix + size * noise.standard_normal(matrix.shape[1:]))[singular]
+            try:
+                return np.asarray(function(nudge, *arguments))
+            except np.linalg.LinAlgError:
+                size *= 3
+        raise

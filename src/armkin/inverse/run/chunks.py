@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula import arrays
-from armkin.formula.arrays import Array, Bool, Entry, Truth
+from armkin.formula.arrays import Array, Bool, Truth
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
-from armkin.inverse.closed.candidates import Recorded, entries, recorded
+from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
 from armkin.inverse.run.edges import decided
@@ -70,7 +70,12 @@ def solve(
             if task.orientation == "full":
                 goal, rounding[some], columns = read_poses(goal)
             target[some] = goal
-            found, workspace = _candidates(runner, goal, columns, workspace)
+            if len(goal) == 1:
+                found = runner.in_numbers(goal)
+            else:
+                if not workspace or workspace[-1].shape[-1] != len(goal):
+                    workspace = runner.code.workspace(len(goal))
+                found = list(runner.code.run(entries(task, goal) if columns is None else columns, workspace))
             there = None
             if examine:
                 first = goal[:, 0] if columns is None else cast("Array", columns[9])
@@ -79,7 +84,7 @@ def solve(
             left.append(start + _keep(goals, runner.axes, out.part(some), found, close, there))
         return left
 
-    parts = shared(part, N, workers, arrays.CHUNK, arrays.CHUNK)
+    parts = [part(slice(0, N))] if workers == 1 else shared(part, N, workers, arrays.CHUNK, arrays.CHUNK)
     edge = np.concatenate([np.empty(0, np.intp), *(rows for one_part in parts for rows in one_part)])
     out.complete[...] = geometry.complete
     if geometry.doubts is None:
@@ -87,21 +92,6 @@ def solve(
             out = decided(Goals(arm, task, target, near), runner, out, edge)
         edge = edge[:0]
     return Solved(out, math.prod(runner.axes), target, rounding, edge)
-
-
-def _candidates(
-    runner: Recorded,
-    goal: Array,
-    columns: list[Entry] | None,
-    workspace: list[NDArray[Any]],
-) -> tuple[list[Array], list[NDArray[Any]]]:
-    """A chunk's candidates as `Recorded.candidates` returns them, and the buffers that they stand in."""
-    N, code = len(goal), runner.code
-    if N == 1:
-        return runner.in_numbers(goal), workspace
-    if not workspace or workspace[-1].shape[-1] != N:
-        workspace = code.workspace(N)
-    return list(code.run(entries(runner.task, goal) if columns is None else columns, workspace)), workspace
 
 
 def _keep(
@@ -125,7 +115,16 @@ def _keep(
     valid = miss <= ACCEPTED**2
     _fill(arm, part, values, valid.reshape(shape), near)
     full = bool(valid.all())
-    doubted = _doubted(miss, valid, doubt, full)
+    # on an edge are those in doubt, and those with a branch that is nearly there
+    if np.shape(doubt)[-1:] != (N,):
+        doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
+    doubted = np.flatnonzero(doubt) % N
+    if not full:
+        clear = miss > NEARBY**2
+        if np.count_nonzero(clear) + np.count_nonzero(valid) < miss.size:  # nearly there, or not a number
+            doubted = np.concatenate([doubted, np.flatnonzero(~(valid | clear)) % N])
+    if len(doubted):
+        doubted = np.unique(doubted)
     if there is not None and len(there):
         doubted = np.union1d(doubted, near_itself.take(goals, part, there))
     if not full:
@@ -140,8 +139,13 @@ def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array)
     *axes, N = valid.shape
     grid = part.q.reshape(N, *axes, arm.n).transpose(1, 2, 3, 0, 4)  # the branch axes in front of the poses
     within, legal = valid, []
-    for i in range(arm.n):
-        value, inside = _legal(arm, i, values[i], close)
+    for i, value in enumerate(values):
+        lower, upper = float(arm.lower[i]), float(arm.upper[i])
+        inside: Truth = True
+        if not arm.prismatic[i]:
+            value, inside = nearest_copy(value, float(close[i]) if close.ndim == 1 else close[:, i], lower, upper)
+        elif lower > -np.inf or upper < np.inf:
+            inside = (value >= lower - SLACK) & (value <= upper + SLACK)
         legal.append(value)
         if inside is not True:
             within = within & inside
@@ -157,30 +161,3 @@ def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array)
 def _every_branch(B: int, N: int) -> NDArray[np.int8]:
     """The indices of all branches of N targets, (N, B): kept, as copying them is quicker than repeating a row."""
     return np.tile(np.arange(B, dtype=np.int8), (N, 1))
-
-
-def _doubted(miss: Array, valid: Bool, doubt: Truth, full: bool) -> NDArray[np.intp]:
-    """Which targets are on an edge: those in doubt, and those with a branch that is nearly there.
-
-    miss, valid: (B, N); full: valid everywhere.
-    """
-    N = miss.shape[1]
-    if np.shape(doubt)[-1:] != (N,):
-        doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
-    edge = np.flatnonzero(doubt) % N
-    if not full:
-        clear = miss > NEARBY**2
-        if np.count_nonzero(clear) + np.count_nonzero(valid) < miss.size:  # nearly there, or not a number
-            edge = np.concatenate([edge, np.flatnonzero(~(valid | clear)) % N])
-    return np.unique(edge) if len(edge) else edge
-
-
-def _legal(arm: Arm, joint: int, value: Array, near: Array) -> tuple[Array, Truth]:
-    """A joint's values at their nearest legal copies, and whether they are within limits."""
-    lower, upper = float(arm.lower[joint]), float(arm.upper[joint])
-    if not arm.prismatic[joint]:
-        close = float(near[joint]) if near.ndim == 1 else near[:, joint]
-        return nearest_copy(value, close, lower, upper)
-    if lower == -np.inf and upper == np.inf:
-        return value, True
-    return value, (value >= lower - SLACK) & (value <= upper + SLACK)

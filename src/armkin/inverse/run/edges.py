@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.answers.batch import Batch, Goals, named, wider, write
+from armkin.inverse.answers.batch import Batch, Goals, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
 from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, SAME
 from armkin.inverse.singular import components, linkages
@@ -51,11 +51,13 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) 
         whole = rows[part]
         doubts.first[part], other, _ = _at_two(runner, target[whole], near[whole], near[whole] + 1.0)
         doubts.other[part] = np.where(doubts.loose[part][:, :, None], other, np.nan)
-    rows, tight, first, other, loose, _, at_ends, _ = (array[~done] for array in doubts)
+    arrays: tuple[NDArray[Any], ...] = doubts
+    rows, tight, first, other, loose, _, at_ends, _ = (array[~done] for array in arrays)
     # with the preferred values for joints that are free, and those that other values would change
     more, unsettled = [first, other], None
     if runner.geometry.ends:
-        more.append(np.where(loose.any(axis=1)[:, None, None], tight, np.nan))  # it may be that it is not quite free
+        hangs: Bool = np.asarray(loose.any(axis=1))
+        more.append(np.where(hangs[:, None, None], tight, np.nan))  # it may be that the joint is not quite free
         unsettled = np.zeros(len(target), bool)
         unsettled[rows[at_ends]], out.complete[rows[at_ends]] = True, False
     if not loose.any():
@@ -160,12 +162,13 @@ def examined(
         def more(which: NDArray[np.int64], lost: Bool, some: Goals = some, incomplete: Bool = incomplete) -> Any:
             return others(some.target[which], some.near[which], lost | incomplete[which])
 
-        part = Seeds(*(array[start : start + AT_ONCE] for array in seeds))
+        arrays: tuple[NDArray[Any], ...] = seeds
+        part = Seeds(*(array[start : start + AT_ONCE] for array in arrays))
         seen = components.examine(some, part, more, None if unsettled is None else unsettled[rows])
         width = seen.q.shape[1]
         if width > out.q.shape[1]:
             out = wider(out, width)
-        write(goals.arm, out, rows, seen.q, seen.valid, named(seen.label, seen.valid), some.near)
+        write(goals.arm, out, rows, seen.q, seen.valid, seen.label, some.near)
         out.status[rows], out.free[rows] = seen.status, seen.free
         out.complete[rows] &= ~seen.again
     return out

@@ -22,7 +22,7 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.whole_turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, NO_SIZE, THERE
-from armkin.inverse.singular.near_itself import room
+from armkin.inverse.singular.near_itself import ROOM
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
 from armkin.model.arm import actual
@@ -63,7 +63,7 @@ class OneTarget:
         runner = recorded(arm, definition, geometry)
         self._run, self._off = runner.code.numbers(), rotation_check().numbers()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
-        self._point, self._home, self._room = point_numbers(arm), arm.home, room(arm)
+        self._point, self._home, self._room = point_numbers(arm), arm.home, ROOM * arm.reach
         self._home_tip = self._point(*arm.home.tolist())
         self._close = [THERE * unit for unit in radian_or_reach(arm).tolist()]
         own, axes = runner.code.axes(), runner.axes

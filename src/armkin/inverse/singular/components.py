@@ -34,7 +34,7 @@ from armkin.inverse.numeric.tolerances import (
     TURNED,
 )
 from armkin.inverse.singular import circuits, meetings, roots, self_motions
-from armkin.inverse.singular.local_structure import Lost, beyond_folds, local_structure, lost_directions, members
+from armkin.inverse.singular.local_structure import beyond_folds, local_structure, members
 
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 FEW = 24  # candidates of a target that are compared all with all
@@ -146,22 +146,6 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     return out
 
 
-def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
-    """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
-    arm, task, target, _ = goals
-    at, missed, beyond = _onto(goals, seeds, most)
-    rests: Bool = np.zeros(at.size.shape, bool)
-    lost = lost_directions(arm, task, at.q, (at.size <= SOLUTION) & ~at.sure.any(axis=2), target)
-    if (lost.nullity[:, 1:] > 1).any():
-        *more, rests = meetings.ways_out(goals, at.q, at.label, at.size, lost.V, lost.nullity, OWN)
-        if wider := rests.shape[1] - at.q.shape[1]:
-            at = _Candidates(*more, np.pad(at.sure, ((0, 0), (0, wider), (0, 0))))
-            lost = lost_directions(arm, task, at.q, (at.size <= SOLUTION) & ~at.sure.any(axis=2), target)
-    groups = _Groups(goals, at, lost, rests)
-    groups.find()
-    return groups.settled(missed, beyond)
-
-
 class _Candidates(NamedTuple):
     """Candidates q (K, M, n), `near` the first, with labels and residuals (K, M).
 
@@ -177,7 +161,7 @@ class _Candidates(NamedTuple):
 class _Groups:
     """Which candidates are one, and what: a candidate of each target at a time leads those that are one with it."""
 
-    def __init__(self, goals: Goals, at: _Candidates, lost: Lost, rests: Bool) -> None:
+    def __init__(self, goals: Goals, at: _Candidates, lost: newton.Lost, rests: Bool) -> None:
         """rests: (K, M) those that no push takes along a self-motion."""
         self.goals, self.at, self.lost, self.rests = goals, at, lost, rests
         K, M, n = at.q.shape
@@ -198,31 +182,6 @@ class _Groups:
         self.chosen, self.curve = np.zeros((K, M), bool), np.zeros((K, M, n), bool)
         self.free, self.singular, self.double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
 
-    def find(self) -> None:
-        """Group all candidates."""
-        few = self.valid.shape[1] <= FEW
-        some = ~self.asked
-        if some.sum() <= AT_ONCE or few:
-            self._ask(*np.nonzero(some if some.sum() <= AT_ONCE else some & (self.lost.nullity < 2)))
-        if few:
-            self._plain()
-        while self.open.any():
-            k = np.flatnonzero(self.open.any(axis=1))
-            self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
-        arm, task, target, _ = self.goals
-        q, sigma = self.at.q, self.lost.sigma
-        rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | self._weak_beside())
-        if len(rows):
-            q, chosen, curve, target = q[rows], self.chosen[rows], self.curve[rows], target[rows]
-            self_motions.drop_contained(arm, task, q, sigma[rows], self.resting[rows], chosen, curve, target)
-            self_motions.drop_twins(arm, task, q, chosen, curve, target)
-            self.chosen[rows] = chosen
-
-    def _weak_beside(self) -> Bool:
-        """Targets (K,) with a root of high order beside a self-motion."""
-        weak = self.chosen & (self.lost.sigma < HIGH) & ~self.curve.any(axis=2)
-        return np.asarray(weak.any(axis=1) & self.curve.any(axis=(1, 2)))
-
     def _plain(self) -> None:
         """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries
         that are alone on their components or two, and self-motions that were known where nothing else may be on them.
@@ -230,7 +189,7 @@ class _Groups:
         valid, sigma, size = self.valid, self.lost.sigma, self.at.size
         on: Bool = np.asarray(self.at.sure.any(axis=2))
         with np.errstate(invalid="ignore"):
-            away = newton.wrapped_distance(self.goals.arm, self.at.q[:, :, None], self.at.q[:, None])
+            away = np.abs(newton.difference(self.goals.arm, self.at.q[:, :, None], self.at.q[:, None])).max(axis=3)
         others: Bool = ~np.eye(valid.shape[1], dtype=bool)
         close: Bool = np.asarray((away < CLOSE_BY) & (valid & ~on)[:, None] & others)
         weak = valid & (sigma < FOLDED) & ~on
@@ -242,9 +201,10 @@ class _Groups:
         told &= ~np.asarray((weak & self.moves).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[:, None]
         told &= (~one | told[:, None]).all(axis=2)
         alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
-        before = np.tri(valid.shape[1], k=-1, dtype=bool)
-        self.chosen |= alone | told & ~(one & _first(size, before)).any(axis=2)
-        self.double |= (told & self.edge & ~(one & _first(self.rank, before)).any(axis=2)).any(axis=1)
+        # the most exact of each, the first of several
+        rank, lead = (np.argsort(np.argsort(x, axis=1, kind="stable"), axis=1) for x in (size, self.rank))
+        self.chosen |= alone | told & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
+        self.double |= (told & self.edge & ~(one & (lead[:, None] < lead[:, :, None])).any(axis=2)).any(axis=1)
         self.open &= ~(alone | told)
         self.curve |= alone[:, :, None] & self.which & on[:, :, None]
         self.singular |= (alone & on).any(axis=1)
@@ -328,15 +288,36 @@ class _Groups:
         return np.asarray(mine)
 
     def settled(self, missed: Bool, beyond: Bool) -> _Settled:
-        """What was found; missed, beyond: see `_onto`."""
+        """All candidates grouped; missed, beyond: (K,) of which targets a loose one came to nothing, and of which all
+        that are near lie beyond a fold."""
+        few = self.valid.shape[1] <= FEW
+        some = ~self.asked
+        if some.sum() > AT_ONCE:
+            some &= few & (self.lost.nullity < 2)
+        if some.any():
+            self._ask(*np.nonzero(some))
+        if few:
+            self._plain()
+        while self.open.any():
+            k = np.flatnonzero(self.open.any(axis=1))
+            self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
         arm, task, target, _ = self.goals
-        K, chosen, q = len(self.chosen), self.chosen, self.at.q
+        q, sigma, chosen = self.at.q, self.lost.sigma, self.chosen
+        # also beside a self-motion: a root of high order
+        moving = np.asarray(self.curve.any(axis=2))
+        beside = (chosen & (sigma < HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
+        rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | beside)
+        if len(rows):
+            at, kept, curve = q[rows], chosen[rows], self.curve[rows]
+            self_motions.drop_contained(arm, task, at, sigma[rows], self.resting[rows], kept, curve, target[rows])
+            self_motions.drop_twins(arm, task, at, kept, curve, target[rows])
+            chosen[rows] = kept
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
         there = np.take_along_axis(chosen, order, axis=1)
         status = np.where(there.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
         status[self.double] = Status.BOUNDARY
         status[self.singular] = Status.SINGULAR
-        surface, (k, b) = np.zeros(K, bool), np.nonzero(chosen & (self.lost.nullity == 2) & self.curve.any(axis=2))
+        surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity == 2) & self.curve.any(axis=2))
         if len(k):
             surface[k[self_motions.on_surface(arm, task, q[k, b], self.lost.V[k, b], target[k])]] = True
         return _Settled(
@@ -352,24 +333,14 @@ class _Groups:
         )
 
 
-def _first(size: Array, before: Bool) -> Bool:
-    """Whether of candidates (K, M) the second is to be taken rather than the first: it is smaller, or before it."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray((size[:, None] < size[:, :, None]) | (size[:, None] == size[:, :, None]) & before)
-
-
-def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool, Bool]:
-    """`near` and candidates moved onto their targets, those that are there in front.
-
-    Also of which targets (K,) a loose one came to nothing, and of which all that are near lie beyond a fold.
-    """
+def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
+    """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
     arm, task, target, near = goals
     K, _, n = seeds.q.shape
     there = ~np.isnan(seeds.q).any(axis=2)
     order = np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]
     q = np.concatenate([near[:, None], np.take_along_axis(seeds.q, order[:, :, None], axis=1)], axis=1)
-    label = np.take_along_axis(seeds.label, order, axis=1)
-    label = np.insert(label, 0, OWN, axis=1)
+    label = np.insert(np.take_along_axis(seeds.label, order, axis=1), 0, OWN, axis=1)
     sure = np.pad(np.take_along_axis(seeds.sure, order[:, :, None], axis=1), ((0, 0), (1, 0), (0, 0)))
     loose = np.take_along_axis(seeds.loose, order, axis=1)
     flat, goal = q.reshape(-1, n).copy(), np.repeat(target, q.shape[1], axis=0)
@@ -391,4 +362,11 @@ def _onto(goals: Goals, seeds: Seeds, most: float) -> tuple[_Candidates, Bool, B
     missed = (loose & (size[:, 1:] > SOLUTION)).any(axis=1) | (seeds.loose & ~there).any(axis=1)
     far = beyond.reshape(K, -1)
     out = far.any(axis=1) & (far | (size > most) | np.isnan(q[..., 0]))[:, 1:].all(axis=1)
-    return _Candidates(q, label, size, sure), np.asarray(missed), np.asarray(out)
+    rests: Bool = np.zeros(size.shape, bool)
+    lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~sure.any(axis=2), target)
+    if (lost.nullity[:, 1:] > 1).any():
+        q, label, size, rests = meetings.ways_out(goals, q, label, size, lost.V, lost.nullity, OWN)
+        if wider := q.shape[1] - sure.shape[1]:
+            sure = np.pad(sure, ((0, 0), (0, wider), (0, 0)))
+            lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~sure.any(axis=2), target)
+    return _Groups(goals, _Candidates(q, label, size, sure), lost, rests).settled(np.asarray(missed), np.asarray(out))

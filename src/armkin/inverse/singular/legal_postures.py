@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.answers.batch import Batch, Goals, named, wider, write
+from armkin.inverse.answers.batch import Batch, Goals, wider, write
 from armkin.inverse.answers.closest import thorough
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_row
@@ -62,7 +62,7 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         if found.q.shape[1] > out.q.shape[1]:
             out = wider(out, found.q.shape[1])
         row = np.array([k])
-        write(arm, out, row, found.q, found.valid, named(found.label, found.valid), near[row])
+        write(arm, out, row, found.q, found.valid, found.label, near[row])
         out.status[k] = max(out.status[k], found.status[0])  # of two roots in one, one was listed
         out.free[k] |= found.free[0]
     return out

@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.linalg import nudged
 from armkin.inverse.numeric.tolerances import (
     ARRIVED,
     BENT,
     CLOSED,
     FINEST,
     FOLD_WAY,
-    FOLDED,
     HIGH,
     MOVED,
     REACH,
@@ -185,7 +183,7 @@ def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Array, Arra
         one = who[active]
         r, bordered[active, :rows, :n] = newton.scaled(arm, task, start.q[one] + away[active] * unit, start.target[one])
         ahead = t[active] - (start.v[one] * away[active]).sum(axis=1)
-        inverse = nudged(np.linalg.inv, bordered[active])
+        inverse = newton.nudged(np.linalg.inv, bordered[active])
         step = (inverse @ np.concatenate([r, ahead[:, None]], axis=1)[:, :, None])[:, :, 0]
         away[active] += step[:, :n]
         # the last rows span what no motion across v reaches: u has turned on the way
@@ -213,7 +211,7 @@ def _least(across: Array, left: Array) -> Array:
     if left.shape[1] == 1:
         return np.asarray(left / np.linalg.norm(across, axis=2))
     L = np.asarray(np.linalg.cholesky(across @ across.swapaxes(1, 2)), float)
-    return np.asarray(nudged(np.linalg.solve, L, left[:, :, None])[:, :, 0])
+    return np.asarray(newton.nudged(np.linalg.solve, L, left[:, :, None])[:, :, 0])
 
 
 _FIT = np.linalg.inv(np.polynomial.chebyshev.chebvander(NODE, NODES - 1))
@@ -290,33 +288,6 @@ def members(at: Structure, rows: NDArray[np.intp], way: Array) -> Bool:
         off = np.abs(way - x).max(axis=2)
         inside = (t >= (at.low[rows] - slack)[:, None]) & (t <= (at.high[rows] + slack)[:, None])
         return np.asarray(at.known[rows, None] & inside & (off <= (4.0 * SMOOTH * span + slack)[:, None]))
-
-
-class Lost(NamedTuple):
-    """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many
-    directions they lose (K, M) and right singular vectors (K, M, n, n)."""
-
-    sigma: Array
-    nullity: NDArray[np.int64]
-    V: Array
-
-
-def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) -> Lost:
-    """What the candidates q (K, M, n) lose that are asked (K, M), which solve their targets; others nothing."""
-    K, M, n = q.shape
-    out = Lost(np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n)))
-    k, b = np.nonzero(asked)
-    if not len(k):
-        return out
-    _, J = newton.scaled(arm, task, q[k, b], target[k])
-    if J.shape[1] == n == task.constraints:
-        # the Frobenius norm of the inverse is no smaller than its largest singular value
-        inverse = nudged(np.linalg.inv, J)
-        out.sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
-        weak = bound < FOLDED
-        k, b, J = k[weak], b[weak], J[weak]
-    out.sigma[k, b], out.V[k, b], out.nullity[k, b] = newton.null_space_of(arm, task, J)
-    return out
 
 
 def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:

@@ -25,11 +25,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 AT_ONCE = 4096  # targets whose branches are compared with `near` together
-
-
-def room(arm: Arm) -> float:
-    """How far the tool may be from a target [mm] that `near` might solve: twice the tolerance, for rounding."""
-    return 2.0 * SOLUTION * arm.reach
+ROOM = 2.0 * SOLUTION  # [reaches] from the tool to a target that `near` might solve: twice the tolerance, for rounding
+ROUNDED = 1.001 * SOLUTION  # residual that solves a rounded target, if it is more
 
 
 def reached(arm: Arm, task: Task, target: Array, tip: Array, first: Array | None = None) -> NDArray[np.intp]:
@@ -38,7 +35,7 @@ def reached(arm: Arm, task: Task, target: Array, tip: Array, first: Array | None
     tip: (3,) or (N, 3), its `position`; first: (N,) the targets' first coordinate, where it stands by itself.
     """
     point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
-    most = room(arm)
+    most = ROOM * arm.reach
     x = point[:, 0] if first is None else first
     rows = np.flatnonzero(np.abs(x - tip[..., 0]) <= most)  # one coordinate tells nearly all others
     if len(rows):
@@ -89,7 +86,7 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> N
 
     Of those that are known better than to `SOLUTION` there are none: of these `take` has decided.
     """
-    rows = np.flatnonzero(most > 1.001 * SOLUTION)
+    rows = np.flatnonzero(most > ROUNDED)
     if not len(rows):
         return rows
     close = np.broadcast_to(near, (len(target), arm.n))

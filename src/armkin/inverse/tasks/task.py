@@ -12,7 +12,7 @@ What is missing to a target stands in `residuals`, which task fits an arm in `fi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -59,7 +59,7 @@ class Task:
         """Names of the target's numbers, as on the command line."""
         return LABELS[self.name]
 
-    @property
+    @cached_property
     def constraints(self) -> int:
         """How many degrees of freedom the target takes."""
         return self.position + len(self.sums) + {"none": 0, "axis": 2, "full": 3}[self.orientation]
@@ -138,7 +138,11 @@ def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
     """Poses (N, 4, 4) with the rotations next to those given, how far these were off (N,), and the entries."""
     _refuse_wild(T)
     entries = pose.read(T)
-    off = _off(T, entries)
+    check = rotation_check()
+    if len(T) == 1:
+        off = check.one_by_one([pose.read_one(T[0])])[0]
+    else:
+        off = np.array(check.run(entries, check.workspace(len(T)))[0])
     if not (off <= ROTATION).all():
         raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 5e-6")
     some = np.flatnonzero(off > ROUNDED)
@@ -163,14 +167,6 @@ def rotation_check() -> StraightLineCode:
         return [worst]
 
     return StraightLineCode(formula, 12)
-
-
-def _off(T: Array, entries: pose.Pose) -> Array:
-    """How far the columns of (N, 4, 4) are from those of rotations: (N,)."""
-    check = rotation_check()
-    if len(T) == 1:
-        return check.one_by_one([pose.read_one(T[0])])[0]
-    return np.array(check.run(entries, check.workspace(len(T)))[0])
 
 
 def nearest_rotation(R: Array) -> Array:
