@@ -148,3 +148,21 @@ def test_info_names_the_redundant_joint() -> None:
     assert run("info", "panda", "--json").json["redundant"] == "J7"
     assert "J7 is redundant: ik lists the intervals of its values" in run("info", "panda").out
     assert "redundant" not in run("info", "ur5e", "--json").json
+
+
+def test_the_redundant_joint_is_held_where_the_arm_hits_nothing(tmp_path: Path) -> None:
+    """A ball where panda's elbow passes with J7 at home: the path was refused, though other values carry it."""
+    moves = {"moves": [{"point": [400, 0, 400, 180, 0, 0]}, {"line": [400, 150, 400]}]}
+    plain = armkin.path(arm_with_rates("panda"), moves)
+    elbow = armkin.frames(plain.arm, plain.runs[0].end_joints)[3, :3, 3]
+    scene = tmp_path / "ball.yaml"
+    ball = f"from: {elbow.tolist()}, to: {np.add(elbow, [0, 0, 1]).tolist()}, radius: 40"
+    scene.write_text(f"keep_out:\n  - name: ball\n    capsule: {{{ball}}}\n")
+    arm = armkin.load("panda", scene=scene)
+    plan = armkin.path(replace(arm, max_speed=np.full(7, 0.5), max_accel=np.full(7, 1.0)), moves)
+    assert plan.clearance is not None
+    assert plan.clearance["mm"] > 0
+    assert plan.held["J7"] != plain.held["J7"]
+    ignored = armkin.load("panda", scene=scene)
+    ignored = replace(ignored, max_speed=np.full(7, 0.5), max_accel=np.full(7, 1.0), ignores_keep_out=True)
+    assert armkin.path(ignored, moves).held == plain.held

@@ -1,7 +1,7 @@
 """Paths of arms with one joint more than their task asks for: it is held, at a value that carries the whole path.
 
 Of the values that joint may have, those are planned for at which every way of the path has, at targets along it, a
-branch within limits; the one nearest to where the joint stands comes first.
+branch within limits; those at which the arm hits nothing first, and of these the nearest to where the joint stands.
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
+from armkin.keep_out.clearance import clearance
 from armkin.model.arm import actual
 from armkin.motion import path_numbers
 from armkin.motion.held import path_held
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 VALUES = 72  # of the redundant joint that are asked, over its range
 STEP = 0.02  # of the arm's reach, between targets that are asked
 ASKED = 200  # targets of a way, at most
+AWAY = 0.01  # of the arm's reach, that values had best keep from what must not be touched
+POSTURES = 8_000  # targets that are asked for that, at most
 MOST = 6  # values that are planned for
 SAME = 1e-9  # [rad] values of joint moves that are one
 
@@ -137,8 +140,8 @@ def _of_others(arm: Arm, file: PathFile, joint: int) -> PathFile:
 def _values(arm: Arm, file: PathFile, task: str | None, close: float, stands: float) -> Iterator[float]:
     """Values of the redundant joint to plan for [rad]: those at which targets along all ways have a branch.
 
-    The nearest to `close` first; where there is none, the one at which most have. A way that begins where the joints
-    stand keeps them there.
+    Those at which it hits nothing come first, and of these those that keep `AWAY`; then the nearest to `close`. Where
+    there is none, the one at which most have. A way that begins where the joints stand keeps them there.
     """
     turned = actual(arm)
     spare = redundancy(turned, task or file.task)
@@ -150,19 +153,44 @@ def _values(arm: Arm, file: PathFile, task: str | None, close: float, stands: fl
         yield stands
         return
     t = _over_range(arm, j, close)
-    missing = np.zeros(len(t), int)
-    for every in ways:
-        way = every[np.unique(np.linspace(0, len(every) - 1, ASKED).astype(int))]
-        goals = np.repeat(way[None], len(t), axis=0).reshape(-1, *way.shape[1:])
-        goals = moved(turned, spare, goals, np.repeat(t * arm.ratio[j], len(way)))
-        s = ik(spare.rest, goals, spare.task.name, examine=False)
-        legal = s.valid & s.within_limits
-        if spare.geometry.ordered:  # one branch all the way
-            legal = (legal[:, :, None] & (s.branch[:, :, None] == np.arange(len(s.names)))).any(axis=1)
-            legal = legal.reshape(len(t), len(way), -1)
-            missing += len(way) - legal.sum(axis=1).max(axis=1)
-        else:
-            missing += len(way) - legal.any(axis=1).reshape(len(t), -1).sum(axis=1)
-    order = np.lexsort((np.abs(t - close), missing))
-    carried = order[missing[order] == missing.min()]
-    yield from t[carried[: MOST if missing.min() == 0 else 1]].tolist()
+    at = t * arm.ratio[j]
+    lacking = np.zeros((1, len(t)), int)
+    for way in ways:
+        lacking += _lacking(turned, spare, way, at, ASKED, [])
+    order = np.argsort(np.abs(t - close), kind="stable")
+    carried = order[lacking[0, order] == lacking.min()]
+    if turned.keep_out and not turned.ignores_keep_out and len(carried) > 1:
+        # beside what must not be touched a proof is long: values that keep away from it come first
+        margins = [0.0, AWAY * turned.reach]
+        count = max(POSTURES // (len(carried) * len(ways)), 2)
+        near = np.zeros((3, len(carried)), int)
+        for way in ways:
+            near += _lacking(turned, spare, way, at[carried], min(count, ASKED), margins)
+        carried = carried[np.lexsort((near[2] > 0, near[1]))]
+    yield from t[carried[: MOST if lacking.min() == 0 else 1]].tolist()
+
+
+def _lacking(
+    arm: Arm, spare: Redundancy, way: Array, values: Array, count: int, margins: list[float]
+) -> NDArray[np.intp]:
+    """How many of some targets of a way lack a branch at each of the redundant joint's values (V,), and how many one
+    that keeps each of the margins [mm] besides: (1 + margins, V). Where branches have names it is one all the way.
+    """
+    some = way[np.unique(np.linspace(0, len(way) - 1, count).astype(int))]
+    goals = np.repeat(some[None], len(values), axis=0).reshape(-1, *some.shape[1:])
+    own = np.repeat(values, len(some))
+    s = ik(spare.rest, moved(arm, spare, goals, own), spare.task.name, examine=False)
+    legal = s.within_limits
+    kinds = [legal]
+    if margins:
+        q = np.insert(s.q, spare.joint, own[:, None], axis=2)
+        mm = np.full(legal.shape, -np.inf)
+        mm[legal] = clearance(arm, q[legal]).mm
+        kinds += [mm >= margin for margin in margins]
+    found = []
+    for good in kinds:
+        each = good.any(axis=1, keepdims=True)
+        if spare.geometry.ordered:
+            each = (good[:, :, None] & (s.branch[:, :, None] == np.arange(len(s.names)))).any(axis=1)
+        found.append(len(some) - each.reshape(len(values), len(some), -1).sum(axis=1).max(axis=1))
+    return np.array(found)
