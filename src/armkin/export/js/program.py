@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _PARTS = Path(__file__).parent / "parts"
+_ALONE = 1e-6  # [rad] from half a turn, from where on a limit leaves one copy of a value
 _ROUNDED = 5e-6  # how far a pose of six printed digits may be from orthonormal
 _ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: string[], method: string,
  *   slides: boolean[], lower: number[], upper: number[], home: number[], ratio: number[], unit: number[],
@@ -69,6 +70,7 @@ def _of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
         *_data(arm, turned, task, geometry, branches, driven),
         *_kinematics(turned, task),
         *_keep_outs(arm, turned),
+        _by_joint(turned, calibrated=bool((arm.ratio != 1.0).any())),
         *map(part, _SOLVER),
         *(map(part, elimination.METHOD) if geometry.pairs is None else ()),
         solve,
@@ -211,6 +213,46 @@ def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int, 
         }
         data += ["const MOTORS = {", *(f"  {name}: {_text(value)}," for name, value in values.items()), "};"]
     return [*data, ""]
+
+
+def _by_joint(arm: Arm, *, calibrated: bool) -> str:
+    """A candidate's joint values and their legal copies, a line a joint: loops over constants take twice as long."""
+    n = arm.n
+    values = ", ".join(f"allJoints[{n} * b + {j}]" for j in range(n))
+    head = "/** Joint values of a candidate. @param {number} b @returns {number[]} */\nfunction candidate(b)"
+    text = _function(head, [f"return [{values}];"])
+    lines = ["let inside = true;", "let turned = 0;", "let slid = 0;", "let value = 0;"]
+    for j in range(n):
+        low, high, slides = float(arm.lower[j]), float(arm.upper[j]), bool(arm.prismatic[j])
+        tests = [f"value >= {low!r} - SLACK"] if np.isfinite(low) else []
+        tests += [f"value <= {high!r} + SLACK"] if np.isfinite(high) else []
+        # within less than a turn there is one copy, wherever `near` is
+        one = not slides and low > -np.pi + _ALONE and high < np.pi - _ALONE
+        usual = [f"Math.abs(value{'' if one else f' - near[{j}]'}) < Math.PI - SLACK", *([] if one else tests)]
+        copy = [f"q[{j}] = value = nearestCopy(value, near[{j}], {_text(low)}, {_text(high)}, {_text(slides)});"]
+        check = [f"if (!({' && '.join(tests)})) inside = false;"] if tests else []
+        lines += [f"value = q[{j}];"]
+        if not slides:
+            lines += [
+                f"if (!({' && '.join(usual)})) {{",
+                *(f"  {line}" for line in copy + (check if not one else [])),
+                "}",
+            ]
+        lines += check if slides or one else []
+        change = f"Math.abs(value - near[{j}]){f' / ARM.ratio[{j}]' if calibrated else ''}"
+        lines += [f"{'slid' if slides else 'turned'} += {change};"]
+    lines += [
+        "copyInside = inside;",
+        "copyMotion[0] = turned * DEGREES + slid;",
+        "copyMotion[1] = turned + slid;",
+        "return q;",
+    ]
+    head = (
+        "/** Turns a posture into its legal copy nearest to `near`; `copyInside` and `copyMotion` tell of it.\n"
+        " * @param {number[]} q @param {Numbers} near */\n"
+        "function legal(q, near)"
+    )
+    return text + "\n" + _function(head, lines)
 
 
 def _keep_outs(arm: Arm, turned: Arm) -> list[str]:

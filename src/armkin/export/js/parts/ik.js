@@ -22,8 +22,8 @@ function read(target) {
   const flat = givenNumbers;
   for (let i = 0; i < target.length; i++) {
     const row = target[i];
-    if (typeof row === 'number') flat[count++ % wanted] = row;
-    else for (let j = 0; j < row.length; j++) flat[count++ % wanted] = row[j];
+    const numbers = typeof row === 'number' ? 1 : row.length;
+    for (let j = 0; j < numbers; j++, count++) if (count < wanted) flat[count] = typeof row === 'number' ? row : row[j];
   }
   if (count !== wanted)
     throw new RangeError(`a target is ${wanted === 16 ? 'a pose, four rows of four' : ARM.labels.join(' ')}: ${wanted} numbers, got ${count}`);
@@ -39,7 +39,7 @@ function read(target) {
     goal.set(flat);
     return 0;
   }
-  for (let k = 0; k < 12; k++) goal[k] = flat[4 * (k % 3) + ((k / 3) | 0)];
+  for (let j = 0; j < 4; j++) for (let i = 0; i < 3; i++) goal[3 * j + i] = flat[4 * i + j];
   let rounding = orthonormalised(goal);
   const given = rounding;
   for (let round = 0; round < 2 && rounding > 1e-15 && rounding <= ROTATION; round++) rounding = orthonormalised(goal);
@@ -94,13 +94,6 @@ const allMisses = new Float64Array(3 * ARM.branches); // squared; of a closed fo
  * @property {number[]} q actual joint values @property {number} branch @property {number[][]} [path] of a self-motion
  * @property {Component} [at] what lies around it @property {boolean} [wide] whether it is one of a surface
  */
-
-/** Joint values of a candidate. @param {number} b @returns {number[]} */
-function candidate(b) {
-  const q = new Array(ARM.joints);
-  for (let j = 0; j < ARM.joints; j++) q[j] = allJoints[b * ARM.joints + j];
-  return q;
-}
 
 /** Candidates of a target, in `allJoints` and `allMisses`; whether it is at an edge. @param {Float64Array} goal @param {Numbers} near */
 function doubted(goal, near) {
@@ -248,30 +241,8 @@ function straight(a, b, goal) {
   );
 }
 
-const LOWEST = ARM.lower.map((x) => x - SLACK);
-const HIGHEST = ARM.upper.map((x) => x + SLACK);
 let copyInside = true;
 const copyMotion = new Float64Array(2); // sums of |change|: [degrees, mm] and [rad, mm]
-
-/** Turns a posture into its legal copy nearest to `near`; `copyInside` and `copyMotion` tell of it. @param {number[]} q @param {Numbers} near */
-function legal(q, near) {
-  let [inside, degrees, plain] = [true, 0, 0];
-  for (let j = 0; j < ARM.joints; j++) {
-    let value = q[j];
-    if (!(Math.abs(value - near[j]) < Math.PI - SLACK && value >= LOWEST[j] && value <= HIGHEST[j])) {
-      value = nearestCopy(value, near[j], ARM.lower[j], ARM.upper[j], ARM.slides[j]);
-      q[j] = value;
-      inside = inside && value >= LOWEST[j] && value <= HIGHEST[j];
-    }
-    const change = CALIBRATED ? Math.abs(value - near[j]) / ARM.ratio[j] : Math.abs(value - near[j]);
-    degrees += ARM.slides[j] ? change : change * DEGREES;
-    plain += change;
-  }
-  copyInside = inside;
-  copyMotion[0] = degrees;
-  copyMotion[1] = plain;
-  return q;
-}
 
 /** Of a self-motion the posture within limits that is nearest. @param {Row} row @param {Numbers} near @param {Float64Array} goal */
 function nearest(row, near, goal) {
@@ -317,13 +288,17 @@ const stoodPose = new Float64Array(16);
 function solvesIt(near, goal, rounding) {
   let same = true;
   for (let j = 0; j < ARM.joints; j++) {
-    if (!(near[j] >= LOWEST[j] && near[j] <= HIGHEST[j])) return false;
+    if (!(near[j] >= ARM.lower[j] - SLACK && near[j] <= ARM.upper[j] + SLACK)) return false;
     same = same && near[j] === stoodAt[j];
   }
   if (!same) {
     stoodAt.set(near);
     poseOf(near, stoodPose);
   }
+  // nearly all targets are elsewhere
+  const far = (SOLUTION + rounding) * ARM.reach;
+  for (let i = 0, first = ARM.orientation === 'full' ? 9 : 0; i < ARM.position; i++)
+    if (Math.abs(goal[first + i] - stoodPose[4 * i + 3]) > far) return false;
   apartFrom(stoodPose, near, goal);
   return off2[0] * off2[0] + off2[1] * off2[1] <= (SOLUTION + rounding) ** 2;
 }

@@ -1,6 +1,8 @@
 /** Names of all branches that a target may have. */
 export const branch_names = ARM.names;
 
+const OUTSIDE = 2 ** 52; // above every rank of a row within limits
+
 /** @type {number[]} */
 const ranks = []; // of the branches of one answer: motions in degrees and mm,
 /** @type {number[]} */
@@ -13,25 +15,17 @@ const free = (row) => !row.hits?.length;
 function sort(rows) {
   let least = Infinity;
   for (let k = 0; k < rows.length; k++) least = Math.min(least, ranks[k]);
-  for (let k = 0; k < rows.length; k++) ranks[k] = rint((ranks[k] - least) * EQUAL);
-  for (let k = 1; k < rows.length; k++) {
+  for (let k = 0; k < rows.length; k++) {
     const row = rows[k];
-    const rank = ranks[k];
-    const place = places[k];
+    const group = row.within_limits ? (KEEPS_OUT && !free(row) ? OUTSIDE / 2 : 0) : OUTSIDE;
+    const rank = rint((ranks[k] - least) * EQUAL) * 256 + places[k] + group;
     let at = k;
-    for (; at > 0; at--) {
-      const other = rows[at - 1];
-      let before = ranks[at - 1] === rank ? places[at - 1] < place : ranks[at - 1] < rank;
-      if (other.within_limits !== row.within_limits) before = other.within_limits;
-      else if (KEEPS_OUT && row.within_limits && free(other) !== free(row)) before = free(other);
-      if (before) break;
-      rows[at] = other;
+    for (; at > 0 && ranks[at - 1] >= rank; at--) {
+      rows[at] = rows[at - 1];
       ranks[at] = ranks[at - 1];
-      places[at] = places[at - 1];
     }
     rows[at] = row;
     ranks[at] = rank;
-    places[at] = place;
   }
 }
 
