@@ -53,13 +53,25 @@ function decompose(A) {
   /** @type {number[][]} */
   const V = [];
   for (let j = 0; j < n; j++) {
-    const u = Array.from(W.subarray(all * j, all * j + m));
-    const size = Math.sqrt(dot(u, u));
+    let size = 0;
+    for (let i = all * j; i < all * j + m; i++) size += W[i] * W[i];
+    size = Math.sqrt(size);
+    const over = size > 0 ? size : 1;
+    /** @type {number[]} */
+    const u = [];
+    /** @type {number[]} */
+    const v = [];
+    for (let i = all * j; i < all * j + m; i++) u.push(W[i] / over);
+    for (let i = all * j + m; i < all * (j + 1); i++) v.push(W[i]);
     let at = j;
-    for (; at > 0 && S[at - 1] < size; at--);
-    U.splice(at, 0, size > 0 ? u.map((x) => x / size) : u);
-    S.splice(at, 0, size);
-    V.splice(at, 0, Array.from(W.subarray(all * j + m, all * (j + 1))));
+    for (; at > 0 && S[at - 1] < size; at--) {
+      S[at] = S[at - 1];
+      U[at] = U[at - 1];
+      V[at] = V[at - 1];
+    }
+    S[at] = size;
+    U[at] = u;
+    V[at] = v;
   }
   return { U, S, V };
 }
