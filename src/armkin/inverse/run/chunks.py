@@ -18,7 +18,7 @@ from armkin.inverse.branches.whole_turns import nearest_copy
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
-from armkin.inverse.run.edges import decided
+from armkin.inverse.run.edges import AT_ONCE, decided
 from armkin.inverse.run.workers import shared
 from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
@@ -89,7 +89,8 @@ def solve(
     out.complete[...] = geometry.complete
     if geometry.doubts is None:
         if examine and len(edge):
-            out = decided(Goals(arm, task, target, near), runner, out, edge)
+            for start in range(0, len(edge), AT_ONCE):
+                out = decided(Goals(arm, task, target, near), runner, out, edge[start : start + AT_ONCE])
         edge = edge[:0]
     return Solved(out, math.prod(runner.axes), target, rounding, edge)
 

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
-from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, SAME
-from armkin.inverse.singular import components, linkages
+from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, NEARBY, SAME
+from armkin.inverse.singular import components, linkages, near_itself
 from armkin.inverse.singular.components import Seeds
 
-AT_ONCE = 256  # targets examined together
+AT_ONCE = 1024  # targets examined together
 
 
 class _Doubts(NamedTuple):
@@ -24,7 +25,8 @@ class _Doubts(NamedTuple):
 
     other: the same with other values, nan where these change nothing; loose: (K, B) which candidates they change;
     free: (K,) whether a joint is; ends: (K,) targets on which the joints that the geometry calls ends are free;
-    narrow: (K,) those with solutions for a part of these values, which `near` is not in.
+    narrow: (K,) those with solutions for a part of these values, which `near` is not in; simple: (K, B) branches that
+    are on no edge, of targets that `near` does not solve.
     """
 
     rows: NDArray[np.intp]
@@ -35,100 +37,119 @@ class _Doubts(NamedTuple):
     free: Bool
     ends: Bool
     narrow: Bool
+    simple: Bool
 
 
 def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) -> Batch:
-    """Decide what the targets `rows` are, which are on an edge.
+    """Decide what the targets `rows` are, which are on an edge: at most `AT_ONCE`.
 
     Where a joint is free, the candidates are not all.
     """
     _, _, target, near = goals
     doubts = _doubts(goals, runner, rows)
-    out, done = _on_linkages(goals, runner, out, doubts)
-    if done.all():
+    parts, left = _on_linkages(goals, runner, doubts), np.ones(len(rows), bool)
+    for known, seeds in parts:
+        left[known] = False
+        if runner.geometry.ends:
+            out = examined(goals, out, rows[known], seeds, runner.others)
+    unsettled = None
+    if left.any():
+        if len(part := np.flatnonzero(left & doubts.narrow)):  # there may be another part
+            whole = rows[part]
+            doubts.first[part], other, _ = _at_two(runner, target[whole], near[whole], near[whole] + 1.0)
+            doubts.other[part] = np.where(doubts.loose[part][:, :, None], other, np.nan)
+        arrays: tuple[NDArray[Any], ...] = doubts
+        open_, tight, first, other, loose, _, at_ends, _, simple = (array[left] for array in arrays)
+        # with the preferred values for joints that are free, and those that other values would change
+        more = [first, other] if loose.any() else [first]
+        if runner.geometry.ends:
+            hangs: Bool = np.asarray(loose.any(axis=1))
+            more.append(np.where(hangs[:, None, None], tight, np.nan))  # it may be that the joint is not quite free
+            unsettled = np.zeros(len(target), bool)
+            unsettled[open_[at_ends]], out.complete[open_[at_ends]] = True, False
+        fixed = (0, 0), (0, (len(more) - 1) * loose.shape[1])
+        label = np.tile(np.arange(loose.shape[1]), len(more))
+        seeds = Seeds.of(np.concatenate(more, axis=1), label, np.pad(loose, fixed), np.pad(simple, fixed))
+        parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(left), seeds)]
+    elif runner.geometry.ends:
         return out
-    if len(part := np.flatnonzero(~done & doubts.narrow)):  # there may be another part
-        whole = rows[part]
-        doubts.first[part], other, _ = _at_two(runner, target[whole], near[whole], near[whole] + 1.0)
-        doubts.other[part] = np.where(doubts.loose[part][:, :, None], other, np.nan)
-    arrays: tuple[NDArray[Any], ...] = doubts
-    rows, tight, first, other, loose, _, at_ends, _ = (array[~done] for array in arrays)
-    # with the preferred values for joints that are free, and those that other values would change
-    more, unsettled = [first, other], None
-    if runner.geometry.ends:
-        hangs: Bool = np.asarray(loose.any(axis=1))
-        more.append(np.where(hangs[:, None, None], tight, np.nan))  # it may be that the joint is not quite free
-        unsettled = np.zeros(len(target), bool)
-        unsettled[rows[at_ends]], out.complete[rows[at_ends]] = True, False
-    if not loose.any():
-        del more[1:]
-    q, fixed = np.concatenate(more, axis=1), np.zeros((len(rows), (len(more) - 1) * loose.shape[1]), bool)
-    label = np.tile(np.arange(loose.shape[1]), len(more))
-    seeds = Seeds.of(q, label, np.concatenate([loose, fixed], axis=1))
-    return examined(goals, out, rows, seeds, runner.others, unsettled)
+    seeds = parts[0][1] if len(parts) == 1 else Seeds.joined([seeds for _, seeds in parts])
+    return examined(goals, out, rows[np.concatenate([part for part, _ in parts])], seeds, runner.others, unsettled)
 
 
-def _on_linkages(goals: Goals, runner: Recorded, out: Batch, doubts: _Doubts) -> tuple[Batch, Bool]:
-    """The same with those targets (K,) written whose self-motions are known in closed form; which these are (K,)."""
-    done, asked = np.zeros(len(doubts.rows), bool), doubts.free & ~doubts.ends
+def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[NDArray[np.intp], Seeds]]:
+    """Those of the targets whose self-motions are known in closed form, with their seeds."""
+    out: list[tuple[NDArray[np.intp], Seeds]] = []
     if not (goals.task.constraints == goals.arm.n and goals.task.orientation == "full"):
-        return out, done
-    for start in range(0, len(done), AT_ONCE):
-        part = start + np.flatnonzero(asked[start : start + AT_ONCE])
-        q = np.stack([doubts.first[part], doubts.other[part]], axis=1)
-        for _ in range(2):
-            if not len(part):
-                break
-            some, loose = goals.of(doubts.rows[part]), doubts.loose[part]
-            found = linkages.settle(some, q, loose)
-            if len(known := np.flatnonzero(found.known)):
-                # postures of known self-motions, and the candidates that are not loose, by their labels
-                fixed = np.where(loose[known][:, :, None], np.nan, doubts.first[part[known]])
-                label = np.concatenate([np.arange(loose.shape[1]), found.label])
-                order = np.argsort(label, kind="stable")
-                at = np.concatenate([fixed, found.q[known]], axis=1)[:, order]
-                sure = np.concatenate([np.zeros(fixed.shape, bool), found.joints[known]], axis=1)[:, order]
-                seeds = Seeds.of(at, label[order])._replace(sure=sure)
-                out = examined(goals, out, doubts.rows[part[known]], seeds, runner.others)
-                done[part[known]] = True
-            lacking = np.flatnonzero(found.lacking)
-            part, q = part[lacking], q[lacking]
-            if len(part):
-                q = np.concatenate([q, runner.samples(some.target[lacking], some.near[lacking])], axis=1)
-    return out, done
+        return out
+    part = np.flatnonzero(doubts.free & ~doubts.ends)
+    q = np.stack([doubts.first[part], doubts.other[part]], axis=1)
+    for _ in range(2):
+        if not len(part):
+            break
+        some, loose = goals.of(doubts.rows[part]), doubts.loose[part]
+        # of the candidates those that are loose in front
+        B = np.arange(loose.shape[1])
+        column = np.argsort(~loose, axis=1, kind="stable")[:, : max(int(loose.sum(axis=1).max()), 1)]
+        found = linkages.settle(
+            some, np.take_along_axis(q, column[:, None, :, None], axis=2), np.take_along_axis(loose, column, axis=1)
+        )
+        if len(known := np.flatnonzero(found.known)):
+            # postures of known self-motions, and the candidates that are not loose, by their labels
+            whose, there = part[known], ~np.isnan(found.q[known, :, 0])
+            at = np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max())]
+            fixed = np.where(loose[known][:, :, None], np.nan, doubts.first[whose])
+            label = np.take_along_axis(np.tile(column[known], q.shape[1]), at, axis=1)
+            label = np.concatenate([np.broadcast_to(B, loose[known].shape), label], axis=1)
+            order = np.argsort(label, axis=1, kind="stable")
+            on, joints = (np.take_along_axis(x[known], at[:, :, None], axis=1) for x in (found.q, found.joints))
+            motion = np.concatenate([np.zeros(fixed.shape, bool), joints], axis=1)
+            seeds = Seeds.of(
+                np.take_along_axis(np.concatenate([fixed, on], axis=1), order[:, :, None], axis=1),
+                np.take_along_axis(label, order, axis=1),
+                simple=np.take_along_axis(np.pad(doubts.simple[whose], ((0, 0), (0, at.shape[1]))), order, axis=1),
+            )._replace(sure=np.take_along_axis(motion, order[:, :, None], axis=1))
+            out.append((whose, seeds))
+        lacking = np.flatnonzero(found.lacking)
+        part, q = part[lacking], q[lacking]
+        if len(part):
+            q = np.concatenate([q, runner.samples(some.target[lacking], some.near[lacking])], axis=1)
+    return out
 
 
 def _doubts(goals: Goals, runner: Recorded, rows: NDArray[np.intp]) -> _Doubts:
-    """The targets `rows`, with preferred values for joints that are free."""
-    _, _, target, near = goals
+    """The targets `rows`, with preferred values for joints that are free; what is on no edge and misses is nan."""
+    arm, task, target, near = goals.arm, goals.task, goals.target[rows], goals.near[rows]
     # what is singular hangs on the last digit
-    *values, _, _, free = runner.in_numbers(target[rows])
-    tight = as_rows(values, len(rows))
+    found = as_rows(runner.in_numbers(target), len(rows))
+    tight, (miss, edge, free) = found[:, :, :-3], np.moveaxis(found[:, :, -3:], 2, 0)
+    plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
+    plain[near_itself.reached(arm, task, target, position(arm, near))] = False
+    gone = plain & (miss > NEARBY**2)
     out = _Doubts(
         rows=rows,
-        tight=tight,
-        first=tight.copy(),
+        tight=np.where(gone[:, :, None], np.nan, tight),
+        first=np.where(gone[:, :, None], np.nan, tight),
         other=np.full(tight.shape, np.nan),
         loose=np.zeros(tight.shape[:2], bool),
-        free=np.asarray((np.reshape(free, (-1, len(rows))) > 0).any(axis=0)),
+        free=np.asarray((free > 0.0).any(axis=1)),
         ends=np.zeros(len(rows), bool),
         narrow=np.zeros(len(rows), bool),
+        simple=plain & (miss <= ACCEPTED**2),
     )
-    freed = np.flatnonzero(out.free)
-    for start in range(0, len(freed), AT_ONCE):
-        part = freed[start : start + AT_ONCE]
-        whole = rows[part]
-        first, second, solved = _at_two(runner, target[whole], near[whole], near[whole] + 1.0)
+    part = np.flatnonzero(out.free)
+    if len(part):
+        goal, close = target[part], near[part]
+        first, second, solved = _at_two(runner, goal, close, close + 1.0)
         apart = np.abs(first - second)
-        changed = ~(apart.max(axis=2) < SAME)
+        changed = ~((apart.max(axis=2) < SAME) | plain[part])
         lost = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
         if len(lost):  # solutions for some values of the free joints alone, or for one
-            rest = whole[lost]
-            best = near[rest] + runner.best_shift(target[rest], near[rest], changed[lost])
-            first[lost], second[lost], solved = _at_two(runner, target[rest], best, best + FOLD_WAY)
+            best = close[lost] + runner.best_shift(goal[lost], close[lost], changed[lost])
+            first[lost], second[lost], solved = _at_two(runner, goal[lost], best, best + FOLD_WAY)
             out.narrow[part[lost]] = solved[1].any(axis=1)
-        out.first[part], out.loose[part] = first, changed
-        out.other[part] = np.where(changed[:, :, None], second, np.nan)
+        out.first[part] = np.where(plain[part][:, :, None], out.first[part], first)
+        out.other[part], out.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
         apart = np.minimum(apart, np.abs(apart - 2 * np.pi))[:, :, list(runner.geometry.ends)]
         out.ends[part] = (apart > SAME).any(axis=(1, 2))
     return out

@@ -85,19 +85,33 @@ class Seeds(NamedTuple):
 
     q: (K, B, n), nan where there is none. loose: (K, B) those that depend on a value preferred for a free joint.
     label: (K, B) of the solver's own numbering. sure: (K, B, n) joints that move along those that are known to
-    lie on a self-motion, one posture of each.
+    lie on a self-motion, one posture of each. simple: (K, B) branches as they stand: no closed form doubts them.
     """
 
     q: Array
     loose: Bool
     label: Int
     sure: Bool
+    simple: Bool
 
     @classmethod
-    def of(cls, q: Array, label: Int, loose: Bool | None = None) -> Seeds:
-        """Candidates of which no self-motion is known; by default none is loose."""
-        label, loose = np.broadcast_to(label, q.shape[:2]), np.zeros(q.shape[:2], bool) if loose is None else loose
-        return cls(q, loose, label, np.zeros(q.shape, bool))
+    def of(cls, q: Array, label: Int, loose: Bool | None = None, simple: Bool | None = None) -> Seeds:
+        """Candidates of which no self-motion is known; by default none is loose, and none is simple."""
+        none, label = np.zeros(q.shape[:2], bool), np.broadcast_to(label, q.shape[:2])
+        sure = np.zeros(q.shape, bool)
+        return cls(q, none if loose is None else loose, label, sure, none if simple is None else simple)
+
+    @classmethod
+    def joined(cls, parts: list[Seeds]) -> Seeds:
+        """Those of several groups of targets, one below the other."""
+        K, width = sum(len(part.q) for part in parts), max(part.q.shape[1] for part in parts)
+        out, start = cls.of(np.full((K, width, parts[0].q.shape[2]), np.nan), np.zeros((K, 1), int)), 0
+        out = out._replace(label=out.label.copy(), simple=out.simple.copy())
+        for part in parts:
+            for whole, some in zip(out, part, strict=True):
+                whole[start : start + len(some), : some.shape[1]] = some
+            start += len(part.q)
+        return out
 
 
 def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None) -> Examined:
@@ -150,12 +164,14 @@ class _Candidates(NamedTuple):
     """Candidates q (K, M, n), `near` the first, with labels and residuals (K, M).
 
     sure: (K, M, n) joints that move along those that are known to lie on a self-motion, one posture of each.
+    simple: (K, M) branches as they stand.
     """
 
     q: Array
     label: Int
     size: Array
     sure: Bool
+    simple: Bool
 
 
 class _Groups:
@@ -172,39 +188,46 @@ class _Groups:
         # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
         self.rank = np.maximum(at.size, EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
-        self.open: Bool = self.valid.copy()  # those of no group yet
+        self.open: Bool = self.valid & ~at.simple  # those of no group yet
         lost.sigma[on] = 0.0
-        self.asked: Bool = ~(self.valid & (lost.sigma < FOLDED) & ~on)
+        self.asked: Bool = ~(self.open & (lost.sigma < FOLDED) & ~on)
         self.known: Bool = on.copy()
         self.moves: Bool = on.copy()
         self.which, self.edge = at.sure.copy(), np.zeros((K, M), bool)
         self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
-        self.chosen, self.curve = np.zeros((K, M), bool), np.zeros((K, M, n), bool)
+        self.chosen, self.curve = at.simple.copy(), np.zeros((K, M, n), bool)
         self.free, self.singular, self.double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
 
     def _plain(self) -> None:
         """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries
         that are alone on their components or two, and self-motions that were known where nothing else may be on them.
         """
-        valid, sigma, size = self.valid, self.lost.sigma, self.at.size
+        valid, sigma, size, M = self.open, self.lost.sigma, self.at.size, self.open.shape[1]
         on: Bool = np.asarray(self.at.sure.any(axis=2))
-        with np.errstate(invalid="ignore"):
-            away = np.abs(newton.difference(self.goals.arm, self.at.q[:, :, None], self.at.q[:, None])).max(axis=3)
-        others: Bool = ~np.eye(valid.shape[1], dtype=bool)
-        close: Bool = np.asarray((away < CLOSE_BY) & (valid & ~on)[:, None] & others)
-        weak = valid & (sigma < FOLDED) & ~on
+        mine, others = valid & ~on, ~np.eye(M, dtype=bool)
+        close = np.zeros((len(valid), M, M), bool)
+        k, i, j = np.nonzero(mine[:, :, None] & mine[:, None] & others)
+        away = np.abs(newton.difference(self.goals.arm, self.at.q[k, i], self.at.q[k, j])).max(axis=1, initial=0.0)
+        close[k, i, j] = away < CLOSE_BY
+        weak = mine & (sigma < FOLDED)
         told = weak & self.known & ~self.moves
         other = weak & ~(told & (sigma >= SOLUTION))  # may be on a self-motion
-        one: Bool = self.component[self.place] & told[:, :, None] & valid[:, None] & others
-        told &= (one == one.swapaxes(1, 2)).all(axis=2) & ~(close & ~told[:, None]).any(axis=2)
-        told &= (one.sum(axis=2) < 2) & ~one[:, :, 0]
-        told &= ~np.asarray((weak & self.moves).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[:, None]
-        told &= (~one | told[:, None]).all(axis=2)
         alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
-        # the most exact of each, the first of several
-        rank, lead = (np.argsort(np.argsort(x, axis=1, kind="stable"), axis=1) for x in (size, self.rank))
-        self.chosen |= alone | told & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
-        self.double |= (told & self.edge & ~(one & (lead[:, None] < lead[:, :, None])).any(axis=2)).any(axis=1)
+        told &= ~np.asarray((weak & self.moves).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[:, None]
+        some = np.flatnonzero(told.any(axis=1))
+        if len(some):
+            mine, one = told[some], self.component[self.place[some]] & valid[some, None] & others
+            one &= mine[:, :, None]
+            mine &= (one == one.swapaxes(1, 2)).all(axis=2) & ~(close[some] & ~mine[:, None]).any(axis=2)
+            mine &= (one.sum(axis=2) < 2) & ~one[:, :, 0]
+            mine &= (~one | mine[:, None]).all(axis=2)
+            # the most exact of each, the first of several
+            rank, lead = (np.argsort(np.argsort(x[some], axis=1, kind="stable"), axis=1) for x in (size, self.rank))
+            self.chosen[some] |= mine & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
+            first = ~(one & (lead[:, None] < lead[:, :, None])).any(axis=2)
+            self.double[some] |= (mine & self.edge[some] & first).any(axis=1)
+            told[some] = mine
+        self.chosen |= alone
         self.open &= ~(alone | told)
         self.curve |= alone[:, :, None] & self.which & on[:, :, None]
         self.singular |= (alone & on).any(axis=1)
@@ -342,19 +365,23 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
     q = np.concatenate([near[:, None], np.take_along_axis(seeds.q, order[:, :, None], axis=1)], axis=1)
     label = np.insert(np.take_along_axis(seeds.label, order, axis=1), 0, OWN, axis=1)
     sure = np.pad(np.take_along_axis(seeds.sure, order[:, :, None], axis=1), ((0, 0), (1, 0), (0, 0)))
-    loose = np.take_along_axis(seeds.loose, order, axis=1)
-    flat, goal = q.reshape(-1, n).copy(), np.repeat(target, q.shape[1], axis=0)
-    size = newton.missing(arm, task, flat, goal)
+    loose, simple = (np.take_along_axis(x & there, order, axis=1) for x in (seeds.loose, seeds.simple))
+    simple = np.pad(simple, ((0, 0), (1, 0)))
+    flat, goal = q.reshape(-1, n).copy(), np.repeat(np.arange(K), q.shape[1])
+    size, some = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
+    size[some] = newton.missing(arm, task, flat[some], target[goal[some]])
     own, beyond = np.zeros(q.shape[:2], bool), np.zeros(len(flat), bool)
     own[:, 0] = True
     free = np.flatnonzero(~(own.ravel() | sure.reshape(-1, n).any(axis=1) | (size < CLOSED)))
     if len(free):
         some = free[size[free] < most]
         far = some[size[some] > SOLUTION]
-        beyond[far] = beyond_folds(arm, task, flat[far], goal[far])
+        beyond[far] = beyond_folds(arm, task, flat[far], target[goal[far]])
         some = some[~beyond[some]]
         steps = 40  # towards a root of third order each step goes a third of the way
-        flat[some], size[some] = newton.correct(arm, task, flat[some], goal[some], steps=steps, patience=PATIENCE)
+        flat[some], size[some] = newton.correct(
+            arm, task, flat[some], target[goal[some]], steps=steps, patience=PATIENCE
+        )
     q, size = flat.reshape(K, -1, n), size.reshape(K, -1)
     # `near` is taken as it is, or not at all, or is the posture that stands for a self-motion already
     stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)
@@ -363,10 +390,11 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
     far = beyond.reshape(K, -1)
     out = far.any(axis=1) & (far | (size > most) | np.isnan(q[..., 0]))[:, 1:].all(axis=1)
     rests: Bool = np.zeros(size.shape, bool)
-    lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~sure.any(axis=2), target)
+    lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)
     if (lost.nullity[:, 1:] > 1).any():
         q, label, size, rests = meetings.ways_out(goals, q, label, size, lost.V, lost.nullity, OWN)
         if wider := q.shape[1] - sure.shape[1]:
-            sure = np.pad(sure, ((0, 0), (0, wider), (0, 0)))
-            lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~sure.any(axis=2), target)
-    return _Groups(goals, _Candidates(q, label, size, sure), lost, rests).settled(np.asarray(missed), np.asarray(out))
+            sure, simple = np.pad(sure, ((0, 0), (0, wider), (0, 0))), np.pad(simple, ((0, 0), (0, wider)))
+            lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)
+    at = _Candidates(q, label, size, sure, simple)
+    return _Groups(goals, at, lost, rests).settled(np.asarray(missed), np.asarray(out))

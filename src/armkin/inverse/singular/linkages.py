@@ -31,13 +31,12 @@ class Linkages(NamedTuple):
     """What is known of K targets.
 
     known: (K,) whether all self-motions of loose candidates are; lacking: (K,) more candidates may tell. q: (K, M, n)
-    a posture of each self-motion, else nan; label: (M,) their columns; joints: (K, M, n) those that they move.
+    a posture of each self-motion, else nan; joints: (K, M, n) those that they move.
     """
 
     known: Bool
     lacking: Bool
     q: Array
-    label: Int
     joints: Bool
 
 
@@ -95,7 +94,7 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     listed &= known[:, None]
     q[~listed] = np.nan
     joints = listed[:, :, None] & np.tile(motions.d != 0.0, (1, S, 1))
-    return Linkages(known, lacking | half, q, np.tile(np.arange(B), S), joints)
+    return Linkages(known, lacking | half, q, joints)
 
 
 def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _Motions]:

@@ -44,6 +44,7 @@ SHRINKS = 3  # as often as this
 STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
+SIGNS = np.array([1.0, -1.0])[:, None, None]  # both ways
 SERIES = 0.01  # [rad, reaches] as far as a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
@@ -95,74 +96,91 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
     )
     if rows < n:
         return out
+    w, whole, short = np.zeros((M, n)), out.span.copy(), np.zeros(M, bool)
     if rows == n > 1:
-        _second_order(arm, task, q, target, r, U, S, V, out)
+        w = _second_order(arm, task, q, target, r, U, S, V, out)
+        # first as far as the component goes by the second order, and as far again
+        ends = 2.0 * np.maximum(-out.low, out.high)
+        short = ~out.known & (ends > 0.0) & (2.0 * ends < whole) & (out.second > HIGH)
+        out.span[short], w[~short] = ends[short], 0.0
     left = np.flatnonzero(~out.known)
-    for _ in range(SHRINKS + 1 if len(left) else 0):
-        start = _Curve(q[left], target[left], U[left, :, n - 1 :], V[left, -1], out.span[left])
+    for _ in range(SHRINKS + 2):
+        if not len(left):
+            break
+        start = _Curve(q[left], target[left], U[left, :, n - 1 :], V[left, -1], w[left], out.span[left])
         on, x, g = _polynomials(arm, task, start)
         some = left[on]
         out.x[:, some], out.g[:, some] = x[:, on], g[:, on]
         _decide(out, some)
-        # a component that leaves a span leaves shorter ones, too; and where two directions are all but lost no shorter
-        # curve stays at hand
-        left = left[~out.known[left] & ~on & (out.second[left] > HIGH)]
-        if not len(left):
-            break
-        out.span[left] /= SHRINK
+        # where two directions are all but lost no shorter curve stays at hand; what leaves a span leaves shorter ones
+        left = left[~out.known[left] & (out.second[left] > HIGH) & (short[left] | ~on)]
+        out.span[left] = np.where(short[left], whole[left], out.span[left] / SHRINK)
+        short[left], w[left] = False, 0.0
     return out
 
 
 def _second_order(
     arm: Arm, task: Task, q: Array, target: Array, r: Array, U: Array, S: Array, V: Array, out: Structure
-) -> None:
+) -> Array:
     """Decide those whose curvature does: g = sigma t + b t^2 / 2, |g'' - b| <= third |t| as far as `SERIES`.
 
     x(t) = v t + w t^2 / 2 keeps what the other directions reach to second order; b and w follow from differences
-    close by, third from g at the ends, where what x(t) misses is counted, too. Where sigma^2 > 2 SOLUTION |g''| as far
-    as 2 SOLUTION / sigma, |g| passes `SOLUTION` there without a turn; where sigma^2 < 2 SOLUTION |g''| as far as
-    4 sqrt(SOLUTION / b), it turns before, and passes it on both sides.
+    close by, third from g at the ends, after a step back onto the curve; what that still misses is counted, too.
+    Where sigma^2 > 2 SOLUTION |g''| as far as 2 SOLUTION / sigma, |g| passes `SOLUTION` there without a turn; where
+    sigma^2 < 2 SOLUTION |g''| as far as 4 sqrt(SOLUTION / b), it turns before, and passes it on both sides.
+    Returns w (M, n).
     """
     n, unit, span = arm.n, radian_or_reach(arm), out.span
-    u, v, sigma = U[:, :, -1], V[:, -1], S[:, -1]
+    v, sigma = V[:, -1], S[:, -1]
 
-    def both_ways(h: float, w: Array) -> Array:
+    def both_ways(h: float, w: Array, more: Array) -> Array:
         """The pose's way f (2, M, rows) there and back."""
-        ends = np.concatenate([q + (0.5 * h * h * w + h * v) * unit, q + (0.5 * h * h * w - h * v) * unit])
+        ends = (q + (0.5 * h * h * w + SIGNS * h * v + more) * unit).reshape(-1, n)
         return r - newton.residuals(arm, task, ends, np.concatenate([target, target])).reshape(2, *r.shape)
 
-    bend = both_ways(FOLD_WAY, np.zeros_like(v)).sum(axis=0) / FOLD_WAY**2
+    none = np.zeros((2, *v.shape))
+    bend = both_ways(FOLD_WAY, none[0], none).sum(axis=0) / FOLD_WAY**2
     along = (U * bend[:, :, None]).sum(axis=1)
     b, size = along[:, -1], np.maximum(np.abs(along[:, -1]), TINY)
-    w = -(V[:, :-1] * (along[:, :-1] / np.maximum(S[:, :-1], TINY))[:, :, None]).sum(axis=1)
-    f = both_ways(SERIES, w)
-    g = (f * u).sum(axis=2)
-    off = np.linalg.norm(f - g[:, :, None] * u, axis=2).max(axis=0) / np.maximum(S[:, -2], TINY)
+    inverse = V[:, :-1] / np.maximum(S[:, :-1], WEAK)[:, :, None]
+    w = -(inverse * along[:, :-1, None]).sum(axis=1)
+    rest = (both_ways(SERIES, w, none)[..., None] * U).sum(axis=2)
+    more = -(inverse * rest[:, :, :-1, None]).sum(axis=2)
+    rest = (both_ways(SERIES, w, more)[..., None] * U).sum(axis=2)
+    g, off = rest[:, :, -1], np.linalg.norm(rest[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], TINY)
+    more = np.linalg.norm(more, axis=2).max(axis=0)
     cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * SERIES)
     quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * SERIES**2) + n * SERIES * off
     third = (6.0 * cubic + 12.0 * quartic) / SERIES**3
     far, near = 4.0 * np.sqrt(SOLUTION / size), 2.0 * SOLUTION / np.maximum(sigma, TINY)
     turns = (far < SERIES) & (third * far < 0.2 * size) & (sigma**2 < 2.0 * SOLUTION * (size - third * far))
     alone = (near < SERIES) & (sigma**2 > 2.0 * SOLUTION * (size + third * near))
-    straight = 0.5 * SERIES**2 * np.linalg.norm(w, axis=1) + off < 0.1 * SERIES
+    straight = 0.5 * SERIES**2 * np.linalg.norm(w, axis=1) + more + off < 0.1 * SERIES
     out.known[...] = (turns | alone) & straight & ((r * r).sum(axis=1) < CLOSED**2)
     out.boundary[...] = turns & out.known
     # where |g| is `SOLUTION` first: with the sign of b; and against it, or beyond the turn
     ahead = 2.0 * SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * SOLUTION * size))
     rest = np.sqrt(np.maximum(sigma**2 - 2.0 * SOLUTION * size, 0.0))
-    back = np.where(turns, ahead + 2.0 * sigma / size, 2.0 * SOLUTION / np.maximum(sigma + rest, TINY))
+    back = np.where(
+        sigma**2 < 2.0 * SOLUTION * size, ahead + 2.0 * sigma / size, 2.0 * SOLUTION / np.maximum(sigma + rest, TINY)
+    )
     out.low[...], out.high[...] = np.where(b > 0.0, [-back, ahead], [-ahead, back])
     out.x[1], out.x[2] = v * span[:, None], 0.5 * w * (span**2)[:, None]
     out.g[1, :, 0], out.g[2, :, 0] = sigma * span, 0.5 * b * span**2
+    return np.asarray(w)
 
 
 class _Curve(NamedTuple):
-    """Where M curves begin: q (M, n), target, directions out of reach u (M, rows, k), v (M, n), and span (M,)."""
+    """Where M curves begin: q (M, n), target, directions out of reach u (M, rows, k), v (M, n), and span (M,).
+
+    w: (M, n) second derivative, as far as it is known.
+    """
 
     q: Array
     target: Array
     u: Array
     v: Array
+    w: Array
     span: Array
 
 
@@ -178,7 +196,8 @@ def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Array, Arra
     unit = radian_or_reach(arm)
     bordered = np.zeros((len(t), rows + 1, rows + 1))
     bordered[:, :rows, n:], bordered[:, rows, :n] = start.u[who], start.v[who]
-    away, g, active = t[:, None] * start.v[who], np.full((len(t), k), np.nan), np.arange(len(t))
+    away = t[:, None] * start.v[who] + 0.5 * (t * t)[:, None] * start.w[who]
+    g, active = np.full((len(t), k), np.nan), np.arange(len(t))
     for _ in range(ITERATIONS):
         one = who[active]
         r, bordered[active, :rows, :n] = newton.scaled(arm, task, start.q[one] + away[active] * unit, start.target[one])
