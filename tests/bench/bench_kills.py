@@ -1,6 +1,6 @@
 """Kills of worker, scheduler and client in a batch on Dask: the same bytes, or a told failure and then they.
 
-python tests/bench/bench_kills.py worker|scheduler|client|alike [KILLS=20] [SEED=1]
+python tests/bench/bench_kills.py worker|scheduler|client|alike [KILLS=20] [SEED=1] [ENDING=csv|npz|parquet|jsonl]
 alike: one process, a pool, Dask with one and two workers, the same bytes.
 """
 
@@ -16,12 +16,12 @@ from kills import Cluster, batch, digest, disturbed, rows
 ROWS = 200_000  # seven parts
 
 
-def alike(folder: Path, given: Path, expected: str) -> bool:
+def alike(folder: Path, given: Path, expected: str, ending: str) -> bool:
     """Bytes of the engines."""
     good = True
     for name, more in {"pool of 2": ["--workers", "2"], "Dask, 1 worker": [], "Dask, 2 workers": []}.items():
         cluster = Cluster(folder, 1 + name.endswith("2 workers")) if not more else None
-        out = folder / "other.csv"
+        out = folder / f"other.{ending}"
         process = batch(given, out, *(more if cluster is None else ["--cluster", cluster.address]))
         process.communicate()
         if cluster is not None:
@@ -37,9 +37,10 @@ def main() -> int:
     who = sys.argv[1]
     kills = int(sys.argv[2]) if len(sys.argv) > 2 else 20
     rng = Random(int(sys.argv[3]) if len(sys.argv) > 3 else 1)
+    ending = sys.argv[4] if len(sys.argv) > 4 else "csv"
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        given, one = folder / "in.csv", folder / "one.csv"
+        given, one = folder / "in.csv", folder / f"one.{ending}"
         rows(given, ROWS)
         process = batch(given, one)
         _, err = process.communicate()
@@ -47,11 +48,11 @@ def main() -> int:
             raise subprocess.CalledProcessError(process.returncode, "armkin", stderr=err)
         expected = digest(one)
         if who == "alike":
-            return 0 if alike(folder, given, expected) else 1
+            return 0 if alike(folder, given, expected, ending) else 1
         good = early = redone = 0
         cluster = Cluster(folder, 2)
         for i in range(kills):
-            told = disturbed(given, folder / f"out{i}.csv", expected, who, cluster, rng, ROWS // 32_768)
+            told = disturbed(given, folder / f"out{i}.{ending}", expected, who, cluster, rng, ROWS // 32_768)
             good += told.same
             early += told.killed
             redone += told.redone

@@ -60,7 +60,7 @@ def together(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
                 for part, head in zip(parts(), heads, strict=True):
                     column = head[i].read(part)
                     values = column.texts() if isinstance(column, Words) else column
-                    out.write(values.astype(dtype, copy=False).tobytes())
+                    out.write(np.ascontiguousarray(values, dtype).view(np.uint8).data)
 
 
 def member(name: str) -> zipfile.ZipInfo:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from armkin.formula.arrays import Array
 
 # Turns z and y over: conjugating a joint's motion with it reverses the joint.
+BLOCK = 2_048  # rows of which all arrays fit the cache
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
@@ -103,13 +104,18 @@ def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
 
 def transforms(xyz: Array, rpy: Array) -> Array:
     """As `transform` of each row, to the same bits: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
-    (cr, cp, cy), (sr, sp, sy) = _cos_sin_deg(np.ascontiguousarray(np.moveaxis(rpy, -1, 0)))
-    T = np.zeros((*xyz.shape[:-1], 4, 4))
-    T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
-    T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
-    T[..., 2, 0], T[..., 2, 1], T[..., 2, 2] = -sp, cp * sr, cp * cr
-    T[..., :3, 3], T[..., 3, 3] = xyz, 1.0
-    return T
+    out = np.zeros((*xyz.shape[:-1], 4, 4))
+    every, place, angles = out.reshape(-1, 4, 4), xyz.reshape(-1, 3), rpy.reshape(-1, 3)
+    for start in range(0, len(every), BLOCK):
+        some = slice(start, start + BLOCK)
+        T = every[some]
+        (cr, cp, cy), (sr, sp, sy) = _cos_sin_deg(np.ascontiguousarray(angles[some].T))
+        cysp, sysp = cy * sp, sy * sp
+        T[:, 0, 0], T[:, 0, 1], T[:, 0, 2] = cy * cp, cysp * sr - sy * cr, cysp * cr + sy * sr
+        T[:, 1, 0], T[:, 1, 1], T[:, 1, 2] = sy * cp, sysp * sr + cy * cr, sysp * cr - cy * sr
+        T[:, 2, 0], T[:, 2, 1], T[:, 2, 2] = -sp, cp * sr, cp * cr
+        T[:, :3, 3], T[:, 3, 3] = place[some], 1.0
+    return out
 
 
 def _cos_sin_deg(angles: Array) -> tuple[Array, Array]:
@@ -118,8 +124,8 @@ def _cos_sin_deg(angles: Array) -> tuple[Array, Array]:
     turn.imag = angles * (math.pi / 180)
     np.exp(turn, out=turn)  # of an imaginary number: the C library's cosine and sine
     cosine, sine = turn.real.copy(), turn.imag.copy()
-    quarter, rest = np.divmod(angles, 90.0)
-    exact = rest == 0.0
+    quarter = np.rint(angles / 90.0)
+    exact = 90.0 * quarter == angles
     if exact.any():
         turns = quarter[exact].astype(np.int64) % 4
         cosine[exact] = np.array([1.0, 0.0, -1.0, 0.0])[turns]

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 DEFECTS = 4.0
 HALVES = 12.0
 COARSEST = 5  # digits: a matrix of fewer is no rotation to that many
+BLOCK = 2_048  # rows of which all arrays fit the cache
 FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
 
 
@@ -108,11 +109,11 @@ def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLi
     angles as sums: two of a pose's three may turn about nearly one axis.
     """
     values = np.asarray(values, float).reshape(-1, len(units))
-    if decimals is None:
-        given = np.broadcast_to(_needed(values).max(axis=1, keepdims=True), values.shape)
-    else:
-        given = np.asarray(decimals, int).reshape(values.shape)
-    off = _HALF.take(given, mode="clip")
+    if decimals is None:  # all numbers of a row have as many: there are no more sizes than decimals
+        sizes = printed(units, values[:0], reach, np.repeat(np.arange(MOST)[:, None], len(units), axis=1))
+        blocks = [_needed(values[start : start + BLOCK]).max(axis=1) for start in range(0, len(values), BLOCK)]
+        return np.asarray(sizes[np.concatenate([np.zeros(0, np.intp), *blocks])])
+    off = _HALF.take(np.asarray(decimals, int).reshape(-1, len(units)), mode="clip")
     angles = np.array([unit == "deg" for unit in units])
     scale = np.array([1.0 / reach if unit == "mm" else 1.0 for unit in units])
     turned = np.radians(off[:, angles].sum(axis=1))

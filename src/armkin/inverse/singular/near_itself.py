@@ -86,13 +86,14 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> N
 
     Of those that are known better than to `SOLUTION` there are none: of these `take` has decided.
     """
-    rows = np.flatnonzero(most > ROUNDED)
-    if not len(rows):
-        return rows
+    known = most > ROUNDED
+    if not known.any():
+        return np.flatnonzero(known)
     close = np.broadcast_to(near, (len(target), arm.n))
     tip = position(arm, near)
-    point = target[rows, :3, 3] if task.orientation == "full" else target[rows, : task.position]
-    away = np.abs(point - (tip if tip.ndim == 1 else tip[rows])[..., : task.position]).max(axis=1)
+    point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
+    rows = np.flatnonzero(known & (np.abs(point[:, 0] - tip[..., 0]) <= most * arm.reach))  # tells nearly all others
+    away = np.abs(point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position]).max(axis=1)
     rows = rows[away <= most[rows] * arm.reach]
     rows = rows[~limits.outside(arm, close[rows]).any(axis=1)]
     there: NDArray[np.intp] = rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]]
