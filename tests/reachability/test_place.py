@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import armkin
+from armkin.cli import compiled_ik
 from armkin.errors import NoSolutionError, UsageError
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
@@ -34,6 +35,18 @@ def test_places_are_what_each_says_when_asked_directly(name: str) -> None:
         i, j, k = (int(rng.integers(size)) for size in found.reached.shape)
         at = np.array([found.x[i], found.y[j]])
         assert from_place.legal_from(question, at, float(found.yaw[k])).sum() == found.reached[i, j, k]
+
+
+def test_machine_code_finds_the_same_places(tmp_path: Path) -> None:
+    arm, given = armkin.load("three_dof"), tmp_path / "targets.csv"
+    given.write_text("x,y,z\n600,0,200\n600,300,200\n500,100,900\n")
+    table = np.loadtxt(given, delimiter=",", skiprows=1)
+    for yaw in (np.pi / 6, 1.0):  # by arcs, and yaw by yaw
+        [found] = armkin.place(arm, table, step=100.0, yaw=yaw)
+        [fast] = armkin.place(arm, table, step=100.0, yaw=yaw, solve=compiled_ik.ik)
+        assert (fast.reached == found.reached).all()
+        assert fast.best == found.best
+    assert run("place", "three_dof", given, "--compiled") == run("place", "three_dof", given)
 
 
 def test_a_margin_is_the_distance_to_the_nearest_place_that_does_not_reach_all() -> None:

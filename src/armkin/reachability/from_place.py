@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -24,6 +24,8 @@ from armkin.reachability.standing import Around, free
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
+
+Solve = Callable[["Arm", Array, str], Solutions]  # `armkin.ik` of an arm, targets and a task
 
 BLOCK = 8_192  # targets that are asked together: what is known of them stays in the cache
 BEYOND = 1e-6  # reaches: farther away nothing solves a target
@@ -50,6 +52,7 @@ class Question(NamedTuple):
     spare: str = ""  # the redundant joint, which a path's plan holds,
     values: tuple[float, ...] = ()  # and where it may [rad], the best first
     whole: Held | None = None  # where one of the values is chosen
+    solve: Solve = ik  # a function of a module, as it travels
 
     @property
     def arcs(self) -> bool:
@@ -107,7 +110,8 @@ def each_value(question: Question) -> Iterator[Question]:
         yield question
     for value in question.values:
         whole = Held(question.arm, {question.spare: value})
-        yield question._replace(arm=_rest(question.arm, question.spare, value), values=(), whole=whole)
+        rest = _rest(question.arm, question.spare, value)  # one of many arms: not worth being compiled
+        yield question._replace(arm=rest, values=(), whole=whole, solve=ik)
 
 
 def at_value(question: Question, at: Array, turn: float) -> Question:
@@ -168,8 +172,8 @@ def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDAr
     legal = np.zeros((len(target), K), bool)
     some = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
     if len(some):
-        goals = seen_from(question._replace(targets=question.targets[target[some]]), place[some], 0.0)
-        s = ik(arm, goals, question.task.name)
+        goals = _beside(question._replace(targets=question.targets[target[some]]), place[some])
+        s = question.solve(arm, goals, question.task.name)
         allowed = s.valid & inside(arm, s.q, range(1, arm.n))
         first, length = arc(arm, s.q[:, :, 0], 0, K, question.sense)
         legal[some] = _covered(first, np.where(allowed, length, 0), K)
@@ -180,13 +184,16 @@ def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDAr
 
 def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
     """The same by a solve for each yaw, many together."""
-    turns: Array = np.asarray(np.arange(question.yaws) * question.step, float)
-    legal = _within_reach(question, target, place, turns)
-    row, turn = np.nonzero(legal)
-    for start in range(0, len(row), BLOCK):
-        m, k = row[start : start + BLOCK], turn[start : start + BLOCK]
-        goals = seen_from(question._replace(targets=question.targets[target[m]]), place[m], turns[k])
-        legal[m, k] = ik(question.arm, goals, question.task.name).within_limits.any(axis=1)
+    K, task, legal = question.yaws, question.task.name, np.zeros((len(target), question.yaws), bool)
+    turns: Array = np.asarray(np.arange(K) * question.step, float)
+    cosine, sine = np.cos(turns), np.sin(turns)
+    at_once = max(BLOCK // K, 1)
+    for start in range(0, len(target), at_once):
+        some = slice(start, start + at_once)
+        m, k = np.nonzero(_within_reach(question, target[some], place[some], turns))
+        beside = _beside(question._replace(targets=question.targets[target[some]]), place[some])
+        goals = _turned(question.task, beside[m], turns[k], cosine[k], sine[k])
+        legal[start + m, k] = question.solve(question.arm, goals, task).within_limits.any(axis=1)
     return legal
 
 
@@ -242,7 +249,8 @@ def legal_from(question: Question, at: Array, turn: float) -> NDArray[np.bool_]:
 
 def free_from(question: Question, at: Array, turn: float, within: bool = True) -> tuple[Solutions, NDArray[np.bool_]]:
     """The branches of all targets from one place, and which are free (N, B); within: and within limits."""
-    find = ik if within else isolated  # of a family every posture is an answer, but what one branch carries is another
+    # of a family every posture is an answer, but what one branch carries is another
+    find = question.solve if within else isolated
     s = find(question.arm, seen_from(question, at, turn), question.task.name)
     legal = s.within_limits if within else s.valid
     if question.arm.keep_out:
@@ -254,21 +262,29 @@ def free_from(question: Question, at: Array, turn: float, within: bool = True) -
     return s, np.asarray(legal)
 
 
-def seen_from(question: Question, at: Array, turn: float | Array) -> Array:
-    """The targets in the frame of an arm at a place (2,) and yaw, or each from a place (N, 2) and yaw of its own."""
-    task, targets = question.task, question.targets.copy()
+def seen_from(question: Question, at: Array, turn: float) -> Array:
+    """The targets in the frame of an arm at a place (2,), or each from a place (N, 2) of its own, and a yaw."""
+    return _turned(question.task, _beside(question, at), np.array(turn), np.cos(turn), np.sin(turn))
+
+
+def _beside(question: Question, at: Array) -> Array:
+    """The same of an arm that is not turned."""
+    targets = question.targets.copy()
     shift = np.concatenate([at, np.full((*at.shape[:-1], 1), question.z)], axis=-1)
-    c, s = np.asarray(np.cos(turn)), np.asarray(np.sin(turn))
+    position = positions_of(question.task, targets)
+    position -= shift[..., : position.shape[1]]
+    return targets
+
+
+def _turned(task: Task, targets: Array, turn: Array, c: Array, s: Array) -> Array:
+    """Targets, in place, in a frame turned about z; turn, its cosine and sine: () or (N,)."""
     if task.orientation == "full":
-        targets[:, :3, 3] -= shift
-        _turn_back(targets[:, 0], targets[:, 1], np.expand_dims(c, -1), np.expand_dims(s, -1))
+        _turn_back(targets[:, 0], targets[:, 1], c[..., None], s[..., None])
         return targets
-    k = task.position
-    targets[:, :k] -= shift[..., :k]
     for first in (0, 3) if task.orientation == "axis" else (0,):
         _turn_back(targets[:, first], targets[:, first + 1], c, s)
     if task.name in ("xy_theta", "xyz_yaw"):
-        targets[:, k] -= turn
+        targets[:, task.position] -= turn
     return targets
 
 

@@ -29,13 +29,14 @@ from armkin.columns.table import Table
 from armkin.engines.run import Engine
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
+from armkin.inverse.solve import ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import read_targets
 from armkin.model.lock import unlock
 from armkin.reachability import keeping, planning
 from armkin.reachability.answers import TURN, limit_margin
 from armkin.reachability.cells import STRAIGHT
-from armkin.reachability.from_place import Question, at_value, counted, each_value, free_from, positions_of
+from armkin.reachability.from_place import Question, Solve, at_value, counted, each_value, free_from, positions_of
 from armkin.reachability.planning import Planned
 from armkin.reachability.standing import apart
 
@@ -108,6 +109,7 @@ def place(
     workers: int = 1,
     cluster: str | None = None,
     progress: Callable[[int], None] | None = None,
+    solve: Solve = ik,
 ) -> list[Place]:
     """Where each arm, by itself, reaches the targets (N, m) or (N, 4, 4) [mm, rad] of its task, or carries a path.
 
@@ -116,7 +118,8 @@ def place(
     area: x and y, each from and to [mm], by default the targets' box grown by the arm's reach; step [mm] and yaw [rad]
     of the places; z [mm] of all. scene: keep-outs that stand with the targets. out: what is finished stays beside that
     file until `armkin.reachability.place_file.write` has written it: after a kill it goes on. workers, cluster: see
-    `armkin.reach`; progress gets the positions done.
+    `armkin.reach`; progress gets the positions done. solve: what is asked of an arm, targets and a task, by default
+    `armkin.ik`; one that calls `armkin.compile(arm).ik` is quicker (a function of a module, as it travels).
 
     >>> import armkin
     >>> [found] = armkin.place(armkin.load("three_dof"), [[600, 0, 200], [600, 300, 200]], step=100.0)
@@ -126,7 +129,7 @@ def place(
     several = [arms] if not isinstance(arms, Sequence) else list(arms)
     settings = {"area": area, "step": step, "yaw": yaw, "z": z}
     told = None if progress is None else lambda done, total: progress(done)
-    return each(several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), told)
+    return each(several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), told, solve)
 
 
 def each(
@@ -137,6 +140,7 @@ def each(
     out: str | os.PathLike[str] | None,
     engine: Engine,
     progress: Callable[[int, int], None] | None,
+    solve: Solve = ik,
 ) -> list[Place]:
     """`place` of arms that have their own targets each; settings: area, step, yaw, z; progress: done, of so many."""
     for name in ("step", "yaw"):
@@ -144,6 +148,7 @@ def each(
             raise UsageError(f"{name}: {settings[name]:g}; it must be above 0")
     paths = [planning.path_of(some) for some in targets]
     asked = [_question(arm, some, file, settings, scene) for arm, some, file in zip(arms, targets, paths, strict=True)]
+    asked = [one._replace(solve=solve) for one in asked]
     grids = [_axes(one, settings["area"], settings["step"]) for one in asked]
     work_list: list[Chunk] = []
     for i, (one, (axes, _)) in enumerate(zip(asked, grids, strict=True)):
@@ -235,6 +240,7 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
         [one.arm.sha256, one.around.sha256, digest(one.targets.tobytes()), *one.ways, *one.values] for one in questions
     ]
     asked = {"command": "place", "armkin": __version__, "robots, scene and targets": robots, **settings}
+    asked["solve"] = [f"{one.solve.__module__}.{one.solve.__qualname__}" for one in questions]
     return Parts(os.fspath(out), asked)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import ik_text, inputs, lock_and_sweep, output, piped_answers, render
+from armkin.cli import compiled_ik, ik_text, inputs, lock_and_sweep, output, piped_answers, render
 from armkin.cli.numbers import decimals
 from armkin.cli.options import (
     AllBranches,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.inverse import choose
     from armkin.inverse.answers.closest import Closest as NearestPose
-    from armkin.inverse.answers.solutions import Solutions
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -104,10 +103,8 @@ def ik(
     if compiled and sweep:
         raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
     if compiled:
-        request = replace(request, ik=_compiled, fk=_compiled_poses)
-        import armkin
-
-        armkin.compile(arm)  # before there are processes, which then have it, too
+        request = replace(request, ik=compiled_ik.ik, fk=compiled_ik.fk)
+        compiled_ik.prepare(arm)
     if continuous and batch is None:
         raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
     if batch is not None or (reached is not None and len(reached) > 1):
@@ -165,20 +162,6 @@ def _rounding(arm: Arm, task: Task, values: Array, shown: list[list[int]] | None
     from armkin.inverse.answers import rounding as target_rounding
 
     return target_rounding.printed(units.label_units(task.labels), values, arm.reach, shown)
-
-
-def _compiled(arm: Arm, targets: Array, task: str | None, near: Array, rounding: Array | None = None) -> Solutions:
-    """`armkin.ik` by machine code."""
-    import armkin
-
-    return armkin.compile(arm).ik(targets, task, near, rounding=rounding)
-
-
-def _compiled_poses(arm: Arm, q: Array) -> Array:
-    """`armkin.fk` by machine code."""
-    import armkin
-
-    return armkin.compile(arm).fk(q)
 
 
 @dataclass

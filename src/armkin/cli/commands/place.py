@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from armkin.cli import inputs, output, render
+from armkin.cli import compiled_ik, inputs, output, render
 from armkin.cli.numbers import comma_separated, number
-from armkin.cli.options import Cluster, Json, Scene, Workers
+from armkin.cli.options import Cluster, Compiled, Json, Scene, Workers
 from armkin.errors import NoSolutionError, UsageError
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def place(
     yaw: Annotated[str, typer.Option("--yaw", metavar="DEG", help="From yaw to yaw.")] = "15",
     z: Annotated[str, typer.Option("--z", metavar="MM", help="Height of the places.")] = "0",
     scene: Scene = None,
+    compiled: Compiled = False,
     workers: Workers = 1,
     cluster: Cluster = None,
     out: Annotated[
@@ -62,14 +63,20 @@ def place(
         raise UsageError("--step and --yaw must be above 0")
     bounds = None if area is None else comma_separated(area, ("xmin", "xmax", "ymin", "ymax"), "--area")
     from armkin.engines.run import Engine
+    from armkin.inverse.solve import ik
     from armkin.model.units import DEGREE
     from armkin.reachability.place import each
     from armkin.reachability.place_file import write
 
     settings |= {"area": bounds, "yaw": turn * DEGREE}
     targets = [_targets(arm, words[-1]) for arm in arms] if not _is_path(words[-1]) else [words[-1]] * len(arms)
+    solve = ik
+    if compiled:
+        for arm in arms:
+            compiled_ik.prepare(arm)
+        solve = compiled_ik.ik
     with output.progress("positions") as tick:
-        found = each(arms, targets, settings, scene, out, Engine(workers, cluster), tick)
+        found = each(arms, targets, settings, scene, out, Engine(workers, cluster), tick, solve)
     if out is not None:
         write(found, out)
     if plot is not None:

@@ -66,6 +66,10 @@ class Doubt:
 
     __ror__ = __or__
 
+    def where(self, real: Truth) -> Doubt:
+        """The same, none where it is not real: a joint that would be free there is none of a branch."""
+        return Doubt(self.edge & real, self.free & real)
+
 
 class Candidates(NamedTuple):
     """What a closed form returns: candidate branches, not yet told from false ones.

@@ -21,7 +21,7 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Entry
+from armkin.formula.arrays import Array, Entry, Truth
 from armkin.inverse.closed import quadratics
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import (
@@ -38,7 +38,16 @@ from armkin.inverse.closed.subproblems import (
     spin,
     trig_quadratic,
 )
-from armkin.inverse.numeric.tolerances import EXACT, NEAR, NEARLY_SPECIAL, NO_COEFFICIENT, NO_LENGTH, NO_SIZE, TINY
+from armkin.inverse.numeric.tolerances import (
+    EXACT,
+    NEAR,
+    NEARLY_SPECIAL,
+    NO_COEFFICIENT,
+    NO_LENGTH,
+    NO_SIZE,
+    SEED,
+    TINY,
+)
 from armkin.inverse.tasks.fitting import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain
@@ -208,7 +217,8 @@ class Position:
             arrays.sub(arrays.mul(ay, y[0]), arrays.mul(ax, y[1])),
         )
         second, doubt2 = linear(a, b, right, 1, size, prefer[1])
-        return third, normalised(second), doubt | doubt2
+        # without a real third joint, the nearest one may well bring the tip onto axis 2: nothing is free there
+        return third, normalised(second), doubt | doubt2.where(_solves(alone, third))
 
     def _slide(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         """Joint 2 prismatic: g = y + d2 z."""
@@ -269,6 +279,16 @@ def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
     if third.s is not None:
         return arrays.add(total, arrays.mul(coefficients[2], third.s))
     return total if power == 1 else arrays.add(total, arrays.mul(coefficients[2], third.c * third.c))
+
+
+def _solves(six: list[Entry], third: Pair) -> Truth:
+    """Whether joint 3 is a root of its equation, or nearly one."""
+    third_power = third.s if third.s is not None else third.c * third.c
+    terms = [six[0], arrays.mul(six[1], third.c), arrays.mul(six[2] if third.s is not None else six[3], third_power)]
+    total, size = terms[0], abs(terms[0])
+    for term in terms[1:]:
+        total, size = arrays.add(total, term), arrays.add(size, abs(term))
+    return arrays.absolute(total) <= SEED * size
 
 
 def _form(rows: Array) -> Array:
