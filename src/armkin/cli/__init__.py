@@ -16,6 +16,7 @@ rows.py            many of them in chunks; csv_rows.py: from CSV; pieces.py: sha
 piped_answers.py   answers on standard input; send_goals.py: all that `send` can be told
 default_port.py    the port; board_link.py: an open machine, signals; trace.py: what is said on it
 lerobot_zero.py    `zero --from`
+compiled_ik.py     ik and fk by machine code
 keys.py            keys of a terminal, and whether one is held
 keep_outs.py       radii that are assumed, the scene of a port, hits that are ignored
 

@@ -70,13 +70,12 @@ def place(
 
     settings |= {"area": bounds, "yaw": turn * DEGREE}
     targets = [_targets(arm, words[-1]) for arm in arms] if not _is_path(words[-1]) else [words[-1]] * len(arms)
-    solve = ik
-    if compiled:
-        for arm in arms:
-            compiled_ik.prepare(arm)
-        solve = compiled_ik.ik
+    for arm in arms if compiled else ():
+        compiled_ik.prepare(arm)
     with output.progress("positions") as tick:
-        found = each(arms, targets, settings, scene, out, Engine(workers, cluster), tick, solve)
+        found = each(
+            arms, targets, settings, scene, out, Engine(workers, cluster), tick, compiled_ik.ik if compiled else ik
+        )
     if out is not None:
         write(found, out)
     if plot is not None:

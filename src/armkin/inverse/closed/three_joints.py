@@ -288,7 +288,8 @@ def _solves(six: list[Entry], third: Pair) -> Truth:
     total, size = terms[0], abs(terms[0])
     for term in terms[1:]:
         total, size = arrays.add(total, term), arrays.add(size, abs(term))
-    return arrays.absolute(total) <= SEED * size
+    solves: Truth = arrays.absolute(total) <= SEED * size
+    return solves
 
 
 def _form(rows: Array) -> Array:
