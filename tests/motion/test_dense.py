@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from armkin.errors import UsageError
 from armkin.model.arm import Arm
 from armkin.motion import branch_path, fitting, playback
 from armkin.motion.b_spline import banded
+from armkin.motion.curve import Curve
 from armkin.motion.path_plan import PathPlan
 
 CENTRE = np.array([340.0, 80.0, 300.0])
@@ -266,6 +268,38 @@ def test_blends_that_share_a_side_s_middle_are_planned(three_dof: Arm) -> None:
     assert np.isfinite(plan.duration)
     assert (plan.limits["accel"] <= 1.002).all()
     assert worst_miss(points, tips(plan), 0.05)[0] <= 0.05
+
+
+def test_lines_between_tight_bends_are_as_fast_as_on_a_far_finer_grid(
+    three_dof: Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Slopes told by neighbours within a bend missed by percents, and a line's first interval was a millimetre long."""
+    corners = [[(12.0 if (k + 1) // 2 % 2 else -12.0), 0.45 * (k // 2), 0.0] for k in range(400)]
+    points = CENTRE - [0.0, 60.0, 0.0] + np.array(corners)
+    plan = armkin.path(three_dof, points, corners="tolerance", tool_speed=20.0)
+    for stretch, _ in plan.on_path.values():
+        assert isinstance(stretch, Curve)
+        pace = armkin.jacobian(three_dof, stretch.path.q)[:, :3] @ stretch.path.d[..., None]
+        np.testing.assert_allclose(np.linalg.norm(pace, axis=1), 1.0, atol=1e-4)
+    monkeypatch.setitem(branch_path.stretches.__kwdefaults__, "grid", 8000)
+    fine = armkin.path(three_dof, points, corners="tolerance", tool_speed=20.0)
+    assert on_path(plan) <= 1.004 * on_path(fine)
+    assert plan.limits["accel"].max() <= 1.002
+
+
+def test_dense_points_through_a_wrist_singularity_keep_tolerance_and_limits() -> None:
+    """Beside it joints need not follow what the Jacobian says: neighbours tell the slopes."""
+    arm = armkin.load("puma560")
+    arm = replace(arm, max_speed=np.full(6, 1.6), max_accel=np.full(6, 4.8))
+    q = np.deg2rad([20.0, -60.0, 60.0, 0.0, 0.0, 10.0])
+    across = np.linspace(-20, 20, 41)
+    way = np.tile(armkin.fk(arm, q), (41, 1, 1))
+    way[:, :2, 3] += np.stack([2e-3 * across**2, across], axis=1)
+    plan = armkin.path(arm, way, corners="tolerance", near=q)
+    assert plan.nearest_singularity is not None
+    assert plan.nearest_singularity[1] > 1e4
+    assert plan.deviation <= 0.05
+    assert plan.limits["accel"].max() <= 1.002
 
 
 def test_an_empty_cell_of_blend_or_speed_leaves_it_to_what_is_said_of_all(three_dof: Arm, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ branch_chains.py    how far each carries, and the fewest runs that carry all
 boundary.py         what branches that meet on a boundary make of it
 wrist_turn.py       past a wrist singularity with the tool turned a little; windows.py: where it is
 branch_path.py      the branch that is taken: joint values along the route
-grid.py             exact at grid points, fine enough in between
+grid.py             exact at grid points, fine enough in between; on_route.py: Newton's method there, and slopes
 time_optimal.py     its fastest law of time; time_law.py: the same for joint values given (`armkin.time_law`)
 speed_bounds.py     what bounds it; cubics.py: on a way of cubics; scan.py: passes along it
 hold_cap.py         how fast it may be for a hold on it

@@ -25,7 +25,7 @@ from armkin.motion.hold_cap import hold_cap
 from armkin.motion.joint_steps import change
 from armkin.motion.linked_branches import ENDS, linked
 from armkin.motion.route import Route
-from armkin.motion.time_optimal import Bounds, finer, knots, optimal
+from armkin.motion.time_optimal import Bounds, finer, optimal
 from armkin.motion.wrist_turn import through_wrists
 from armkin.motors import motor_accel
 
@@ -174,11 +174,11 @@ def stretches(
         here = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
         solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
-        path, breaks, off = fine_enough(arm, route, s[here], q[here], a, b, number, kept, run.chain.windows, inner)
+        path, off = fine_enough(arm, route, s[here], q[here], a, b, number, kept, run.chain.windows, inner)
         _check_kept(path, off, pace)
         if made:  # the stop is the same to the last digit
             path.q[0] = made[-1].end
-        made += _timed(arm, route, path if len(inner) else finer(knots(path.s, path.q, breaks)), pace)
+        made += _timed(arm, route, finer(path), pace)
     return made
 
 

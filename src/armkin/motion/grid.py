@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.forward import jacobian, position, tip_and_jacobian
-from armkin.inverse.tasks.residuals import residual, task_jacobian
-from armkin.model.units import radian_or_reach
+from armkin.forward import jacobian, position
 from armkin.motion.cubics import Knots
 from armkin.motion.joint_steps import chord_bound, levers
+from armkin.motion.on_route import DAMPING, corrected, exact_cubics
 from armkin.motion.scan import Int
 from armkin.motion.time_optimal import knots
 
 if TYPE_CHECKING:
-    from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
     from armkin.motion.route import Route
     from armkin.motion.windows import Window
@@ -26,10 +24,10 @@ _ROUNDS = 8  # in which intervals are divided
 _BLOCK = 8192  # points that are looked at together
 _COARSE = 0.05  # [mm] steps are no coarser, if the tolerance is not
 _EACH = (4, 64)  # of a section between two bends, at least, with many sections and with few
-_DAMPING = (2e-4, 0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
+_FEWEST = 2  # of a section where slopes are exact: they need no neighbours
+_GROWTH = 3.0  # of an interval beside the next one, at most: motions speed up and slow down beside bends
+_GROWS = 1.3  # times that: what is hardly longer stays
 _REST = 32  # intervals from rest to rest, at least, where there are many rests
-_SETTLED = 1e-8  # of a Newton step, relative: the next one would be nothing
-_SHORT, _QUADRATIC = 1e-5, 1e-3  # so is it after a short step, by so much shorter than the one before
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
 
@@ -44,24 +42,33 @@ def fine_enough(
     tolerance: float | None,
     windows: tuple[Window, ...] = (),
     stops: Array | None = None,
-) -> tuple[Knots, list[int], Array]:
-    """A grid from length a to b: cubics, numbers of the points where q'' jumps, and how far they may leave the route.
+    exact: bool = True,
+) -> tuple[Knots, Array]:
+    """A grid from length a to b: cubics, and how far they may leave the route.
 
     s, q: samples (N,), (N, n) of the branch. The grid has `number` points, and more in the intervals that may leave
     the route by more than `tolerance` [mm]; None: whatever they do. windows: where the wrist passes a singularity;
-    stops: (k,) lengths at which it rests. The last: (M,) [mm] for each interval.
+    stops: (k,) lengths at which it rests; exact: whether a route of many sections may have the slopes of its targets.
+    The last: (M,) [mm] for each interval.
     """
     stops = np.zeros(0) if stops is None else stops
-    where, breaks = _places(arm, route, s, q, a, b, number, windows, stops)
+    exact = exact and len(route.spans) > 0 and not windows
+    where, breaks = _places(arm, route, s, q, a, b, number, windows, stops, _FEWEST if exact else _EACH[0])
+    if exact:
+        where, breaks = _graded(where, breaks)
     resting = _nearest(where[breaks], stops)
     most = _TIMES * len(where)
-    for damping in _DAMPING:
+    for damping in DAMPING:
         known, before = None, None
         for _ in range(_ROUNDS):
             values = _solved(arm, route, s, q, where, damping, known, windows)
-            path = known = knots(where, values, breaks.tolist(), breaks[resting].tolist())
+            rests = breaks[resting]
+            found = exact_cubics(arm, route, where, values, rests, known) if exact else None
+            if exact and found is None:
+                return fine_enough(arm, route, s, q, a, b, number, tolerance, windows, stops, exact=False)
+            path = known = found or knots(where, values, breaks.tolist(), rests.tolist())
             if tolerance is None:
-                return path, breaks.tolist(), np.zeros(len(path.h))
+                return path, np.zeros(len(path.h))
             every, steps = interval_deviations(arm, route, path, before), _steps(arm, path)
             before = path, every
             off, steps = (np.delete(each, path.rests) for each in (every, steps / max(tolerance, _COARSE)))
@@ -69,11 +76,13 @@ def fine_enough(
                 break
             needed = np.maximum(np.cbrt(off / tolerance), np.sqrt(steps))  # of third and of second order in h
             parts = np.ceil(np.clip(1.15 * needed, 1.0, 6.0)).astype(int)
-            beside = np.maximum(np.append(parts[1:], 1), np.append(1, parts[:-1])) > 2
-            where, breaks = _divided(where, breaks, np.maximum(parts, 1 + beside))
+            if not exact:  # slopes that neighbours tell want even steps
+                beside = np.maximum(np.append(parts[1:], 1), np.append(1, parts[:-1])) > 2
+                parts = np.maximum(parts, 1 + beside)
+            where, breaks = _divided(where, breaks, parts)
         if off.max() <= tolerance:
             break
-    return path, breaks.tolist(), every
+    return path, every
 
 
 def _nearest(sorted_: Array, values: Array) -> Int:
@@ -88,7 +97,7 @@ def _nearest(sorted_: Array, values: Array) -> Int:
 
 def _places(
     arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, windows: tuple[Window, ...],
-    stops: Array,
+    stops: Array, fewest: int,
 ) -> tuple[Array, Int]:  # fmt: skip
     """Grid points that follow way and joints, and which of them are breaks."""
     bends = np.sort(np.concatenate([route.breaks, *([one.begin, one.end] for one in windows)]))
@@ -98,7 +107,7 @@ def _places(
     measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
     at = np.interp(edges, s, measure)
     total = max(float(at[-1] - at[0]), 1e-12)
-    each = int(np.clip(2 * number / (len(edges) - 1), *_EACH))
+    each = int(np.clip(2 * number / (len(edges) - 1), fewest, _EACH[1]))
     share = _MOTION * np.diff(at) / total + (1 - _MOTION) * np.diff(edges) / (b - a)
     least = np.full(len(share), each)
     if len(stops):
@@ -117,6 +126,18 @@ def _places(
     fine = route.spans
     inside = np.diff(np.searchsorted(fine, where))
     return _divided(where, begin[1:], np.where(inside > 1, inside + 1, 1))
+
+
+def _graded(where: Array, breaks: Int) -> tuple[Array, Int]:
+    """Points (N,) with more where an interval is long beside its neighbour; breaks keep their places."""
+    while True:
+        h = np.diff(where)
+        left, right = _GROWTH * np.append(np.inf, h[:-1]), _GROWTH * np.append(h[1:], np.inf)
+        long = np.flatnonzero(h > _GROWS * np.minimum(left, right))
+        if not len(long):
+            return where, breaks
+        at = np.where(left <= right, where[:-1] + left, where[1:] - right)[long]
+        where, breaks = np.insert(where, long + 1, at), breaks + np.searchsorted(long, breaks)
 
 
 def _divided(where: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
@@ -149,66 +170,6 @@ def _solved(
         if inside.any():
             values[inside] = one.joints(arm, route, where[inside], one.copy_of(arm, guess[inside[new]][0]))
     return values
-
-
-def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = _DAMPING[0], steps: int = 6) -> Array:
-    """Joint values near the right ones, made exact by damped Newton steps; those of free joints stay: (N, n).
-
-    damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
-    round for what is within the tolerance anyway.
-    """
-    blocks = [slice(i, i + _BLOCK) for i in range(0, len(q), _BLOCK)]
-    return np.concatenate([_newton(arm, task, q[part], target[part], damping, steps) for part in blocks])
-
-
-def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
-    k, p = len(task.sums), task.position
-    scale = np.ones(p + k + (3 if task.orientation != "none" else 0))
-    scale[:p] = 1 / arm.reach
-    unit = radian_or_reach(arm)
-    each = unit[:, None, None] * scale[:, None]  # (n, k, 1)
-    each[:, p : p + k] *= arm.ratio[:, None, None]
-    out, open_, before = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
-    for _ in range(steps):
-        q, wanted = out[open_], target[open_]
-        T, J = tip_and_jacobian(arm, q)
-        r = np.multiply(residual(task, T, q * arm.ratio, wanted).T, scale[:, None], order="C")
-        J = task_jacobian(task, J, T)
-        step = _damped_steps(np.multiply(J.transpose(2, 1, 0), each, order="C"), r, (damping / arm.reach) ** 2)
-        size = np.abs(step).max(axis=0)
-        step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
-        out[open_] = q + step.T * unit
-        # where a step is so much shorter than the one before, the next one would be nothing
-        going = (size >= _SETTLED) & ((size > _SHORT) | (size > _QUADRATIC * before))
-        open_, before = open_[going], size[going]
-        if not len(open_):
-            break
-    return out
-
-
-def _damped_steps(J: Array, r: Array, damping: float) -> Array:
-    """Solutions x (n, M) of (J'J + damping 1) x = J'r: column by column J (n, k, M), and r (k, M), by Cholesky.
-
-    Over all members at once it takes a fraction of the time of `np.linalg.solve` on small matrices.
-    """
-    n = len(J)
-    x = (J * r).sum(axis=1)
-    L: list[list[Array]] = []
-    for i in range(n):
-        L.append([])
-        for j in range(i + 1):
-            entry = (J[i] * J[j]).sum(axis=0)
-            for above, below in zip(L[i], L[j], strict=False):
-                entry -= above * below
-            L[i].append(np.sqrt(np.maximum(entry + damping, 1e-300)) if i == j else entry / L[j][j])
-        for j in range(i):
-            x[i] -= L[i][j] * x[j]
-        x[i] /= L[i][i]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            x[i] -= L[j][i] * x[j]
-        x[i] /= L[i][i]
-    return np.asarray(x)
 
 
 def deviation(arm: Arm, route: Route, path: Knots) -> float:

@@ -16,8 +16,8 @@ from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian
 from armkin.motion.branch_chains import Chain
 from armkin.motion.branch_columns import Columns
-from armkin.motion.grid import corrected
 from armkin.motion.joint_steps import change
+from armkin.motion.on_route import corrected
 from armkin.motion.windows import Window
 
 if TYPE_CHECKING:

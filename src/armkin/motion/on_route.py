@@ -1,0 +1,140 @@
+"""Joint values that solve a route exactly, and their slopes along it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array
+from armkin.forward import tip_and_jacobian
+from armkin.inverse.tasks.residuals import residual, task_jacobian
+from armkin.model.units import radian_or_reach
+from armkin.motion.cubics import Knots
+from armkin.motion.scan import Int
+
+if TYPE_CHECKING:
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+    from armkin.motion.route import Route
+
+DAMPING = (2e-4, 0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
+_BLOCK = 8192  # points that are looked at together
+_SETTLED = 1e-8  # of a Newton step, relative: the next one would be nothing
+_SHORT, _QUADRATIC = 1e-5, 1e-3  # so is it after a short step, by so much shorter than the one before
+_ASIDE = 1e-6  # [mm] along the route, to the target that tells a slope
+_TELLING = 0.02  # [mm/rad] damping of slopes: rounding is multiplied little
+_LOST = 1e-5  # of a slope: where damping takes more a singularity is near
+
+
+def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = DAMPING[0], steps: int = 6) -> Array:
+    """Joint values near the right ones, made exact by damped Newton steps; those of free joints stay: (N, n).
+
+    damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
+    round for what is within the tolerance anyway.
+    """
+    blocks = [slice(i, i + _BLOCK) for i in range(0, len(q), _BLOCK)]
+    return np.concatenate([_newton(arm, task, q[part], target[part], damping, steps) for part in blocks])
+
+
+def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
+    unit = radian_or_reach(arm)
+    out, open_, before = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
+    for _ in range(steps):
+        q = out[open_]
+        T, J = _scaled(arm, task, q)
+        r = _missed(arm, task, T, q, target[open_])
+        step = _damped_steps(J, r, (damping / arm.reach) ** 2)
+        size = np.abs(step).max(axis=0)
+        step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
+        out[open_] = q + step.T * unit
+        # where a step is so much shorter than the one before, the next one would be nothing
+        going = (size >= _SETTLED) & ((size > _SHORT) | (size > _QUADRATIC * before))
+        open_, before = open_[going], size[going]
+        if not len(open_):
+            break
+    return out
+
+
+def _scale(arm: Arm, task: Task) -> Array:
+    """What a unit of each of the task's rows counts: (k,)."""
+    scale = np.ones(task.position + len(task.sums) + (3 if task.orientation != "none" else 0))
+    scale[: task.position] = 1 / arm.reach
+    return scale
+
+
+def _scaled(arm: Arm, task: Task, q: Array) -> tuple[Array, Array]:
+    """The tool's poses (M, 4, 4), and the task's Jacobians without units, column by column: (n, k, M)."""
+    k, p, scale = len(task.sums), task.position, _scale(arm, task)
+    each = radian_or_reach(arm)[:, None, None] * scale[:, None]  # (n, k, 1)
+    each[:, p : p + k] *= arm.ratio[:, None, None]
+    T, J = tip_and_jacobian(arm, q)
+    return T, np.multiply(task_jacobian(task, J, T).transpose(2, 1, 0), each, order="C")
+
+
+def _missed(arm: Arm, task: Task, T: Array, q: Array, target: Array) -> Array:
+    """What is missing to the targets, without units: (k, M)."""
+    return np.multiply(residual(task, T, q * arm.ratio, target).T, _scale(arm, task)[:, None], order="C")
+
+
+def _damped_steps(J: Array, r: Array, damping: float) -> Array:
+    """Solutions x (n, M) of (J'J + damping 1) x = J'r: column by column J (n, k, M), and r (k, M), by Cholesky.
+
+    Over all members at once it takes a fraction of the time of `np.linalg.solve` on small matrices.
+    """
+    n = len(J)
+    x = (J * r).sum(axis=1)
+    L: list[list[Array]] = []
+    for i in range(n):
+        L.append([])
+        for j in range(i + 1):
+            entry = (J[i] * J[j]).sum(axis=0)
+            for above, below in zip(L[i], L[j], strict=False):
+                entry -= above * below
+            L[i].append(np.sqrt(np.maximum(entry + damping, 1e-300)) if i == j else entry / L[j][j])
+        for j in range(i):
+            x[i] -= L[i][j] * x[j]
+        x[i] /= L[i][i]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= L[j][i] * x[j]
+        x[i] /= L[i][i]
+    return np.asarray(x)
+
+
+def exact_cubics(arm: Arm, route: Route, where: Array, q: Array, rests: Int, known: Knots | None) -> Knots | None:
+    """Cubics through joint values q (N, n) that solve the route at lengths `where` (N,), with its own slopes.
+
+    rests: numbers of the points at which the path rests: these stand twice. known: such cubics on some of the points.
+    None: beside a singularity the joints need not follow all that the targets do.
+    """
+    twice = np.sort(np.concatenate([np.arange(len(where)), rests]))
+    s, values = where[twice], q[twice]
+    d, new = np.empty_like(values), np.ones(len(s), bool)
+    if known is not None:
+        old = np.searchsorted(s, known.s)
+        old += np.diff(known.s, prepend=-1.0) == 0
+        d[old], new[old] = known.d, False
+    ends = np.append(twice[1:] == twice[:-1], True)  # the slope there is that of the way before it
+    number = np.flatnonzero(new)
+    for part in (number[i : i + _BLOCK] for i in range(0, len(number), _BLOCK)):
+        found = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_ASIDE, _ASIDE))
+        if found is None:
+            return None
+        d[part] = found
+    return Knots(s, values, d)
+
+
+def _slopes(arm: Arm, route: Route, s: Array, q: Array, aside: Array) -> Array | None:
+    """dq/ds (M, n) of J dq = dx, by what misses to the targets a little aside; None: J is singular, or nearly."""
+    if arm.n > len(_scale(arm, route.task)):
+        return None
+    T, J = _scaled(arm, route.task, q)
+    there = s + aside
+    here, beside = (_missed(arm, route.task, T, q, route.targets(x)) for x in (s, there))
+    rate = (beside - here) / (there - s)
+    d = _damped_steps(J, rate, (_TELLING / arm.reach) ** 2)
+    lost = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)
+    if not (lost <= _LOST * np.abs(rate).max(axis=0)).all():
+        return None
+    return np.asarray(d.T * radian_or_reach(arm))
