@@ -164,10 +164,19 @@ def test_a_queue_that_runs_dry_stops_in_time(brake: float) -> None:
     assert abs(status.counts[1]) < 2500
 
 
+def test_a_slow_arm_stands_where_its_queue_ends() -> None:
+    host = ready()
+    assert host.move([0, 1], [0, 0], [whole(640, 8000, 0, (640, -320))], at_rest=False) == Error.OK  # u = 10 ms
+    host.board.advance(0.4)
+    status = host.status()
+    assert (status.error, status.state, status.known) == (Error.DRY, State.IDLE, 7)
+    assert status.counts[:2] == (640, -320)
+
+
 def test_a_queue_that_ends_abruptly_is_lost() -> None:
     host = ready()
     assert host.move([0, 1], [0, 0], CRUISE[:1], at_rest=False) == Error.OK
-    host.board.motors.queue.dry = lambda u: False  # type: ignore[method-assign]  # a board too busy to notice in time
+    host.board.motors.queue.dry = lambda u, **_: False  # type: ignore[method-assign]  # a board too busy to notice in time
     host.board.advance(0.2)
     status = host.status()
     assert (status.error, status.state, status.known) == (Error.DRY, State.IDLE, 4)

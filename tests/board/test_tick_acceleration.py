@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from armkin.board.firmware import straight_lines
 from armkin.board.firmware.protocol import BLOCK, HALF, STEP, AxisImage, Image, Segment
 from armkin.board.firmware.straight_lines import Pieces
+from armkin.board.firmware.streaming import later
 from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
 from armkin.board.sim.frames import RefusedError
 from armkin.board.sim.velocity import Velocity, times_valid
@@ -34,6 +35,12 @@ def intervals(s: Segment) -> NDArray[np.float64]:
     return np.asarray(s.interval + np.concatenate([[0], np.cumsum(add >> 8)[:-1]]) / 65536)
 
 
+def unheard(cut: list[Segment]) -> float:
+    """Cycles by which a line is ahead of its law, as nobody can tell before its first step."""
+    first = cut[0]
+    return 0.0 if first.add or any(first.steps) else first.ticks * first.interval * (1 / straight_lines.UNHEARD - 1)
+
+
 def leaders_limits(cut: list[Segment], law: Profile, steps: int, axis: int, clock: int) -> tuple[float, float, float]:
     """Greatest speed and acceleration at a tick, as shares of the law's; greatest jump between segments, in its bound.
 
@@ -42,7 +49,8 @@ def leaders_limits(cut: list[Segment], law: Profile, steps: int, axis: int, cloc
     """
     top, accel = law.peak * steps / law.length, law.accel * steps / law.length
     first = math.sqrt(1 / accel)  # half a step from rest
-    now, before, speed, most, jump = 0.0, 0.0, 0.0, 0.0, 0.0
+    now = unheard(cut)
+    before, speed, most, jump = 0.0, 0.0, 0.0, 0.0
     for s in cut:
         cycles, rate = intervals(s), abs(s.rates[axis])
         v = rate / STEP / cycles * clock
@@ -123,14 +131,19 @@ def test_fewer_pieces_keep_to_their_bound(pieces: Pieces, most: float) -> None:
         assert leaders_limits(list(move.segments), law, n, 0, 16_000_000)[1] <= most
 
 
-def refused(end: list[int], rate: float, accel: float) -> str:
-    """What the board says of a line from 0 that just keeps to its motors' bounds; n: counts/s and /s^2 of the first."""
+def refused(end: list[int], rate: float, accel: float, pause: float = 0.0) -> str:
+    """What the board says of a line from 0 that just keeps to its motors' bounds; n: counts/s and /s^2 of the first.
+
+    pause: [s] that it waits for its queue in the segment before its first step, if it has one.
+    """
     n = end[0]
     bounds = [[max(1, math.ceil(most * abs(x) / n)) for x in end] for most in (rate * 1.05, accel)]
     images = [AxisImage(True, False, -n, n, 0, v, a) for v, a in zip(*bounds, strict=True)]
     velocity = Velocity(BOARDS["uno_cnc_shield"]._replace(min_interval=448), Image(tuple(images)))
     try:
-        for s in straight_lines.line([0] * len(end), end, rate / n, accel / n, min_interval=448).segments:
+        cut = list(straight_lines.line([0] * len(end), end, rate / n, accel / n, min_interval=448).segments)
+        cut[0] = later(cut[0], pause, 16_000_000) or cut[0]
+        for s in cut:
             if not times_valid(s, 448):
                 return f"INTERVAL {s}"
             velocity.begin(s)
@@ -170,7 +183,8 @@ def test_the_board_takes_random_lines() -> None:
         if k % 5 == 0:  # next to no cruise
             rate = min(math.sqrt(accel * n) * rng.uniform(0.98, 1.001), 16e6 / 448)
         end = [n, int(n * rng.uniform(-1, 1)), int(n * rng.uniform(-1, 1) * 10 ** rng.uniform(-3, 0))]
-        assert refused(end, rate, accel) == "", (end, rate, accel)
+        pause = 10 ** rng.uniform(-3, -1.3)
+        assert refused(end, rate, accel, pause) == "", (end, rate, accel, pause)
 
 
 def crude(seconds: float, share: float, within: float) -> bool:

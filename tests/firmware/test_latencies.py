@@ -48,8 +48,8 @@ def test_short_moves_lose_no_byte(monkeypatch: pytest.MonkeyPatch, load: float, 
         assert (spilled, machine.session.line.resent, stats["uart"]["overruns"], machine.status.bad) == (0, 0, 0, 0)
 
 
-def test_a_plan_begins_within_10_ms_of_the_first_byte(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The law's own first step follows 8.4 ms later: half a step from rest."""
+def test_the_first_step_comes_within_10_ms_of_the_first_byte(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The law has it 8.4 ms after rest; until then no motor tells how it got there, and the board lets it be sooner."""
     monkeypatch.setattr(streaming, "_load", lambda session: 0.0)
     with EmulatedBoard(speed="step", reset_on_open=False, trace=True) as board:
         port = SteppedPort(board, 0.0005)
@@ -57,12 +57,10 @@ def test_a_plan_begins_within_10_ms_of_the_first_byte(monkeypatch: pytest.Monkey
         machine = Machine(port, ARM, configure(ARM))
         machine.prepare(assume=ARM.home)
         plan = machine.plan(machine.counts(), np.deg2rad([-3, 0.5, -0.5]))
-        law = plan.trajectory.stretches[0].law  # type: ignore[attr-defined]
-        own = np.sqrt(law.length / law.accel / np.abs(plan.end - plan.start).max())
         port.wait(0.03)
         begin = board.control("cycles")["cycle"]
         machine.run([plan])
         trace = board.trace()
         arrived, _ = trace.edges("uart.in")
         step = min(trace.rises(f"{axis}.STEP")[0] for axis in "XYZ")
-        assert 0.005 < (step - arrived[arrived > begin][0]) / board.clock_hz - own < 0.01
+        assert 0.005 < (step - arrived[arrived > begin][0]) / board.clock_hz < 0.01

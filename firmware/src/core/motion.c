@@ -17,6 +17,7 @@ static uint8_t pace;
 
 static const float STANDING = 1.0F;   // ms: u at which a hold stands still
 static const float TOO_FAST = 30.0F;  // ms: u from which an abrupt stop loses steps
+static const float SLOW = 24.0F;      // ms: u below which the arm may stand where its queue ends
 static const float UNIT_MS = 256e3F / CLOCK;
 
 #define SHARED(x) (*(volatile __typeof__(x) *)&(x))  // the interrupt changes it
@@ -272,9 +273,10 @@ void motion_stop(void) {
     hold_speed = stop_time(s, interval);
 }
 
-// The queue must always hold the time that a stop takes: on a path that slows down by itself, a stop takes all of it.
+// The queue must always hold the time that a stop takes: on a path that slows down by itself, a stop takes all of it. A slow arm needs
+// none: it may begin before the queue is full.
 static bool running_dry(const struct segment *s, uint16_t left, uint16_t interval) {
-    if (motion.ended) {
+    if (motion.ended || (motion.state == MOVING && speed < SLOW)) {
         return false;
     }
     const uint32_t rest = queued_units - motion_units(s) + span(left, interval, last_interval(s));

@@ -205,6 +205,17 @@ static void an_unfinished_queue_is_a_hold(uint8_t flags) {
     CHECK(abs(bench_pins[0] + 2 * bench_pins[1]) <= 2);
 }
 
+static void a_slow_arm_stands_where_its_queue_ends(void) {
+    // 320 ms at 2 kHz without END, u = 10 ms
+    fresh(9);
+    const struct host_segment s = {.ticks = 640, .interval = CLOCK / 2000, .steps = {640, -320}};
+    CHECK(host_motion(3, HOST_WIDE, home_counts, 1, &s).error == OK);
+    host_wait_idle(1000);
+    const struct status status = host_status(0);
+    CHECK(status.ack.error == E_DRY && status.known == ALL_AXES && pins_are(status.counts));
+    CHECK(bench_pins[0] == 640 && bench_pins[1] == -320);
+}
+
 static void an_abrupt_end_at_speed_loses_the_position(void) {
     // the main loop hangs until the queue has run out at u = 50 ms: no path to brake on
     fresh(6);
@@ -255,6 +266,7 @@ void test_holds(void) {
     a_gentle_hold_does_not_outlast_the_queue();
     an_unfinished_queue_is_a_hold(0);
     an_unfinished_queue_is_a_hold(HOST_GENTLE);
+    a_slow_arm_stands_where_its_queue_ends();
     an_abrupt_end_at_speed_loses_the_position();
     a_hold_is_obeyed_in_every_phase_of_a_segment();
 }

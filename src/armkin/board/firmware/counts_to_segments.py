@@ -97,12 +97,14 @@ class Cutter:
         change: float = 0.0,
         drift: float = _DRIFT,
         make_up: float | None = None,
+        unheard: bool = False,
     ) -> Segment:
         """A straight line to `counts` (motors,), fractions included, in so many seconds.
 
         change: speed at its end less that at its beginning, over the mean: -2 to 2. The speed changes evenly.
         drift: steps that a motor may be off at its end, for the next piece to make up for. make_up: the share of its
-        own way by which a motor makes up for the pieces before, at most; None: all.
+        own way by which a motor makes up for the pieces before, at most; None: all. unheard: no motor makes a step in
+        it, so that the short form will do.
         """
         aims = [round(c * STEP) + HALF for c in counts]
         owed = [before - place for before, place in zip(self._aims, self.places, strict=True)]
@@ -114,7 +116,10 @@ class Cutter:
         self._aims = aims
         most = max(map(abs, left), default=0) / STEP  # steps of the fastest motor
         exact = seconds * self.clock + self.late
-        if abs(change) < _STEADY:
+        if unheard:
+            ticks = self._ticks(exact, most)
+            segment = Segment(ticks, round(exact / ticks), 0, tuple(round(x / ticks / COARSE) * COARSE for x in left))
+        elif abs(change) < _STEADY:
             segment = self._steady(exact, left, most, drift)
         else:
             segment = self._ramp(exact, left, most, change)

@@ -26,7 +26,11 @@ _RAMP, _SHORT, _ROUGH = 27, 13, 12  # segments of a ramp at most, see `Pieces`
 _WIDEST = 1.4  # ratio, from where the first segment gets longer instead: the board takes 5/4 of the acceleration
 _FIRST, _FIRST_ROUGH = 0.003, 0.03  # [s] a ramp's first segment at least, and four times what any other lasts at least
 _FIRST_MOST = 0.1  # [s] the same at most: the board lets a speed jump by what 50 ms of 5/4 of the acceleration make
-_BEFORE_STEP = 0.9  # of the time to its first step: until then no motor tells how it got there
+_BEFORE_STEP = 0.96  # of the time to its first step: until then no motor tells how it got there
+_NO_STEP = 0.49  # steps: what is left for rates' rounding
+# Of its time, that such a first segment takes, at once at the speed that 1.2 of the acceleration makes in it; the
+# board's bound is 5/4. All edges come so much sooner, as far from one another as in the time law.
+UNHEARD = math.sqrt(1 / 2.4)
 _CRUISE = (0.2, 0.4)  # [s] a cruise segment
 _JERK = 0.02  # [s] a segment in which the acceleration changes
 _SPLIT = 0.08  # [s] a cruise segment whose end is one of its own
@@ -83,6 +87,7 @@ class LineSegments:
         """The segments in order."""
         law, span, steps = self.law, self.end - self.start, self._steps
         cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
+        unheard = law.is_trapezoid
         for times, ending in _on_steps(law, _bounds(law, steps, self.pieces), steps):
             done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
             if ending:
@@ -92,7 +97,10 @@ class LineSegments:
                 counts = (self.start + span * done[k + 1]).tolist()
                 drift = _SPARE * steps * float(done[k + 1] - done[k])
                 last = ending and k + 2 == len(times)
-                yield cutter.piece(b - a, counts, change, drift, None if last else _MAKE_UP)
+                unheard = unheard and float(done[k + 1]) * steps < _NO_STEP
+                seconds = (b - a) * (UNHEARD if unheard else 1.0)
+                yield cutter.piece(seconds, counts, change, drift, None if last else _MAKE_UP, unheard)
+                unheard = False
         if [p // STEP for p in cutter.places] != self.end.tolist():
             raise AssertionError("a line's rates do not lead to its end")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from armkin.board.firmware.go_back_n import QUESTION
 from armkin.board.firmware.motion_frame import Batch, motion_size
 from armkin.board.firmware.protocol import Error, Segment, State, Status
 from armkin.board.firmware.reply_checks import DeviceError
-from armkin.board.firmware.straight_lines import Pieces
+from armkin.board.firmware.straight_lines import UNHEARD, Pieces
 
 if TYPE_CHECKING:
     from armkin.board.backend import Progress
@@ -27,16 +28,17 @@ _LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.05
 _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
 _TICK = 20_000  # [cycles] of that pause, at most
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
-_MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop
+_MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop,
+_SLOW = 0.024  # [s] from where on that is
 _TWICE = 1 + 33 / 32  # [s] of motion that each second since rest wants in the queue
-_FIRST = 0.01  # [s] of a motion in its first frame, at least
+_UNHEARD_MOST = 0.045  # [s] of a segment before the first step, in which the arm may wait for its queue: the board
+_INTERVAL = 50_000  # takes a jump of speed for the time of 50 ms; [cycles] of its intervals, at most
 _SEEN = 64  # segments of a beginning, whose way to the board is reckoned: both ramps of a short move
-_STARTING = (
-    (2, 3, 3, 3, 4),
-    (2, 3, 4),
-)  # segments of its first frames: short ones are there soon, few need few acks
+# Segments of a motion's first frames: a short one is there soon, those behind it last a while.
+_STARTING = ((1, 3, 3, 4, 4), (1, 4, 3, 6, 3), (1, 4, 4, 6, 3), (1, 5, 5, 6, 3), (1, 6))
 _FAR = 0.005  # [s] of the slowest answer, from where on the queue is too short to wait for credit in a short move
-_BUSY = 0.0005  # [s] that a board is busy with a segment
+_BUSY = 0.0003, 0.0005  # [s] that a board is busy with a frame, and with a segment of it,
+_BETWEEN = 2.2  # times that between ticks
 _ACK = 16  # [bytes] of an answer
 _BEGUN = 0.1  # [s] after its longest pause, until which a motion that has made no step may begin again
 
@@ -179,33 +181,47 @@ def _others_running() -> int:
         return 0
 
 
-def lead(session: Session, frames: Sequence[tuple[float, int, int]], least: float = 0.0) -> float:
+def lead(session: Session, frames: Sequence[tuple[float, int, int]], least: float = 0.0, unheard: float = 0.0) -> float:
     """Seconds that the arm stands before a motion, at least `least`, so that the queue does not run dry.
 
-    frames: the first of the motion: seconds, segments and bytes on the line of each.
+    frames: the first of the motion: seconds, segments and bytes on the line of each. unheard: [s] of them before
+    the first step.
     """
     busy = next((seconds for load, seconds in _LEAD_BUSY if _load(session) > load), 0.0)
     bad = _LEAD_BAD if session.line.damaged else 0.0
-    return max(least, busy, bad, min(_LEAD + _behind(session, frames), _LEAD_MOST))
+    return max(least, busy, bad, min(_LEAD + _behind(session, frames, unheard), _LEAD_MOST))
 
 
-def _behind(session: Session, frames: Sequence[tuple[float, int, int]]) -> float:
-    """Seconds by which a frame would come too late, at most, if the motion began with the first.
+def _there(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> list[float]:
+    """When the board has queued each of these frames, in seconds from the first one's first byte.
 
-    Two frames are on their way at a time; the board's queue holds the time to a stop at any moment (section 7), which
-    from rest is at most the time since then.
+    Two frames are on their way at a time; between ticks, behind the `unheard` seconds, the board is slower.
     """
     bit = 10 / session.port.baud
-    free = behind = 0.0  # free: when the line is
-    there: list[float] = []  # when the board has them
-    done = 0.0  # [s] of motion in all before a frame
-    for k, (seconds, segments, size) in enumerate(frames):
+    free = moves = 0.0  # free: when the line is; moves: when the arm does
+    there = list[float]()
+    for k, (_, segments, size) in enumerate(frames):
         may = there[k - 2] + session.line.slowest + _ACK * bit if k > 1 else 0.0
         free = max(free, may) + size * bit
-        there.append(max(free, there[-1] if there else 0.0) + segments * _BUSY)
+        begins = max(free, there[-1] if there else 0.0)
+        ends = begins + _BUSY[0] + segments * _BUSY[1]
+        there.append(ends + (_BETWEEN - 1) * max(0.0, ends - max(begins, moves)) if k else ends)
+        moves = moves or ends + _LEAD + unheard
+    return there
+
+
+def _behind(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> float:
+    """Seconds by which a frame would come too late, at most, if the motion began with the first.
+
+    The board's queue holds the time to a stop at any moment (section 7), which from rest is at most the time since then
+    in which the arm would have speeded up evenly; a slow arm's need only not be empty.
+    """
+    there, ahead = _there(session, frames, unheard), unheard * (1 / UNHEARD - 1)
+    behind = done = 0.0  # done: [s] of motion in all before a frame
+    for k, (seconds, _, _) in enumerate(frames):
         if k:
-            spare = done - _SPARE
-            behind = max(behind, there[k] - there[0] - (spare / _TWICE if spare > 0 else spare))
+            stops = (done - _SPARE - ahead * (_TWICE - 1)) / _TWICE
+            behind = max(behind, there[k] - there[0] - min(done, max(_SLOW - ahead, stops)))
         done += seconds
     return behind
 
@@ -229,17 +245,16 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
     places = [count * protocol.STEP + protocol.HALF for count in at]
     source = (s.of(moving) for s in move.segments)
     todo: list[Segment] = list(islice(source, _SEEN))
-    pause, sizes = min(  # of the first frames of a motion from rest
-        (lead(session, _first_frames(todo, sizes, room, clock), least), list(sizes))
-        for sizes in ([(_BATCH[0],)] if line.noisy else _STARTING)
-    )
+    pause, sizes = _start(session, todo, room, clock, least) if todo else (0.0, list[int]())
     begins = not line.damaged and _left(session) >= pause  # behind a rest, which may wait for room
-    if todo and not begins:
-        pause = max(pause, _FIRST - _seconds(todo[: sizes[0] - 1], clock))
+    if begins:
+        sizes = []
+    elif todo and (longer := later(todo[0], pause, clock)):
+        todo[0] = longer
+    elif todo:
         ticks = math.ceil(pause * clock / _TICK)
         todo.insert(0, Segment(ticks, math.ceil(pause * clock / ticks), 0, (0,) * len(moving)))
-    else:
-        sizes = []
+        sizes[0] += 1
     while todo := todo + list(islice(source, max(0, _BATCH[1] + 1 - len(todo)))):
         fits = _BATCH[1] if begins else max(_BATCH[0], session.pending[1])  # more would wait for room
         most = sizes.pop(0) if sizes else _BATCH[0] if line.noisy else min(fits, _BATCH[1])
@@ -270,14 +285,39 @@ def _fit(todo: Sequence[Segment], most: int, room: int) -> int:
     return n
 
 
-def _first_frames(todo: Sequence[Segment], sizes: Sequence[int], room: int, clock: int) -> list[tuple[float, int, int]]:
-    """The first frames of a motion from rest, behind a pause: seconds, segments and bytes of each."""
+def _unheard(first: Segment) -> bool:
+    """Whether a motion's first segment makes no step: how long it lasts nobody can tell."""
+    return first.add == 0 and not any(first.steps)
+
+
+def later(first: Segment, pause: float, clock: int) -> Segment | None:
+    """The first segment of a motion, `pause` seconds longer for one in front of it; None where that would be felt."""
+    interval = first.interval + math.ceil(pause * clock / first.ticks)
+    fits = interval <= _INTERVAL and first.ticks * interval < _UNHEARD_MOST * clock
+    return replace(first, interval=interval) if fits and _unheard(first) else None
+
+
+def _start(session: Session, todo: Sequence[Segment], room: int, clock: int, least: float) -> tuple[float, list[int]]:
+    """How long the arm stands before a motion from rest, and the segments of its first frames: it begins soonest so."""
+    ways = list[tuple[float, float, list[int]]]()
+    unheard = _seconds(todo[:1], clock) if _unheard(todo[0]) else 0.0
+    for sizes in [(_BATCH[0] - 1,)] if session.line.noisy else _STARTING:
+        frames = _first_frames(todo, sizes, room, clock, paused=not unheard)
+        pause = lead(session, frames, least, unheard)
+        ways.append((_there(session, frames, unheard)[0] + pause, pause, list(sizes)))
+    return min(ways)[1:]
+
+
+def _first_frames(
+    todo: Sequence[Segment], sizes: Sequence[int], room: int, clock: int, *, paused: bool
+) -> list[tuple[float, int, int]]:
+    """The first frames of a motion from rest, behind a pause or not: seconds, segments and bytes of each."""
     frames, at = list[tuple[float, int, int]](), 0
     while at < len(todo):
         most = sizes[len(frames)] if len(frames) < len(sizes) else _BATCH[1]
-        n = max(1, _fit(todo[at:], most - (at == 0), room))
-        part = todo[at : at + n]
-        size = motion_size(len(part[0].rates), part) + 6 + (at == 0) * 17
-        frames.append((_seconds(part, clock), n + (at == 0), size))
+        n = max(1, _fit(todo[at:], most, room))
+        part, more = todo[at : at + n], paused and at == 0
+        size = motion_size(len(part[0].rates), part) + 6 + more * 17
+        frames.append((_seconds(part, clock), n + more, size))
         at += n
     return frames

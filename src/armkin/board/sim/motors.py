@@ -105,7 +105,7 @@ class Motors:
             if self.state == State.MOVING and self.queue.dry(self.queue.stop_time()):
                 self._fault(Error.DRY)
         elif self.state == State.HOLDING:
-            if self.queue.dry(self._hold):
+            if self.queue.dry(self._hold, holding=True):
                 self._brake = 1.0
             self._hold -= seconds * self._brake
             plan = self.queue.stop_time()

@@ -12,6 +12,7 @@ from armkin.board.firmware.protocol import HALF, STEP, Segment
 from armkin.board.sim.axes import Axes
 
 _TOO_FAST = 0.030  # [s] time to a stop from which an abrupt stop loses steps
+_SLOW = 0.024  # [s] the same, below which the arm may stand where its queue ends
 
 
 def intervals(s: Segment) -> Iterator[int]:
@@ -127,9 +128,9 @@ class Queue:
         limits = zip(now.segment.rates, self.axes.image.axes, strict=True)
         return max((abs(n) * rate / axis.max_accel for n, axis in limits if n), default=0.0)
 
-    def dry(self, u: float) -> bool:
+    def dry(self, u: float, *, holding: bool = False) -> bool:
         """Whether what is left is just enough for a stop that takes u seconds, and does not end at rest."""
-        if not self._queue or self._queue[-1].end:
+        if not self._queue or self._queue[-1].end or (u < _SLOW and not holding):
             return False
         rest = self._units * 256 - self._at
         return rest / self.clock < u + u / 32 + 0.002
