@@ -45,6 +45,7 @@ STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
 SIGNS = np.array([1.0, -1.0])[:, None, None]  # both ways
+BACK = 5  # steps at most back onto the curve
 SERIES = 0.01  # [rad, reaches] as far as a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
@@ -122,10 +123,10 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
 def _second_order(
     arm: Arm, task: Task, q: Array, target: Array, r: Array, U: Array, S: Array, V: Array, out: Structure
 ) -> Array:
-    """Decide those whose curvature does: g = sigma t + b t^2 / 2, |g'' - b| <= third |t| as far as `SERIES`.
+    """Decide those whose curvature does: g = sigma t + b t^2 / 2, |g'' - b| <= third |t| as far as `SERIES` or 4 times.
 
     x(t) = v t + w t^2 / 2 keeps what the other directions reach to second order; b and w follow from differences
-    close by, third from g at the ends, after a step back onto the curve; what that still misses is counted, too.
+    close by, third from g at the ends, after steps back onto the curve; what these still miss is counted, too.
     Where sigma^2 > 2 SOLUTION |g''| as far as 2 SOLUTION / sigma, |g| passes `SOLUTION` there without a turn; where
     sigma^2 < 2 SOLUTION |g''| as far as 4 sqrt(SOLUTION / b), it turns before, and passes it on both sides.
     Returns w (M, n).
@@ -133,31 +134,33 @@ def _second_order(
     n, unit, span = arm.n, radian_or_reach(arm), out.span
     v, sigma = V[:, -1], S[:, -1]
 
-    def both_ways(h: float, w: Array, more: Array) -> Array:
-        """The pose's way f (2, M, rows) there and back."""
-        ends = (q + (0.5 * h * h * w + SIGNS * h * v + more) * unit).reshape(-1, n)
-        return r - newton.residuals(arm, task, ends, np.concatenate([target, target])).reshape(2, *r.shape)
+    def both_ways(away: Array) -> Array:
+        """The pose's way f (2, M, rows) along away (2, M, n), in directions of U."""
+        ends = (q + away * unit).reshape(-1, n)
+        f = r - newton.residuals(arm, task, ends, np.concatenate([target, target])).reshape(2, *r.shape)
+        return np.asarray((f[..., None] * U).sum(axis=2))
 
-    none = np.zeros((2, *v.shape))
-    bend = both_ways(FOLD_WAY, none[0], none).sum(axis=0) / FOLD_WAY**2
-    along = (U * bend[:, :, None]).sum(axis=1)
+    along = both_ways(SIGNS * FOLD_WAY * v).sum(axis=0) / FOLD_WAY**2
     b, size = along[:, -1], np.maximum(np.abs(along[:, -1]), TINY)
     inverse = V[:, :-1] / np.maximum(S[:, :-1], WEAK)[:, :, None]
     w = -(inverse * along[:, :-1, None]).sum(axis=1)
-    rest = (both_ways(SERIES, w, none)[..., None] * U).sum(axis=2)
-    more = -(inverse * rest[:, :, :-1, None]).sum(axis=2)
-    rest = (both_ways(SERIES, w, more)[..., None] * U).sum(axis=2)
-    g, off = rest[:, :, -1], np.linalg.norm(rest[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], TINY)
-    more = np.linalg.norm(more, axis=2).max(axis=0)
-    cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * SERIES)
-    quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * SERIES**2) + n * SERIES * off
-    third = (6.0 * cubic + 12.0 * quartic) / SERIES**3
     far, near = 4.0 * np.sqrt(SOLUTION / size), 2.0 * SOLUTION / np.maximum(sigma, TINY)
-    turns = (far < SERIES) & (third * far < 0.2 * size) & (sigma**2 < 2.0 * SOLUTION * (size - third * far))
-    alone = (near < SERIES) & (sigma**2 > 2.0 * SOLUTION * (size + third * near))
-    straight = 0.5 * SERIES**2 * np.linalg.norm(w, axis=1) + more + off < 0.1 * SERIES
-    out.known[...] = (turns | alone) & straight & ((r * r).sum(axis=1) < CLOSED**2)
-    out.boundary[...] = turns & out.known
+    h = np.clip(np.minimum(far, near), SERIES, 4.0 * SERIES)
+    more, close = np.zeros((2, *v.shape)), (r * r).sum(axis=1) < CLOSED**2
+    for _ in range(BACK):
+        rest = both_ways(0.5 * (h * h)[:, None] * w + SIGNS * h[:, None] * v + more)
+        g, off = rest[:, :, -1], np.linalg.norm(rest[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], TINY)
+        cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
+        quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * h**2) + n * h * off
+        third = (6.0 * cubic + 12.0 * quartic) / h**3
+        turns = (far <= h) & (third * far < 0.2 * size) & (sigma**2 < 2.0 * SOLUTION * (size - third * far))
+        alone = (near <= h) & (sigma**2 > 2.0 * SOLUTION * (size + third * near))
+        bent = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(more, axis=2).max(axis=0) + off
+        new = ~out.known & (turns | alone) & (bent < 0.1 * h) & close
+        out.known[new], out.boundary[new] = True, turns[new]
+        if out.known.all():
+            break
+        more -= (inverse * rest[:, :, :-1, None]).sum(axis=2)
     # where |g| is `SOLUTION` first: with the sign of b; and against it, or beyond the turn
     ahead = 2.0 * SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * SOLUTION * size))
     rest = np.sqrt(np.maximum(sigma**2 - 2.0 * SOLUTION * size, 0.0))
