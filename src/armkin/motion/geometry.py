@@ -274,7 +274,7 @@ def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: flo
     """Length at which a piece is `radius` away from its corner, between the corner's length and the farthest."""
     if piece.rate:
         return inner + math.copysign(radius / piece.rate, outer - inner)
-    for _ in range(9):  # each time a part of 1/100 of what is left
+    for _ in range(6):  # each time a part of 1/100 of what is left
         s = np.linspace(inner, outer, 101)
         away = np.linalg.norm(piece.along(s)[:, : piece.task.position] - corner, axis=1)
         k = min(int(np.argmax(away[1:] >= radius)), 99) if (away[1:] >= radius).any() else 99
@@ -310,16 +310,21 @@ def unit_speed(
     nodes = grid[:-1, None] + step[:, None] * _GAUSS
     speed = np.linalg.norm(at(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
     s = np.concatenate([[0.0], np.cumsum(speed.mean(axis=1) * step)])
-    rate = 1.0 / np.maximum(np.linalg.norm(at(grid)[1] * scale, axis=1), 1e-12)  # du/ds
+    y, left = at(grid)
+    right = at(grid[1:] - 1e-9 * step)[1]  # where the way rests in a corner it comes and goes in two directions
+    left, right = (d / np.maximum(np.linalg.norm(d * scale, axis=1), 1e-12)[:, None] for d in (left[:-1], right))
+    moving = np.flatnonzero((y != y[0]).any(axis=0))
+    still, y, left, right = y[0], y[:, moving], left[:, moving], right[:, moving]  # left, right: dy/ds
 
     def along(x: Array) -> Array:
         i = np.clip(np.searchsorted(s, x, side="right") - 1, 0, len(step) - 1)
-        h = s[i + 1] - s[i]
-        f = (x - s[i]) / h
-        chord = step[i]
-        d0, d1 = rate[i] * h, rate[i + 1] * h
-        v = grid[i] + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
-        return at(v)[0]
+        h = (s[i + 1] - s[i])[:, None]
+        f = (x - s[i])[:, None] / h
+        y0, d0, d1 = y[i], left[i] * h, right[i] * h
+        chord = y[i + 1] - y0
+        out = np.repeat(still[None], len(x), axis=0)
+        out[:, moving] = y0 + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
+        return out
 
     return Piece(task, first, along, float(s[-1])), lambda v: np.interp(v, grid, s)
 

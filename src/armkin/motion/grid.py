@@ -31,6 +31,9 @@ _REST = 32  # intervals from rest to rest, at least, where there are many rests
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
 
+Missed = tuple[float, float] | None  # the greatest distance of a given point from the motion, and where [mm]
+
+
 def fine_enough(
     arm: Arm,
     route: Route,
@@ -209,12 +212,12 @@ def _steps(arm: Arm, path: Knots) -> Array:
     return np.asarray(off)
 
 
-def missed(arm: Arm, route: Route, path: Knots) -> tuple[float, float] | None:
+def missed(arm: Arm, route: Route, path: Knots) -> Missed:
     """Greatest distance of a given point from the tip's motion on a grid, and where [mm]; None: there is none."""
     s, points = route.given
     here = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)
     s, points = s[here], points[here]
-    worst: tuple[float, float] | None = None
+    worst: Missed = None
     for i in range(0, len(s), _BLOCK):
         at, given = s[i : i + _BLOCK], points[i : i + _BLOCK]
         distance = np.full(len(at), np.inf)  # the least of what is met: in a tight corner the search may leave it

@@ -24,7 +24,7 @@ from armkin.motion.branch_path import Pace, carry, stands, stretches
 from armkin.motion.curve import Curve, Smoothed, way_of, ways_of
 from armkin.motion.dense import FIT, PLAN, Polyline
 from armkin.motion.geometry import Piece, Spot
-from armkin.motion.grid import deviation, missed
+from armkin.motion.grid import Missed, deviation, missed
 from armkin.motion.joint_moves import approach, straight
 from armkin.motion.path_numbers import OF_JOINTS
 from armkin.motion.path_plan import Marker, PathPlan
@@ -238,10 +238,10 @@ class Walk:
         s, runs = self._runs(route, near, free=free)
         for k, run in enumerate(runs):
             fixed = self.q if not free and k == 0 and run.first == 0 and stands(run.chain, self.q) else None
-            curves = self._curves(route, s, run, near, fixed)
+            curves, given = _curves(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
                 self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
-            self.append_curves(route, curves, order)
+            self.append_curves(route, curves, order, given)
             near = self.q
         for kind, value in self.pauses.get(len(self.pieces), ()):
             self.emit_event(kind, value)
@@ -261,25 +261,8 @@ class Walk:
             raise branch_report.refused(self.plan, carried, branch)
         return carried.columns.s, carried.moving
 
-    def _curves(self, route: Route, s: Array, run: Run, near: Array, fixed: Array | None) -> list[Curve | Smoothed]:
-        """A run in time; a route that is fitted to points leaves the motion little of the tolerance."""
-        if not len(route.given[0]):
-            return stretches(self.arm, route, s, run, near, self.pace, fixed=fixed)
-        for share in PLAN:
-            pace = replace(self.pace, tolerance=share * self.pace.tolerance)
-            made = stretches(self.arm, route, s, run, near, pace, fixed=fixed)
-            off = (missed(self.arm, route, ways_of(made)) or (0.0,))[0]
-            if off <= self.pace.tolerance:
-                return made
-        raise NoSolutionError(
-            f"a given point would lie {off:.4f} mm off the motion, tolerance {self.pace.tolerance:g} mm: give a larger "
-            "tolerance, or fewer points at a time; nothing was moved",
-            deviation_mm=off,
-            tolerance_mm=self.pace.tolerance,
-        )
-
-    def append_curves(self, route: Route, curves: list[Curve | Smoothed], order: dict[int, int]) -> None:
-        """Put a run's curves into the plan, with the pauses where they begin."""
+    def append_curves(self, route: Route, curves: list[Curve | Smoothed], order: dict[int, int], given: Missed) -> None:
+        """Put a run's curves into the plan, with the pauses where they begin; given: what they miss of given points."""
         at = {round(float(route.ends[order[k]]), 6): self.pauses[k] for k in self.pauses if k in order}
         for curve in curves:
             path_ = way_of(curve)
@@ -288,7 +271,7 @@ class Walk:
             self.plan.along(len(self.made), curve, self.plan.length)
             self.made.append(curve)
             self.q = curve.end
-        _measure(self.plan, route, ways_of(curves))
+        _measure(self.plan, route, ways_of(curves), given)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
@@ -304,9 +287,29 @@ class Walk:
         self.q = goal
 
 
-def _measure(plan: PathPlan, route: Route, path: Knots) -> None:
+def _curves(
+    arm: Arm, pace: Pace, route: Route, s: Array, run: Run, near: Array, fixed: Array | None
+) -> tuple[list[Curve | Smoothed], Missed]:
+    """A run in time, and what it misses of given points: a route fitted to them leaves it little tolerance."""
+    if not len(route.given[0]):
+        return stretches(arm, route, s, run, near, pace, fixed=fixed), None
+    for share in PLAN:
+        tight = replace(pace, tolerance=share * pace.tolerance)
+        made = stretches(arm, route, s, run, near, tight, fixed=fixed)
+        given = missed(arm, route, ways_of(made))
+        off = 0.0 if given is None else given[0]
+        if off <= pace.tolerance:
+            return made, given
+    raise NoSolutionError(
+        f"a given point would lie {off:.4f} mm off the motion, tolerance {pace.tolerance:g} mm: give a larger "
+        "tolerance, or fewer points at a time; nothing was moved",
+        deviation_mm=off,
+        tolerance_mm=pace.tolerance,
+    )
+
+
+def _measure(plan: PathPlan, route: Route, path: Knots, given: Missed) -> None:
     """Note how far a curve leaves the route, or given points, and how near it comes to a singularity."""
-    given = missed(plan.arm, route, path)
     off = deviation(plan.arm, route, path) if given is None else given[0]
     if given is not None and off > plan.deviation:
         plan.rounded_most = plan.length + given[1]

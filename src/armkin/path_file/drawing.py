@@ -27,7 +27,12 @@ class Placing:
     def point(self, p: Sequence[float]) -> list[float]:
         """A point of the drawing in the arm's frame."""
         x, y, z = p[0] * self.scale, p[1] * self.scale, p[2] * self.scale
-        return [o + a[0] * x + a[1] * y + a[2] * z for o, a in zip(self.origin, self.axes, strict=True)]
+        (ox, oy, oz), (a, b, c) = self.origin, self.axes
+        return [
+            ox + a[0] * x + a[1] * y + a[2] * z,
+            oy + b[0] * x + b[1] * y + b[2] * z,
+            oz + c[0] * x + c[1] * y + c[2] * z,
+        ]
 
     def direction(self, d: Sequence[float]) -> list[float]:
         """A direction of the drawing in the arm's frame."""

@@ -30,6 +30,7 @@ _GROUPS: dict[str, tuple[float, ...]] = {
     "one-line": (4.0, 10.0, 28.0, 52.0, 92.0, 29.0, 11.0),
 }
 _GROUP = {code: group for group, codes in _GROUPS.items() for code in codes}
+_PLACES = frozenset("XYZIJKR")
 _KNOWN_G = {*_GROUP, *_IGNORED_G, 53.0}
 
 
@@ -109,7 +110,7 @@ class _Program:
         for code in m_codes:
             if code in (0.0, 1.0):
                 self.pen.pause(self.block.line)
-        return bool({2.0, 30.0} & set(m_codes))
+        return 2.0 in m_codes or 30.0 in m_codes
 
     def _sorted(self) -> tuple[list[float], list[float], dict[str, float]]:
         """The line's G and M codes, and its other words."""
@@ -187,7 +188,7 @@ class _Program:
             self._set_system(values)
         elif 52.0 in codes or 92.0 in codes:
             self._set_shift(values, 52.0 in codes)
-        elif any(letter in values for letter in "XYZIJKR"):
+        elif not _PLACES.isdisjoint(values):
             if 4.0 in codes or 29.0 in codes:
                 raise self._wrong("an axis' word beside G4")
             self._move(values, machine=53.0 in codes)

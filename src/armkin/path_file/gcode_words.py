@@ -35,7 +35,7 @@ def blocks(text: str, name: str) -> Iterator[Block]:
     """The lines that have words, up to a second `%`. Raises PathFileError with line and word."""
     percents = 0
     for number, raw in enumerate(text.splitlines(), 1):
-        if raw.strip() == "%":
+        if "%" in raw and raw.strip() == "%":
             percents += 1
             if percents == 2:
                 return
@@ -67,7 +67,7 @@ def _checked(line: str, name: str, number: int) -> str:
 
 
 def _words(line: str, name: str, number: int) -> tuple[tuple[str, float, str], ...]:
-    own = _OWN_WORDS.match(line)
+    own = _OWN_WORDS.match(line) if "M" in line else None
     if own is not None and own[1] is not None and int(own[1]) not in _MACHINE_M:
         # M201 X500: what follows is the M word's own; of a fan the S counts
         speed = re.search(r"\bS\s*([0-9.]+)", line[own.end() :])
@@ -75,25 +75,25 @@ def _words(line: str, name: str, number: int) -> tuple[tuple[str, float, str], .
         return (word, ("S", _number(speed[1]), "S")) if speed else (word,)
     if len(line) > _LONGEST:
         raise wrong(name, number, f"has {len(line)} characters; a line of G-code has at most {_LONGEST}")
-    if _HOME.match(line) is not None:
+    if "28" in line and _HOME.match(line) is not None:
         line = _FLAG.sub(" ", line)
     packed = "".join(line.split())
     if packed.startswith("/"):
         raise wrong(name, number, "'/' marks a line that a machine's switch leaves out: write it or leave it out")
-    out, at = [], 0
-    for found in _WORD.finditer(packed):
-        if found.start() != at:
-            break
-        at = found.end()
-        if found[1] != "N":
-            out.append((found[1], float(found[2]), found[0]))
-    if at < len(packed):
+    found = _WORD.findall(packed)
+    words = [letter + number for letter, number in found]
+    if "".join(words) != packed:
+        at = 0
+        while (one := _WORD.match(packed, at)) is not None:
+            at = one.end()
         rest = packed[at:]
         if rest[0] in "#=[]" or (len(rest) > 1 and rest[1] in "#["):
             raise wrong(name, number, f"'{rest[:20]}': expressions, parameters and macros are not known")
-        near = next((one for one in line.split() if not _is_words(one)), rest)
+        near = next((some for some in line.split() if not _is_words(some)), rest)
         raise wrong(name, number, f"'{near[:20]}' is no word of G-code: a letter and a number, such as X10")
-    return tuple(out)
+    return tuple(
+        (letter, float(number), word) for (letter, number), word in zip(found, words, strict=True) if letter != "N"
+    )
 
 
 def _is_words(text: str) -> bool:
