@@ -349,6 +349,18 @@ def test_the_program_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     until(page, "!document.querySelector('#moves li')")
 
 
+# Heights of joint 1's drum.
+_FIRST_DRUM = """async ([arm, q]) => {
+  const [{ Shapes }, { frames }] = [await import('/js/bodies.js'), await import('/js/chain.js')];
+  const [T, at] = [frames(arm, q).after[0], []];
+  for (const { geometry } of new Shapes(arm).bodies[1].filter(({ drum }) => drum)) {
+    const p = geometry.attributes.position.array;
+    for (let k = 0; k < p.length; k += 3) at.push(T[8] * p[k] + T[9] * p[k + 1] + T[10] * p[k + 2] + T[11]);
+  }
+  return at;
+}"""
+
+
 def test_the_page_draws_the_arm_where_it_is(browser: Browser, server: Server) -> None:
     """Its ten lines of forward kinematics against ours, for every robot, calibrated ones, too."""
     context = browser.new_context(bypass_csp=True)
@@ -364,6 +376,10 @@ def test_the_page_draws_the_arm_where_it_is(browser: Browser, server: Server) ->
             [scene(arm), units.joints_out(arm, q).tolist()],
         )
         assert np.reshape(tool, (4, 4)) == pytest.approx(armkin.fk(arm, q), abs=1e-8), arm.name
+        if arm.prismatic[0] or abs(arm.link[0][2, 2]) < 0.99:
+            continue
+        corners = page.evaluate(_FIRST_DRUM, [scene(arm), units.joints_out(arm, q).tolist()])
+        assert min(corners) > min(arm.base[2, 3], 0) - 1e-6 * arm.reach, arm.name  # it stands on the floor
     context.close()
 
 

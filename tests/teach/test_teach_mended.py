@@ -137,6 +137,21 @@ def test_what_one_needs_is_in_sight_and_stays_there(browser: Browser) -> None:
             assert page.evaluate(f"{low}.map((one) => one.id || one.textContent)") == []
 
 
+def test_the_first_picture_has_the_whole_handle_and_sliders_their_values(browser: Browser) -> None:
+    for robot in ("ur5e", "jaco_j2n6s300"):  # stretched upwards; joints without limits at 275 and 241 degrees
+        with served(robot) as server, opened(browser, server.address, viewport={"width": 390, "height": 844}) as page:
+            handle = "+document.querySelector('#canvas').dataset.handle.split(' ')[1]"
+            low = "document.querySelector('#views').getBoundingClientRect().bottom"
+            top = "document.querySelector('#canvas').getBoundingClientRect().top"
+            until(page, f"{handle} + {top} - {low} > 40")  # its arrow is below the buttons
+            for slider, box in zip(
+                page.locator("#sliders input[type=range]").all(),
+                page.locator("#sliders input[type=number]").all(),
+                strict=True,
+            ):
+                assert float(slider.input_value()) == pytest.approx(float(box.input_value()), abs=0.1)
+
+
 def test_the_branch_that_is_pointed_at_is_solid_and_f_fits_the_arm_in(browser: Browser) -> None:
     with served("ur5e") as server, opened(browser, server.address) as page:
         for k, angle in enumerate((20, -70, 80, -60, 70, 10)):

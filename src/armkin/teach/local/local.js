@@ -93,9 +93,8 @@ function copies(title, text) {
 /** @param {any} page */
 function ready(page) {
   for (const part of document.querySelectorAll("[data-served]")) absent.append(part);
-  get("keys").querySelector("p")?.replaceChildren("1 to 8 a branch, arrows and Page up, Page down the end effector by 5 mm (with Shift 0.5 mm), P play, F fit the picture");
   if (plan) page.program.carry(plan);
-  else absent.append(get("program"));
+  else absent.append(get("program"), get("play-key"));
   if (!slice) absent.append(get("slice"));
   const title = make("h2", { id: "share-title" }, "Share");
   const buttons = make(

@@ -110,7 +110,9 @@ export class Shapes {
     const [link, base] = [this.arm.links[0], this.arm.base];
     const axis = [0, 1, 2].map((row) => link[row][2]);
     const over = axis.reduce((sum, z, row) => sum + z * (link[row][3] + joint.at * z - base[row][3]), 0);
-    return Math.abs(over) < half ? Math.sign(over || 1) * half - over : 0;
+    const up = axis.reduce((sum, z, row) => sum + z * base[row][2], 0); // an axis may point into the floor
+    const way = Math.sign(Math.abs(over) > 1e-6 * half ? over : up) || 1;
+    return Math.abs(over) < half ? way * half - over : 0;
   }
 
   /** Two fingers that continue the last piece of the arm. @returns {Part[]} */

@@ -67,10 +67,20 @@ export class Joints {
   show(q) {
     this.q = q;
     q.forEach((value, i) => {
+      this.reachable(i, value);
       if (document.activeElement !== this.sliders[i]) this.sliders[i].value = String(value);
       this.sliders[i].setAttribute("aria-valuetext", `${fixed(value, 2)} ${this.arm.joints[i].unit}`);
       show(this.boxes[i], value);
     });
+  }
+
+  /** A joint without limits may be anywhere: its slider goes as far to both sides of that. @param {number} i @param {number} value */
+  reachable(i, value) {
+    const [joint, slider] = [this.arm.joints[i], this.sliders[i]];
+    if (joint.lower !== null || joint.upper !== null || (value >= Number(slider.min) && value <= Number(slider.max))) return;
+    const half = (Number(slider.max) - Number(slider.min)) / 2;
+    slider.min = String(value - half);
+    slider.max = String(value + half);
   }
 
   /** @param {string[]} words what is outside */

@@ -226,9 +226,8 @@ class Page {
       button.addEventListener("click", () => view.look(/** @type {HTMLElement} */ (button).dataset.view ?? ""));
     }
     view.size();
-    view.pose(this.q);
+    this.show(this.look); // the handle stands at the tip before all is fitted in
     view.look("space");
-    this.show(this.look);
   }
 }
 

@@ -81,6 +81,7 @@ export class View {
     /** Joint values of the solid arm. */
     this.q = arm.joints.map((joint) => joint.home);
     this.middle = new Vector3();
+    this.covered = 0; // share of the picture that buttons cover, from its top
     this.inside = false; // whether the whole arm was in the picture when it last rested
     this.theme();
     new ResizeObserver(() => this.size()).observe(canvas);
@@ -179,7 +180,7 @@ export class View {
     const points = frames.map((T) => new Vector3(T[3], T[7], T[11]));
     const inside = (/** @type {Vector3} */ point, /** @type {number} */ most) => {
       const at = point.project(this.camera);
-      return Math.max(Math.abs(at.x), Math.abs(at.y)) < most;
+      return Math.max(Math.abs(at.x), Math.abs((at.y + this.covered) / (1 - this.covered))) < most;
     };
     const seen = points.every((point) => inside(point, 1)) && (!this.gizmo.there || inside(this.gizmo.handle.position.clone(), HANDLE));
     if (this.inside && !seen && !this.gizmo.dragging) this.look("fit");
@@ -246,10 +247,14 @@ export class View {
     const { clientWidth, clientHeight } = this.canvas;
     if (!clientWidth || !clientHeight) return;
     this.renderer.setSize(clientWidth, clientHeight, false);
-    this.camera.aspect = clientWidth / clientHeight;
+    // The picture's middle is that of what the buttons at its top leave free.
+    const bar = Math.max(get("views").getBoundingClientRect().bottom - this.canvas.getBoundingClientRect().top, 0);
+    this.covered = Math.min(bar / clientHeight, 0.5);
+    const height = clientHeight * (1 - this.covered);
     // A narrow window sees as much to its sides as a square one.
-    this.camera.fov = this.camera.aspect < 1 ? 36 / this.camera.aspect ** 0.7 : 36;
-    this.camera.updateProjectionMatrix();
+    const aspect = clientWidth / height;
+    this.camera.fov = aspect < 1 ? 36 / aspect ** 0.7 : 36;
+    this.camera.setViewOffset(clientWidth, height, 0, height - clientHeight, clientWidth, clientHeight);
     this.now();
   }
 
