@@ -116,7 +116,9 @@ def _answered(
     each = np.broadcast_to(close, (len(given), arm.n)) if many else close.reshape(-1, arm.n)
     one = close if close.ndim == 1 else None
     if geometry.pairs:
-        out, count, target, shown = _closed(arm, definition, geometry, given, each, one, examine, workers)
+        out, count, target, shown, left = chunks.solve(arm, definition, geometry, given, each, one, examine, workers)
+        if len(left):
+            out = _otherwise(Goals(arm, definition, target, each), geometry.doubts, out, left, examine, workers)
     else:
         target, _, shown = read_targets(definition, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
@@ -174,20 +176,18 @@ def _commanded(arm: Arm, found: Solutions) -> Solutions:
     return replace(found, arm=arm, task=task_for(arm, found.task.name), near=near, q=q)
 
 
-def _closed(
-    arm: Arm, task: Task, geometry: Geometry, given: Array, near: Array, one: Array | None, examine: bool, workers: int
-) -> tuple[Batch, int, Array, Array]:
-    """Closed forms, as `chunks.solve`; what they leave in doubt is solved the other way that they name."""
-    out, count, target, shown, left = chunks.solve(arm, task, geometry, given, near, one, examine, workers)
-    if len(left):
-        assert geometry.doubts is not None
-        some, close = target[left], near[left]
-        if geometry.doubts.pairs:
-            rest = _closed(arm, task, geometry.doubts, some, close, None, examine, workers)[0]
-        else:
-            rest = _rows(arm, task, geometry.doubts, some, close, examine, workers)[0]
-        out = replaced(out, left, rest)
-    return out, count, target, shown
+def _otherwise(
+    goals: Goals, geometry: Geometry | None, out: Batch, left: NDArray[np.intp], examine: bool, workers: int
+) -> Batch:
+    """The same with what a closed form leaves in doubt solved the other way that it names."""
+    assert geometry is not None
+    some = arm, task, target, near = goals.of(left)
+    if not geometry.pairs:
+        return replaced(out, left, _rows(arm, task, geometry, target, near, examine, workers)[0])
+    rest, _, target, _, more = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
+    if len(more):
+        rest = _otherwise(some._replace(target=target), geometry.doubts, rest, more, examine, workers)
+    return replaced(out, left, rest)
 
 
 def _rows(

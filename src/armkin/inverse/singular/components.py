@@ -314,10 +314,9 @@ class _Groups:
         """All candidates grouped; missed, beyond: (K,) of which targets a loose one came to nothing, and of which all
         that are near lie beyond a fold."""
         few = self.valid.shape[1] <= FEW
-        some = ~self.asked
-        if some.sum() > AT_ONCE:
-            some &= few & (self.lost.nullity < 2)
-        if some.any():
+        # those that lose several directions when they lead; of many, those that lose one, too
+        some = ~self.asked & (self.lost.nullity < 2)
+        if some.any() and (few or some.sum() <= AT_ONCE):
             self._ask(*np.nonzero(some))
         if few:
             self._plain()
