@@ -173,7 +173,9 @@ def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
         q = q.reshape(-1, 6)
         pose = np.repeat(np.arange(part.shape[0]), 2)
         done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
-        good = done.residual < GRAZING
-        touching[begin + pose[good & (done.residual > ELIMINATED)]] = True
+        # where links are all but points the loop's unit is as small, and slides are millions of it long
+        far = np.maximum(1.0, np.linalg.norm(part[pose, :3, 3], axis=1))
+        good = done.residual < GRAZING * far
+        touching[begin + pose[good & (done.residual > ELIMINATED * far)]] = True
         found.append(answers_of(closed, begin + pose, done, good))
     return concatenate(found), touching, all_
