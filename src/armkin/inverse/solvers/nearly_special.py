@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.forward import fk
 from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
@@ -146,8 +146,12 @@ def _places(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target:
     there = ~np.isnan(q[:, :, 0])
     numbers = np.full(there.shape, -1)
     if q.size:
+        away = np.zeros((len(target), B, q.shape[1]))
         with np.errstate(invalid="ignore"):
-            away = newton.wrapped_distance(arm, q[:, None], seed[:, :, None])  # (N, B, M)
+            for i in range(arm.n):  # one joint at a time: all at once leave the processor's cache
+                a, b = np.ascontiguousarray(q[:, None, :, i]), np.ascontiguousarray(seed[:, :, None, i])
+                far = (a - b) / arm.reach if arm.prismatic[i] else wrapped(a - b)
+                away = np.maximum(away, np.abs(far), out=away)
             real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
         away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
         nearest, back = away.argmin(axis=2), away.argmin(axis=1)
