@@ -118,9 +118,11 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
     held |= np.equal(j, 0)  # `near` stands for all that meet there
     open_ = np.flatnonzero(held)
     same[open_] = _straight(arm, task, at[open_], apart[open_], target[k[open_]])
-    for p in np.flatnonzero(slow & ~same):
-        joints = curve[k[p], i[p]] | (size[p] > SAME)
-        same[p] = _round(arm, task, at[p], joints, at[p] + apart[p] * unit, target[k[p]])
+    some = np.flatnonzero(slow & ~same)
+    if len(some):  # whether the self-motion of the one goes round to the other
+        joints = curve[k[some], i[some]] | (size[some] > SAME)
+        there, asked = (at[some] + apart[some] * unit)[:, None], np.ones((len(some), 1), bool)
+        same[some] = circuits.on_one(arm, task, at[some], joints, there, asked, target[k[some]])[:, 0]
     for row, one, other in zip(k[same], i[same], j[same], strict=True):
         chosen[row, one] &= not chosen[row, other]
 
@@ -143,12 +145,6 @@ def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool
     good = (size <= SOLUTION) & (off < 10 * TURNED)
     out[who[good.reshape(3, -1).all(axis=0)]] = True
     return out
-
-
-def _round(arm: Arm, task: Task, q: Array, joints: Bool, other: Array, target: Array) -> bool:
-    """Whether the self-motion of q (n,), along which joints (n,) move, goes round to another posture (n,)."""
-    there, asked = other[None, None], np.ones((1, 1), bool)
-    return bool(circuits.on_one(arm, task, q[None], joints[None], there, asked, target[None]).all())
 
 
 def _both_ways(arm: Arm, way: Array) -> Array:
