@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import armkin
+from armkin.inverse.run import edges
 from armkin.inverse.singular import components, local_structure
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
@@ -53,3 +56,35 @@ def test_plain_folds_are_those_that_one_by_one_are_found(name: str, monkeypatch:
     for field in ("status", "valid", "free", "complete"):
         assert np.array_equal(getattr(short, field), getattr(long, field)), field
     np.testing.assert_allclose(np.nan_to_num(short.q), np.nan_to_num(long.q), atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5e", "irb120"])
+def test_branches_that_are_not_examined_are_what_examining_finds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = armkin.load(name)
+    rng = np.random.default_rng(9)
+    q = np.concatenate([beside_folds(arm), rng.integers(-4, 4, (24, arm.n)) * np.pi / 4])
+    target = np.asarray(targets_of(task_for(arm), armkin.fk(arm, q), q))
+    short, doubts, kept = armkin.ik(arm, target), edges._doubts, 0
+
+    def all_examined(*arguments: Any) -> Any:
+        nonlocal kept
+        found = doubts(*arguments)
+        kept += found.simple.sum()
+        return found._replace(simple=np.zeros_like(found.simple))
+
+    monkeypatch.setattr(edges, "_doubts", all_examined)
+    long = armkin.ik(arm, target)
+    assert kept > 0
+    for field in ("status", "valid", "free", "complete", "branch"):
+        assert np.array_equal(getattr(short, field), getattr(long, field)), field
+    np.testing.assert_allclose(np.nan_to_num(short.q), np.nan_to_num(long.q), atol=1e-9)
+
+
+def test_a_component_is_followed_as_far_as_it_goes() -> None:
+    """On 10 degrees the curve of this posture, with a wrist 2e-7 rad off a straight one, is not smooth."""
+    arm = armkin.load("puma560")
+    q = np.array([[0.75 * np.pi, 0.75 * np.pi, -0.5 * np.pi, -4.28440518e-03, 1.89039945e-07, -0.781113759]])
+    found = local_structure.local_structure(arm, task_for(arm), q, armkin.fk(arm, q))
+    assert found.known.all()
+    assert not (found.manifold | found.boundary).any()
+    assert 0.03 < found.high[0] - found.low[0] < 0.05

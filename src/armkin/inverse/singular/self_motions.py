@@ -118,11 +118,11 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
     held |= np.equal(j, 0)  # `near` stands for all that meet there
     open_ = np.flatnonzero(held)
     same[open_] = _straight(arm, task, at[open_], apart[open_], target[k[open_]])
-    some = np.flatnonzero(slow & ~same)
-    if len(some):  # whether the self-motion of the one goes round to the other
-        joints = curve[k[some], i[some]] | (size[some] > SAME)
-        there, asked = (at[some] + apart[some] * unit)[:, None], np.ones((len(some), 1), bool)
-        same[some] = circuits.on_one(arm, task, at[some], joints, there, asked, target[k[some]])[:, 0]
+    left = np.flatnonzero(slow & ~same)
+    if len(left):  # whether the self-motion of the one goes round to the other
+        joints = curve[k[left], i[left]] | (size[left] > SAME)
+        there, asked = (at[left] + apart[left] * unit)[:, None], np.ones((len(left), 1), bool)
+        same[left] = circuits.on_one(arm, task, at[left], joints, there, asked, target[k[left]])[:, 0]
     for row, one, other in zip(k[same], i[same], j[same], strict=True):
         chosen[row, one] &= not chosen[row, other]
 
