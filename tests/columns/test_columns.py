@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from armkin.cli import batch, csv_rows
 from armkin.cli.csv_rows import Columns
-from armkin.columns import parts, text
+from armkin.columns import branches, parts, text
 from armkin.columns.cells import csv_line
 from armkin.columns.table import Table, Words, part
+from armkin.compiled import nearest as compiled_nearest
 from armkin.compiled import text as compiled_text
 from armkin.errors import UnfinishedError
 from command_line import THREE_DOF, Result, run
@@ -293,3 +294,18 @@ def test_the_error_of_unfinished_parts_has_its_fields(tmp_path: Path) -> None:
     with pytest.raises(UnfinishedError) as caught:
         parts.Parts(str(tmp_path / "out.csv"), {}).refuse_begun()
     assert caught.value.fields["parts"] == str(tmp_path / "out.csv.parts")
+
+
+def test_machine_code_takes_the_same_branch() -> None:
+    rng = np.random.default_rng(4)
+    for N, B, n in ((3_000, 8, 6), (500, 1, 3), (400, 5, 7), (20, 0, 6), (0, 8, 6)):
+        near, scale = rng.uniform(-1.0, 1.0, n), np.where(rng.random(n) < 0.3, 1.0, np.pi / 180)
+        q, wanted = rng.uniform(-3.0, 3.0, (N, B, n)), rng.random((N, B)) < 0.6
+        if B > 2:  # as far as another one, but for rounding
+            q[::3, 1] = 2.0 * near - q[::3, 0] + 1e-12
+        q[~wanted] = np.nan
+        there, fast = branches.nearest(q, wanted, near, scale), compiled_nearest.nearest(q, wanted, near, scale)
+        assert fast is not None
+        assert (fast[0] == there[0]).all()
+        assert (fast[1] == there[1])[there[0] >= 0].all()
+    assert compiled_nearest.nearest(np.zeros((1, 1, 8)), np.ones((1, 1), bool), np.zeros(8), np.ones(8)) is None

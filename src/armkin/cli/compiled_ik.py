@@ -1,11 +1,14 @@
-"""`armkin.ik` and `armkin.fk` by machine code: functions of a module, which other processes find by name."""
+"""`armkin.ik`, `armkin.fk` and the nearest branch by machine code: functions that other processes find by name."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from armkin.formula.arrays import Array
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from armkin.formula.arrays import Array, Bool
     from armkin.inverse.answers.solutions import Solutions
     from armkin.model.arm import Arm
 
@@ -31,3 +34,10 @@ def fk(arm: Arm, q: Array) -> Array:
     import armkin
 
     return armkin.compile(arm).fk(q)
+
+
+def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
+    """`armkin.columns.branches.nearest`, where it serves."""
+    from armkin.compiled import nearest as found
+
+    return found.nearest(q, wanted, near, scale)

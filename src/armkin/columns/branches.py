@@ -5,7 +5,7 @@ What `armkin.inverse.choose` answers target by target, on arrays; only branches 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -34,10 +34,17 @@ class Listed(NamedTuple):
     unsolved: Bool
 
 
-def columns(request: choose.Request, targets: Array, rows: NDArray[np.integer], every: bool, **more: Any) -> Listed:
+def columns(
+    request: choose.Request,
+    targets: Array,
+    rows: NDArray[np.integer],
+    every: bool,
+    quick: Callable[..., tuple[NDArray[np.intp], Array] | None] | None = None,
+    **more: Any,
+) -> Listed:
     """The columns of ik: targets (N, ...) [mm, rad], rows (N,) their numbers; every: all branches, not the best alone.
 
-    more: of `armkin.ik`. The request sweeps no joint.
+    more: of `armkin.ik`. The request sweeps no joint. quick: `nearest` by machine code, None where it does not serve.
     """
     arm, near = request.arm, units.joints_in(request.arm, request.near_out)
     kept = [i for i, name in enumerate(arm.joint_names) if name not in request.held]
@@ -50,7 +57,7 @@ def columns(request: choose.Request, targets: Array, rows: NDArray[np.integer], 
     free = within & s.clear if arm.keep_out else within
     names = () if request.branch is None else find(s.names, request.branch)
     parts = [
-        _listed(request, _Found(s, slice(i, i + BLOCK), q, within, free, near, names), rows, every)
+        _listed(request, _Found(s, slice(i, i + BLOCK), q, within, free, near, names), rows, every, quick)
         for i in range(0, max(len(q), 1), BLOCK)
     ]
     return Listed(joined([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
@@ -71,26 +78,39 @@ class _Found(NamedTuple):
     names: Sequence[int]
 
 
-def _listed(request: choose.Request, found: _Found, rows: NDArray[np.integer], every: bool) -> Listed:
-    s, some, arm = found.s, found.some, request.arm
+def _listed(request: choose.Request, found: _Found, rows: NDArray[np.integer], every: bool, quick: Any) -> Listed:
+    s, some, scale = found.s, found.some, units.scale(request.arm)
     q, within, free, valid = found.q[some], found.within[some], found.free[some], s.valid[some]
-    motion = _motion(q, found.near, units.scale(arm))
     wanted = free if request.branch is None else free & np.isin(s.branch[some], found.names)
-    unsolved = ~_any(wanted)
-    key = np.where(valid if every else wanted, motion.round(EQUAL), np.inf)
     if every:
+        unsolved, motion = ~_any(wanted), _motion(q, found.near, scale)
+        key = np.where(valid, motion.round(EQUAL), np.inf)
         count = valid.sum(axis=1)
         lines = np.maximum(count, 1)
         target = np.repeat(np.arange(len(lines)), lines)
         there = np.repeat(count > 0, lines)
         place = np.arange(len(target)) - np.repeat(np.cumsum(lines) - lines, lines)
         branch = _ranked(key, valid, within, free)[target[there], place[there]]
+        motion = motion[target[there], branch]
     else:
-        target, there = np.arange(len(unsolved)), ~unsolved
-        branch = key.argmin(axis=1)[there] if key.shape[1] else np.zeros(0, int)
+        best, motion = (quick and quick(q, wanted, found.near, scale)) or nearest(q, wanted, found.near, scale)
+        target, there = np.arange(len(best)), best >= 0
+        unsolved, branch, motion = ~there, best[there], motion[there]
     chosen = target[there], branch
-    values = _Lines(target, there, q[chosen], within[chosen], motion[chosen], *chosen)
+    values = _Lines(target, there, q[chosen], within[chosen], motion, *chosen)
     return Listed(_table(request, s, rows[some], some, values), unsolved)
+
+
+def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
+    """The branch (N,) of q (N, B, n) that moves the joints least of those wanted (N, B), -1 if none is; and how far.
+
+    Motions are sums of |change| from near (n,), each joint by its scale (n,); to `EQUAL` decimals the first one counts.
+    """
+    there, motion = _any(wanted), _motion(q, near, scale)
+    if not q.shape[1]:
+        return np.full(len(q), -1), np.full(len(q), np.nan)
+    branch = np.where(wanted, motion.round(EQUAL), np.inf).argmin(axis=1)
+    return np.where(there, branch, -1), motion[np.arange(len(q)), branch]
 
 
 def _any(flags: Bool) -> Bool:

@@ -4,6 +4,7 @@ arm.py         `compile`, and what it returns
 one_target.py  one target at a time, in microseconds
 results.py     results of a batch, as `Solutions` has them
 text.py        columns as lines of text
+nearest.py     of many branches those that move the joints least
 source.py      the C file: the formulas of `armkin.export.c`, and the loop over a batch in parts/
 toolchain.py   the system's compiler, and the folder of what it has built
 """

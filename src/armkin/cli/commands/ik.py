@@ -192,7 +192,9 @@ class Questions:
 
         targets = units.targets_in(self.task.labels, chunk.values)
         rounding = _rounding(self.request.arm, self.task, chunk.values)
-        found = branches.columns(self.request, targets, chunk.numbered(), self.all_branches, rounding=rounding)
+        quick = compiled_ik.nearest if self.request.ik is compiled_ik.ik else None
+        numbers = chunk.numbered()
+        found = branches.columns(self.request, targets, numbers, self.all_branches, quick, rounding=rounding)
         return found.table, ~found.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:

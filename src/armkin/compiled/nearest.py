@@ -1,0 +1,42 @@
+"""The branch that moves the joints least by machine code: as `armkin.columns.branches.nearest`, to the same bits."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.compiled import toolchain
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric.tolerances import EQUAL
+
+SOURCE = Path(__file__).parent / "parts" / "nearest.c"
+MOST = 7  # joints that numpy adds up from left to right
+
+
+def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
+    """See `armkin.columns.branches.nearest`; None for more joints than are added up one after the other."""
+    N, B, n = q.shape
+    if n > MOST:
+        return None
+    branch, motion, away = np.empty(N, np.int64), np.full(N, np.nan), np.empty(B * n)
+    inputs = np.ascontiguousarray(q), np.ascontiguousarray(wanted), np.tile(near, B), np.tile(scale, B), away
+    pointers = (one.ctypes.data for one in inputs)
+    _library()(N, B, n, *pointers, 10.0**EQUAL, branch.ctypes.data, motion.ctypes.data)
+    return branch, motion
+
+
+@cache
+def _library() -> Any:
+    """`arm_nearest` of parts/nearest.c. Raises MissingExtraError without a C compiler."""
+    text = SOURCE.read_text(encoding="utf-8")
+    content = hashlib.sha256(text.encode()).hexdigest()
+    found = toolchain.load(text.replace("@content@", content), content, 3).arm_nearest
+    size, pointer = ctypes.c_int64, ctypes.c_void_p
+    found.argtypes, found.restype = [*[size] * 3, *[pointer] * 5, ctypes.c_double, *[pointer] * 2], None
+    return found
