@@ -10,10 +10,10 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import CONVERGED, ELIMINATED, SLOWLY, STALE
+from armkin.inverse.numeric.tolerances import CONVERGED, SLOWLY, STALE
 
 LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
-MORE = 3  # steps more for candidates this close that are no answers yet
+MORE = 3  # steps more for candidates this close that have not converged
 
 
 class Polished(NamedTuple):
@@ -134,7 +134,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
                 normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
                 fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
             inverse[index] = fresh
-        going = np.flatnonzero(size > CONVERGED if step < steps else (size > ELIMINATED) & (size < SLOWLY))
+        going = np.flatnonzero(size > CONVERGED if step < steps else (size > 10 * CONVERGED) & (size < SLOWLY))
         if step == most or going.size == 0:
             break
         if going.size < active.size:

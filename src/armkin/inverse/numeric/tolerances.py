@@ -149,5 +149,5 @@ LOOSE = 1e-12  # squared length across a joint [1 or reaches] below which it may
 LOOSE_DOUBLE = 1e-9  # rounding leaves the root; the same where that root is one of fourth order, and leaves the fourth
 SHAKE = 1e-4  # [reaches, rad] by how much a target is moved to where nothing is free
 SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # how far each pass of an elimination moves the pose
-SLOWLY = 1e-3  # [rad, scaled length] candidates this close that are no answers yet take more steps
+SLOWLY = 1e-3  # [rad, scaled length] candidates this close that have not converged take more steps
 FINEST = 3e-6  # of a span: the first point at which a residual is compared

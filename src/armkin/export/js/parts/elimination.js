@@ -82,7 +82,7 @@ function refine(start, goal, steps, damped) {
         for (let i = 0; i < 6; i++) for (let j = 0; j < 6; j++) inverse[6 * i + j] = system6[12 * i + 6 + j];
       }
     }
-    if (!(size > 1e-14) || step === most || (step >= steps && !(size > 1e-10 && size < 1e-3))) return out;
+    if (!(size > 1e-14) || step === most || (step >= steps && !(size > 1e-13 && size < 1e-3))) return out;
     last = size;
     const by = [0, 0, 0, 0, 0, 0];
     for (let i = 0; i < 6; i++) for (let j = 0; j < 6; j++) by[i] += inverse[6 * i + j] * chainError[j];
