@@ -23,7 +23,9 @@ FIELDS = [f.name for f in fields(armkin.Solutions)]
 
 def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutions | None:
     """One target by the short way, and a check that it is as in a batch."""
-    alone = one_target.solve(arm, target, None, near)
+    one = one_target.prepared(arm, None)
+    assert one is not None
+    alone = one.solve(target, near)
     batch = armkin.ik(arm, target[None], near=None if near is None else near[None])
     if alone is None:
         return None
@@ -77,12 +79,14 @@ def test_what_is_not_plain_is_left_to_the_batch() -> None:
     arm = shipped("puma560")[0]
     T = armkin.fk(arm, np.full(6, 0.3))
     rounded = T.round(8)
-    assert one_target.solve(arm, T, None, None) is not None
-    assert one_target.solve(arm, rounded, None, None) is None  # made a rotation first
-    assert one_target.solve(arm, T * np.nan, None, None) is None
-    assert one_target.solve(arm, np.array([T, T]), None, None) is None
-    assert one_target.solve(arm, T, None, [0.0] * 5) is None
-    assert one_target.solve(arm, armkin.fk(arm, np.zeros(6)), None, None) is None  # the wrist is singular
+    one = one_target.prepared(arm, None)
+    assert one is not None
+    assert one.solve(T, None) is not None
+    assert one.solve(rounded, None) is None  # made a rotation first
+    assert one.solve(T * np.nan, None) is None
+    assert one.solve(np.array([T, T]), None) is None
+    assert one.solve(T, [0.0] * 5) is None
+    assert one.solve(armkin.fk(arm, np.zeros(6)), None) is None  # the wrist is singular
 
 
 ANGLE = st.floats(-np.pi, np.pi)

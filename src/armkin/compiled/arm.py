@@ -197,7 +197,7 @@ class _CompiledTask:
             target, rounding = np.ascontiguousarray(read.values), read.rounding
             out = solved(target, each, workers, read=True)
             assert out is not None
-        single = target_rounding.is_single(targets)
+        single = arrays.is_single(targets)
         shown = given.reshape(target.shape), rounding
         rounding, most = target_rounding.of_targets(self.arm, self.task, target, shown, single, said, lead)
         rows = near_itself.standing(self.arm, self.task, target, each, most)

@@ -77,6 +77,11 @@ def real(values: ArrayLike, what: str) -> Array:
     raise UsageError(f"{what}: expected an array of real numbers, got {found}")
 
 
+def is_single(values: ArrayLike) -> bool:
+    """Whether values are an array in float32."""
+    return getattr(values, "dtype", None) == np.float32
+
+
 def mul(a: Entry, b: Entry) -> Entry:
     """Product that skips known zeros and ones.
 

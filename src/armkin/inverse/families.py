@@ -50,7 +50,7 @@ def families(
     q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad].
     """
     task = free.task
-    values, single = arrays.real(targets, "targets"), target_rounding.is_single(targets)
+    values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
     goal, lead, off = read_targets(task, values)
     close = read_near(arm, near, lead)
     each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n)) * arm.ratio

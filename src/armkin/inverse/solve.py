@@ -83,13 +83,14 @@ def ik(
         return minima(ik, arm, targets, near=near)
     if (free := redundancy(arm, task)) is not None:
         return families(ik, arm, free, targets, near, rounding)
-    values, single = arrays.real(targets, "targets"), target_rounding.is_single(targets)
+    values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
     if (
         rounding is None
         and not single
         and examine
         and values.ndim <= 2
-        and (alone := one_target.solve(arm, values, task, near)) is not None
+        and (one := one_target.prepared(arm, task)) is not None
+        and (alone := one.solve(values, near)) is not None
     ):
         return alone
     if (turned := actual(arm)) is not arm:

@@ -6,7 +6,7 @@ singular posture the exact answer to that one is far away: docs/solver.md, "Edge
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,11 +39,6 @@ class Rounding(NamedTuple):
 
     known: Array
     most: Array
-
-
-def is_single(targets: Any) -> bool:
-    """Whether targets are an array in float32."""
-    return getattr(targets, "dtype", None) == np.float32
 
 
 def of_targets(

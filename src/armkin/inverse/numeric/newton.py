@@ -25,24 +25,16 @@ def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     Prismatic columns too: a joint value is then worth one radian or one reach.
     """
     T, slopes = tip_and_jacobian(arm, q)
-    r = residual(task, T, q, target)
+    r = residual(task, T, q, target, arm.reach)
     J = task_jacobian(task, slopes, T)
-    r[:, : task.position] /= arm.reach
     J = J * radian_or_reach(arm)
     J[:, : task.position] /= arm.reach
     return r, J
 
 
-def residuals(arm: Arm, task: Task, q: Array, target: Array) -> Array:
-    """Residuals (M, r), lengths in units of the arm's reach."""
-    r = residual(task, fk(arm, q), q, target)
-    r[:, : task.position] /= arm.reach
-    return r
-
-
 def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Size of the residual (M,), lengths in units of the arm's reach; infinite where it is not known."""
-    r = residuals(arm, task, q, target)
+    r = residual(task, fk(arm, q), q, target, arm.reach)
     size: Array = np.sqrt((r * r).sum(axis=1))
     return np.where(np.isnan(size), np.inf, size)
 
@@ -72,7 +64,7 @@ def correct(
         if k < steps:
             r, J = scaled(arm, task, q[active], target[active])
         else:
-            r = residuals(arm, task, q[active], target[active])
+            r = residual(task, fk(arm, q[active]), q[active], target[active], arm.reach)
         size = np.sqrt((r * r).sum(axis=1))
         size[np.isnan(size)] = np.inf
         before = best_size[active]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula import arrays
-from armkin.formula.arrays import Array, Bool, Truth
+from armkin.formula.arrays import Array, Truth
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
@@ -103,7 +103,8 @@ def _keep(
     near: Array,
     there: NDArray[np.intp] | None,
 ) -> NDArray[np.intp]:
-    """Write a chunk's branches; returns the targets on an edge.
+    """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
+    targets on an edge.
 
     there: `near_itself.reached`, if that is asked.
     """
@@ -113,9 +114,25 @@ def _keep(
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
     miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
-    valid = miss <= ACCEPTED**2
-    _fill(arm, part, values, valid.reshape(shape), near)
-    full = bool(valid.all())
+    valid = within = miss <= ACCEPTED**2
+    full, legal = bool(valid.all()), []
+    for i, value in enumerate(values):
+        lower, upper = float(arm.lower[i]), float(arm.upper[i])
+        inside: Truth = True
+        if not arm.prismatic[i]:
+            value, inside = nearest_copy(value, float(near[i]) if near.ndim == 1 else near[:, i], lower, upper)
+        elif lower > -np.inf or upper < np.inf:
+            inside = (value >= lower - SLACK) & (value <= upper + SLACK)
+        legal.append(value)
+        if inside is not True:
+            within = (within.reshape(shape) & inside).reshape(B, N)
+    grid = part.q.reshape(N, *axes, arm.n).transpose(1, 2, 3, 0, 4)  # the branch axes in front of the poses
+    for i, value in enumerate(legal):
+        # values on all branch axes, one after the other, are written branch by branch in one loop
+        grid[..., i] = np.ascontiguousarray(np.broadcast_to(value, shape))
+    part.valid[...] = True if full else valid.T
+    part.within[...] = part.valid if within is valid else within.T
+    part.branch[...] = _every_branch(B, arrays.CHUNK)[:N]
     # on an edge are those in doubt, and those with a branch that is nearly there
     if np.shape(doubt)[-1:] != (N,):
         doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
@@ -133,29 +150,6 @@ def _keep(
         part.status[count == 0] = Status.UNREACHABLE
         pack(part, count)
     return doubted
-
-
-def _fill(arm: Arm, part: Batch, values: list[Array], valid: Bool, close: Array) -> None:
-    """Write joint values and valid, on branch axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies."""
-    *axes, N = valid.shape
-    grid = part.q.reshape(N, *axes, arm.n).transpose(1, 2, 3, 0, 4)  # the branch axes in front of the poses
-    within, legal = valid, []
-    for i, value in enumerate(values):
-        lower, upper = float(arm.lower[i]), float(arm.upper[i])
-        inside: Truth = True
-        if not arm.prismatic[i]:
-            value, inside = nearest_copy(value, float(close[i]) if close.ndim == 1 else close[:, i], lower, upper)
-        elif lower > -np.inf or upper < np.inf:
-            inside = (value >= lower - SLACK) & (value <= upper + SLACK)
-        legal.append(value)
-        if inside is not True:
-            within = within & inside
-    for i, value in enumerate(legal):
-        # values on all branch axes, one after the other, are written branch by branch in one loop
-        grid[..., i] = np.ascontiguousarray(np.broadcast_to(value, valid.shape))
-    part.valid[...] = True if valid.all() else valid.reshape(-1, N).T
-    part.within[...] = part.valid if within is valid else within.reshape(-1, N).T
-    part.branch[...] = _every_branch(part.branch.shape[1], arrays.CHUNK)[:N]
 
 
 @lru_cache(maxsize=8)

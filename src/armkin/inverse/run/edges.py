@@ -104,11 +104,13 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
             order = np.argsort(label, axis=1, kind="stable")
             on, joints = (np.take_along_axis(x[known], at[:, :, None], axis=1) for x in (found.q, found.joints))
             motion = np.concatenate([np.zeros(fixed.shape, bool), joints], axis=1)
-            seeds = Seeds.of(
-                np.take_along_axis(np.concatenate([fixed, on], axis=1), order[:, :, None], axis=1),
-                np.take_along_axis(label, order, axis=1),
+            seeds = Seeds(
+                q=np.take_along_axis(np.concatenate([fixed, on], axis=1), order[:, :, None], axis=1),
+                loose=np.zeros(order.shape, bool),
+                label=np.take_along_axis(label, order, axis=1),
+                sure=np.take_along_axis(motion, order[:, :, None], axis=1),
                 simple=np.take_along_axis(np.pad(doubts.simple[whose], ((0, 0), (0, at.shape[1]))), order, axis=1),
-            )._replace(sure=np.take_along_axis(motion, order[:, :, None], axis=1))
+            )
             out.append((whose, seeds))
         lacking = np.flatnonzero(found.lacking)
         part, q = part[lacking], q[lacking]

@@ -33,19 +33,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def solve(arm: Arm, target: Array, task: str | None, near: ArrayLike | None) -> Solutions | None:
-    """The branches of a single target; None if it is a batch, or if there is more to it."""
-    one = _prepared(arm, task)
-    if one is None or target.shape != one.shape:
-        return None
-    if near is None:
-        return one.solve(target, arm.home)
-    close = arrays.real(near, "near")
-    return one.solve(target, close) if close.shape == (arm.n,) and np.isfinite(close).all() else None
-
-
 @lru_cache(maxsize=64)
-def _prepared(arm: Arm, task: str | None) -> OneTarget | None:
+def prepared(arm: Arm, task: str | None) -> OneTarget | None:
     """The short way of an arm and task, prepared at its first use; None if there is none."""
     if actual(arm) is not arm or solver(arm, task)[1].pairs is None:
         return None
@@ -81,8 +70,15 @@ class OneTarget:
         self._same = {"arm": arm, "task": definition, "method": geometry.name, "why": geometry.why}
         self._same["names"] = branch_names(arm, definition, geometry, self.count)
 
-    def solve(self, target: Array, near: Array) -> Solutions | None:
-        """The branches of a target of the task's shape; near: (n,)."""
+    def solve(self, target: Array, given: ArrayLike | None) -> Solutions | None:
+        """The branches of a single target; None if it is a batch, or if there is more to it. given: `near`."""
+        if target.shape != self.shape:
+            return None
+        near = self._home
+        if given is not None:
+            near = arrays.real(given, "near")
+            if near.shape != (self._n,) or not np.isfinite(near).all():
+                return None
         goal, off = target.ravel().tolist(), 0.0
         if not math.isfinite(sum(goal)) or max(goal) > LARGEST or min(goal) < -LARGEST:
             return None

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.forward import fk
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACROSS, CROSSING, OFF_CURVE, SHORTEST_STEP, TINY
+from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -115,5 +117,5 @@ def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tupl
     back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):
         q = q + (back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
-        r = newton.residuals(arm, task, q, target)
+        r = residual(task, fk(arm, q), q, target, arm.reach)
     return q, V, np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))

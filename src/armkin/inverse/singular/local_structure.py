@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.forward import fk
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     ARRIVED,
@@ -30,6 +31,7 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     WEAK,
 )
+from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -137,7 +139,8 @@ def _second_order(
     def both_ways(away: Array) -> Array:
         """The pose's way f (2, M, rows) along away (2, M, n), in directions of U."""
         ends = (q + away * unit).reshape(-1, n)
-        f = r - newton.residuals(arm, task, ends, np.concatenate([target, target])).reshape(2, *r.shape)
+        goals = np.concatenate([target, target])
+        f = r - residual(task, fk(arm, ends), ends, goals, arm.reach).reshape(2, *r.shape)
         return np.asarray((f[..., None] * U).sum(axis=2))
 
     along = both_ways(SIGNS * FOLD_WAY * v).sum(axis=0) / FOLD_WAY**2
@@ -325,7 +328,8 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     U, S, V = np.linalg.svd(J)
     u, way = U[:, :, -1], FOLD_WAY * V[:, -1] * radian_or_reach(arm)
     both = np.concatenate([q + way, q - way])
-    ahead, behind = np.split(newton.residuals(arm, task, both, np.concatenate([target, target])), 2)
+    goals = np.concatenate([target, target])
+    ahead, behind = np.split(residual(task, fk(arm, both), both, goals, arm.reach), 2)
     bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / FOLD_WAY**2
     lost = (u * r).sum(axis=1)
     rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], HIGH)

@@ -12,14 +12,14 @@ HALF_TURN = 1e-6  # sine of the angle of a rotation that is about half a turn
 TINY = 1e-300  # keeps a quotient finite where its divisor is zero
 
 
-def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
-    """What is missing to the targets: (M, position + sums + orientation), mm first, then rad.
+def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -> Array:
+    """What is missing to the targets: (M, position + sums + orientation), lengths in units [mm] first, then rad.
 
     T: (M, 4, 4) the tool's poses; q: (M, n); target: (M, m) or (M, 4, 4).
     """
     if task.orientation == "full":
         out = np.empty((len(T), 6))
-        out[:, :3] = target[:, :3, 3] - T[:, :3, 3]
+        out[:, :3] = (target[:, :3, 3] - T[:, :3, 3]) / unit
         # half the sum of the columns' vector products is the rotation vector to third order
         C = np.ascontiguousarray(T[:, :3, :3]) @ np.ascontiguousarray(
             np.swapaxes(target[:, :3, :3], 1, 2)
@@ -30,7 +30,7 @@ def residual(task: Task, T: Array, q: Array, target: Array) -> Array:
         if far.any():
             out[far, 3:] = _rotation_vector(np.swapaxes(C[far], 1, 2))
         return out
-    parts = [target[:, : task.position] - T[:, : task.position, 3]]
+    parts = [(target[:, : task.position] - T[:, : task.position, 3]) / unit]
     if len(task.sums):
         wanted = target[:, task.position : task.position + len(task.sums)]
         angle = wanted - q @ task.sums.T - task.offsets
