@@ -19,7 +19,7 @@ _RESEND = 0.03  # [s] without progress, beyond the time of the slowest answer
 _GAP = 0.004  # [s] after all that was sent has left and an answer had its time
 _LATE = 0.012  # [s] without progress, before a question is to find out
 _EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
-_UNDER_WAY = 16  # frames
+_UNDER_WAY = 1, 16  # frames, on a bad line, where what follows one that is lost was sent for nothing, and on a good one
 _BYTES = (240, 700)  # under way, on a bad line and on a good one
 QUESTION = 12  # [bytes] of a STATUS? on the line
 
@@ -118,7 +118,8 @@ class Window:
     def _fill(self) -> None:
         credit = self._credit
         size = sum(len(data) for _, data in self._sent)
-        while self._waiting and len(self._sent) < _UNDER_WAY:
+        most = _UNDER_WAY[0 if self._line.noisy else 1]
+        while self._waiting and len(self._sent) < most:
             if self._waiting[0].segments > credit:
                 return
             data = protocol.wire(self._waiting[0].make((self._next + len(self._sent)) & 255))

@@ -8,7 +8,7 @@ from armkin.board.firmware import protocol
 from armkin.board.firmware.protocol import Ack, Info, Status
 from armkin.board.ports import Port
 
-_COPIES = 3  # of every frame, on a bad line
+_COPIES = 3  # of every frame, on a bad line, and of questions that nothing goes on without
 _LATE = 0.03  # [s] an answer may take
 _ASKING = 50  # [bytes] of a STATUS? and its answer, at least
 _PATIENCE, _SURELY = 0.05, 0.012  # [s] for an answer; beyond twice the slowest of those measured
@@ -36,6 +36,11 @@ class Line:
     def damaged(self) -> bool:
         """Whether anything at all was damaged or lost so far."""
         return self.splitter.bad + self.resent > 0
+
+    @property
+    def copies(self) -> int:
+        """How often a question is sent that nothing goes on without."""
+        return _COPIES if self.damaged else 1
 
     def write(self, data: bytes) -> None:
         """Send bytes."""

@@ -94,7 +94,7 @@ class Session:
     def _hello(self, nonce: int, timeout: float) -> Info | None:
         """Greet the board. A repeated nonce changes nothing there: the answer to the one before serves as well."""
         self._tag = (self._tag + 1) & 255
-        self.port.write(b"\0" + protocol.wire(protocol.hello(self._tag, nonce)))
+        self.port.write(b"\0" + protocol.wire(protocol.hello(self._tag, nonce)) * self.line.copies)
         end = self.port.now() + timeout
         while self.port.now() < end:
             for payload in self.line.splitter.feed(self.port.read(max(0.001, end - self.port.now()))):
@@ -190,10 +190,10 @@ class Session:
         if self._window:
             self._stalled()
 
-    def _ask(self, page: int = 0) -> int:
+    def _ask(self, page: int = 0, copies: int = 1) -> int:
         self._asked, self._tag = self.port.now(), (self._tag + 1) & 255
         self.line.asked(self._tag)
-        self.line.write(protocol.wire(protocol.status_query(self._tag, page)))
+        self.line.write(protocol.wire(protocol.status_query(self._tag, page)) * copies)
         return self._tag
 
     def _hear(self, timeout: float) -> None:
@@ -232,7 +232,7 @@ class Session:
         tags: list[int] = []  # asked since this was called: an answer may come later than the next question
         begin = self.port.now()
         while self.port.now() - begin < _QUIET:
-            tags.append(self._ask(page))
+            tags.append(self._ask(page, self.line.copies))  # each is answered: one of them will come through
             end = self.port.now() + self.line.patience
             while self.port.now() < end:
                 self._status = None
@@ -267,7 +267,7 @@ class Session:
             if self._stop():
                 raise StoppedError(self.hold())
             self._stalled()
-            self._hear(0.02)
+            self._hear(_POLL_SOON)
 
     def arrivals(self, seconds: float = 0.0) -> Iterator[float]:
         """Wait until all that was submitted is done and the arm stands; yields the seconds left.

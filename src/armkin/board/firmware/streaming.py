@@ -107,6 +107,8 @@ def _left_of(
     status = session.rest()
     if status.bad and not session.line.damaged:  # the board alone knows of it yet
         session.line.resent += 1
+    if session.line.damaged and not session.line.noisy:  # one frame that is lost, and sent again, holds nothing
+        session.line.resent += 1
     counts = [status.counts[axis] for axis in axes]
     if counts == plan.start.tolist():
         return plan
