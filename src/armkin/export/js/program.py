@@ -84,7 +84,8 @@ def _of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
 def _with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
     """The module of an arm with one joint to spare: the redundant joint is held, the module of the others solves."""
     name, task = arm.joint_names[spare.joint], spare.task
-    others = replace(lock(arm, {name: 0.0}), keep_out=(), whole=None)
+    plain = turned is arm and not arm.keep_out  # then it is prepared already
+    others = spare.rest if plain else replace(lock(arm, {name: 0.0}), keep_out=(), whole=None)
     inner = _of_all(others, task.name, driven=False).replace(part("head"), "")
     inner = re.sub("^export ", "", inner, flags=re.MULTILINE)
     way = arm.link[-1] if spare.joint else inverse(arm.link[0])
