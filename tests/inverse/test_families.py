@@ -254,3 +254,15 @@ def test_a_target_that_only_postures_outside_the_limits_reach_has_no_legal_inter
     assert found.status == Status.EXACT
     assert found.valid.any()
     assert not found.within_limits.any()
+
+
+@pytest.mark.parametrize(("k", "degrees", "count"), [(0, -1.38508, 2), (7, 119.39265, 4), (8, -84.25, 4)])
+def test_intervals_shorter_than_a_sample_are_listed(k: int, degrees: float, count: int) -> None:
+    """Beside a merge the other branch is legal for 1e-4 degrees; between two limits one is for 0.06."""
+    arm = armkin.load("panda")
+    _, target = postures(arm, None, 12, 5)
+    s = armkin.ik(arm, target[k])
+    assert s.interval is not None
+    value = float(np.deg2rad(degrees))
+    assert len(held_answers(arm, 6, value, target[k], None)) == count
+    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == count

@@ -12,7 +12,9 @@ singular/     what a solution is: isolated, boundary or self-motion manifold
 solvers/      which class an arm belongs to
 run/          how targets go through: one alone, chunks of a batch, threads
 held.py        joints that are held: the arm of the others, and its targets
-followed.py    answers of the other joints along the redundant one
+follower.py    answers of the other joints at any value of the redundant one
+followed.py    its branches, followed along it
+ends.py        where these end
 arm_angle.py   those curves in closed form, of a shoulder, an elbow and a wrist
 arcs.py        the same traced through all joints, of other joints without a closed form
 traced.py      and their families

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.followed import Follower, over_a_turn
+from armkin.inverse.follower import Follower, over_a_turn
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import CONVERGING, SAME_SEED, SHORTEST_ARC

@@ -20,7 +20,8 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.arcs import PLANES
 from armkin.inverse.arm_angle import Turning, arm_angle
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.followed import SAMPLES, Followed, Follower, Ik
+from armkin.inverse.followed import SAMPLES, Followed
+from armkin.inverse.follower import Follower, Ik
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import PROBE, SAME, SOLUTION
@@ -36,7 +37,7 @@ from armkin.model.limits import outside
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-AT_ONCE = 24_000  # targets of the other joints solved together
+AT_ONCE = 48_000  # targets of the other joints solved together
 CIRCLES = 64  # targets whose arm angles are worked on together
 TRACED = 8  # and whose curves are traced together
 FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free
@@ -179,7 +180,8 @@ class _Rows:
 
 
 def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
-    """The postures (P, n) of pieces that move the joints least from near (P, n): golden section around the best sample.
+    """The postures (P, n) of pieces that move the joints least from near (P, n): golden section around the best sample,
+    then where a joint stands as near has it.
 
     Of families without a legal posture they are that sample.
     """
@@ -215,6 +217,12 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
         cost = costs(some, new)
         left, right = np.where(go, new, right), np.where(go, left, new)
         at_left, at_right = np.where(go, cost, at_right), np.where(go, at_left, cost)
+    if len(some):  # where a joint passes its near in what is left the motion has a kink: by a secant
+        ends = [curves.at(p, t)[0] - near[some] for t in (low, high)]
+        passes = np.where(ends[0] * ends[1] < 0, np.abs(ends[1] - ends[0]), 0.0)
+        index = np.arange(len(some)), passes.argmax(axis=1)
+        a, b = (end[index] for end in ends)
+        costs(some, np.where(a * b < 0, low + (high - low) * a / np.where(a == b, 1.0, a - b), low))
     return best
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, wrapped
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -113,3 +113,26 @@ def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
     least = np.minimum.reduceat(costs, begin)
     where = np.flatnonzero(costs == np.repeat(least, count))
     return np.asarray(index[where[np.searchsorted(where, begin)]])
+
+
+def margin(arm: Arm, q: Array) -> Array:
+    """How far postures (..., n) are within the limits, negative beyond them (...) [rad | mm]; at most a turn."""
+    room = np.where(np.isnan(q[..., 0]), np.nan, 2 * np.pi)
+    for j in range(arm.n):
+        lower, upper = float(arm.lower[j]), float(arm.upper[j])
+        if not np.isfinite(lower) or not np.isfinite(upper) or (not arm.prismatic[j] and upper - lower >= 2 * np.pi):
+            continue
+        off = q[..., j] - 0.5 * (lower + upper)
+        off = np.abs(off if arm.prismatic[j] else wrapped(off))
+        np.minimum(room, 0.5 * (upper - lower) - off, out=room)
+    return room
+
+
+def turning(values: Array) -> Bool:
+    """Whether values of one sign at a sample and the next seem to have the other one in between, if they go on as on
+    the far sides of both: (N, K, B)."""
+    following = np.roll(values, -1, axis=1)
+    with np.errstate(invalid="ignore"):
+        on, back = 2 * values - np.roll(values, 1, axis=1), 2 * following - np.roll(values, -2, axis=1)
+        up, down = (values < 0) & (following < 0), (values > 0) & (following > 0)
+        return np.asarray((up & (on > 0) & (back > 0)) | (down & (on < 0) & (back < 0)))

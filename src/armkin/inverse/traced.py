@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.arcs import Points, curves_of, onto
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.followed import Follower
+from armkin.inverse.follower import Follower
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CONVERGING, REACH
-from armkin.inverse.pieces import Int, Pieces, best_samples, holding_none, motion, none, runs
+from armkin.inverse.pieces import Int, Pieces, best_samples, holding_none, margin, motion, none, runs
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
 ON_LIMIT, ON_TURN = 12, 14  # steps to where a limit is crossed, and to where the joint turns back
-STEPS = 24  # of the golden section
+STEPS = 16  # of the golden section
 
 
 class Traced(NamedTuple):
@@ -97,7 +94,7 @@ class Traced(NamedTuple):
         q, tangent, P = self.points.q, self.points.tangent, len(whose)
         index = np.arange(P)
         chord, next_tangent = self.chord(index), tangent[self.after]
-        legal = _margin(arm, q) >= -SLACK
+        legal = margin(arm, q) >= -SLACK
         up = tangent[:, j] * (tangent * chord).sum(axis=1) > 0
         next_up = next_tangent[:, j] * (next_tangent * chord).sum(axis=1) > 0
         alive = self.after != index
@@ -137,12 +134,12 @@ class Traced(NamedTuple):
         """Shares of the way (M,) at which a limit is crossed: regula falsi, the Illinois way."""
         arm = self.find.arm
         lo, hi = np.zeros(len(point)), np.ones(len(point))
-        at_lo, at_hi = _margin(arm, self.points.q[point]), _margin(arm, self.points.q[self.after[point]])
+        at_lo, at_hi = margin(arm, self.points.q[point]), margin(arm, self.points.q[self.after[point]])
         share, side = 0.5 * (lo + hi), np.zeros(len(point))
         for _ in range(ON_LIMIT if len(point) else 0):
             apart = np.where(at_hi == at_lo, 1.0, at_hi - at_lo)
             share = np.where(at_hi == at_lo, 0.5 * (lo + hi), (lo * at_hi - hi * at_lo) / apart)
-            value = _margin(arm, self.between(row, point, share).q)
+            value = margin(arm, self.between(row, point, share).q)
             low = (value >= 0) == (at_lo >= 0)
             at_hi = np.where(low, np.where(side > 0, 0.5 * at_hi, at_hi), value)
             at_lo = np.where(low, value, np.where(side < 0, 0.5 * at_lo, at_lo))
@@ -197,15 +194,6 @@ class _Nodes(NamedTuple):
             at(np.maximum(on - 1, first)), at(on), at(np.minimum(on + 1, first + length)),
             self.q[on % K],
         )  # fmt: skip
-
-
-def _margin(arm: Arm, q: Array) -> Array:
-    """How far postures (M, n) are within the limits, negative beyond them (M,) [rad | mm]; at most a turn."""
-    whole = np.isinf(arm.lower) | np.isinf(arm.upper) | (~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi))
-    lower, upper = np.where(whole, 0.0, arm.lower), np.where(whole, 0.0, arm.upper)
-    half, off = 0.5 * (upper - lower), q - 0.5 * (lower + upper)
-    room = half - np.abs(np.where(arm.prismatic, off, wrapped(off)))
-    return np.asarray(np.where(whole, 2 * np.pi, room).min(axis=1))
 
 
 def _nothing(n: int) -> Points:
