@@ -58,6 +58,9 @@ def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
         sides = [np.stack([np.interp(at, u, y[:, k]) for k in range(y.shape[1])], axis=1) for at in (before, after)]
         far = turns(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
         sharp = sharp[far > CORNER]
+    # nearer to each other than the points are known they are a tight bend and noise, if a curve passes them
+    apart = np.diff(u[sharp], prepend=-np.inf, append=np.inf) > tolerance
+    sharp = sharp[apart[:-1] & apart[1:]]
     found[sharp] = True
     found[ends[1:-1]] = True
     return found
@@ -110,7 +113,7 @@ def _curves(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Array,
         bad = off > 1.0
         missed[rows.point[bad & (rows.point >= 0)]] = True
         cubics = layout.powers(control)
-        for beside in (rows.chord[bad & (rows.point < 0)], _astray_chords(chords, layout, cubics, tolerance)):
+        for beside in (rows.chord[bad & (rows.point < 0)], _astray_chords(chords, bent, layout, cubics, tolerance)):
             missed[beside] = missed[beside + 1] = True
         missed |= _astray_points(chords, bent, layout, cubics, tolerance)
         begin, end = np.append(begin, layout.begin), np.append(end, layout.end)
@@ -138,16 +141,20 @@ def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
     return inside
 
 
-def _astray_chords(chords: Chords, layout: Layout, cubics: Array, tolerance: float) -> Int:
+def _astray_chords(chords: Chords, used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Int:
     """Chords that a cubic leaves between the places that it was fitted to: their numbers."""
-    f = (np.arange(_BETWEEN) + 0.5)[:, None, None] / _BETWEEN
-    p = cubics[:, 0] + f * (cubics[:, 1] + f * (cubics[:, 2] + f * cubics[:, 3]))
-    at = layout.begin + f[..., 0] * (layout.end - layout.begin)
-    k = np.clip(np.searchsorted(chords.u, at, side="right") - 1, 0, len(chords.length) - 1)
-    unit = chords.step[k] / chords.length[k][..., None]
+    f = (np.arange(_BETWEEN) + 0.5)[:, None] / _BETWEEN
+    k = np.flatnonzero(used)
+    u = np.append(layout.begin + f * (layout.end - layout.begin), chords.u[k] + f * chords.length[k])
+    i = np.searchsorted(layout.begin, u, side="right") - 1
+    h = ((u - layout.begin[i]) / (layout.end[i] - layout.begin[i]))[:, None]
+    c0, c1, c2, c3 = (cubics[:, j][i] for j in range(4))
+    p = c0 + h * (c1 + h * (c2 + h * c3))
+    k = np.clip(np.searchsorted(chords.u, u, side="right") - 1, 0, len(chords.length) - 1)
+    unit = chords.step[k] / chords.length[k][:, None]
     off = p - chords.y[k]
-    along = np.clip((off * unit).sum(axis=2), 0.0, chords.length[k])
-    away = np.linalg.norm(off - along[..., None] * unit, axis=2)
+    along = np.clip((off * unit).sum(axis=1), 0.0, chords.length[k])
+    away = np.linalg.norm(off - along[:, None] * unit, axis=1)
     return np.unique(k[away > tolerance + chords.sagitta[k]])
 
 

@@ -27,6 +27,7 @@ _EACH = (4, 64)  # of a section between two bends, at least, with many sections 
 _FEWEST = 2  # of a section where slopes are exact: they need no neighbours
 _GROWTH = 3.0  # of an interval beside the next one, at most: motions speed up and slow down beside bends
 _GROWS = 1.3  # times that: what is hardly longer stays
+_AROUND = 0.5  # [mm] of the way, about a given point
 _REST = 32  # intervals from rest to rest, at least, where there are many rests
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
@@ -228,7 +229,13 @@ def missed(arm: Arm, route: Route, path: Knots) -> Missed:
             tangent = (np.asarray(jacobian(arm, q)[:, : given.shape[1]]) @ slope[:, :, None])[..., 0]
             size = np.maximum((tangent**2).sum(axis=1), 1e-300)
             at = at + np.clip((off * tangent).sum(axis=1) / size, -1.0, 1.0)
-        k = int(distance.argmax())
+        k, sure = -1, set[int]()
+        while k not in sure:  # in a tight bend the search may have left it: the worst is looked for place by place
+            sure.add(k)
+            k = int(distance.argmax())
+            near = np.clip(s[i + k] + np.linspace(-_AROUND, _AROUND, 401), path.s[0], path.s[-1])
+            off = given[k] - position(arm, path.at(near)[0])[:, : given.shape[1]]
+            distance[k] = min(distance[k], float(np.linalg.norm(off, axis=1).min()))
         if worst is None or distance[k] > worst[0]:
             worst = float(distance[k]), float(s[i + k])
     return worst

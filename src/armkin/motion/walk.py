@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -170,7 +171,8 @@ class Walk:
         self._spot = dense.last
         made = dense.pieces(self.pace.tolerance)
         self.pieces += made
-        self.blends += [*[None] * (len(made) - 1), corner]
+        # curves of points meet where the way turns back: a blend there would pass the points beside it by
+        self.blends += [None if a.dense is None and b.dense is None else 0.0 for a, b in pairwise(made)] + [corner]
 
     def corner(self, move: Move, inner: bool = False) -> float | None:
         """How the corner at a move's end is passed: the radius of its blend, None: by the tolerance."""
