@@ -297,13 +297,13 @@ def _form(rows: Array) -> Array:
     return np.asarray(rows.T @ rows)
 
 
-def recognise(arm: Arm, task: Task, tolerance: float = EXACT, near: float = NEARLY_SPECIAL) -> Geometry | None:
-    """Any three joints that place a point; none that is nearer than `near` to a special case but not one."""
+def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+    """Any three joints that place a point; none that is near a special case but not one."""
     if task.name != "xyz" or arm.n != 3:
         return None
     if rank(arm, task) < 3:
         raise UsageError(f"{arm.name}: its three joints cannot place a point: they move it in a plane or on a line")
-    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance, near)
+    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance, NEARLY_SPECIAL)
     if position.close and tolerance == EXACT:
         return None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)

@@ -4,10 +4,11 @@ The closed form of the class that such an arm almost belongs to gives seeds, whi
 method moves onto the true arm. Branches continue each other as long as no singularity lies
 between the two arms: where those of the similar arm move too much, appear or vanish as the
 target is moved by a few times the distance between the arms, the pose is in doubt. Six joints
-then go to the elimination, which needs no special class; for fewer, the similar arm's branches
-at the targets around give more seeds. There is no proof that nothing is lost in between,
-hence `complete` is False. Where the elimination is healthy on the arm, as the share of poses that its first two
-passes settle shows, six joints go straight to it, and the similar arm only names the branches.
+then go to the elimination, which needs no special class; of three turning joints all roots are
+eigenvalues (`position_pencil`). For others, the similar arm's branches at the targets around give
+more seeds: there is no proof that nothing is lost in between, hence `complete` is False. Where the
+elimination is healthy on the arm, as the share of poses that its first two passes settle shows,
+six joints go straight to it, and the similar arm only names the branches.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from armkin.inverse.numeric.tolerances import (
     SOLUTION,
     STEADY,
 )
-from armkin.inverse.solvers import general
+from armkin.inverse.solvers import general, position_pencil
 from armkin.inverse.tasks.fitting import NEARLY_PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.rotation import rotation_about
@@ -102,8 +103,8 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     slow = Geometry(f"near {alike.name}", why, False, rows=rows, branches=math.prod(sizes) if sizes else None, **named)
     if corrected is None:
         return slow
-    quartic = three_joints.recognise(arm, task, near=NEAR)
-    return Geometry(slow.name, why, counted, corrected, doubts=quartic or slow, **named)
+    pencil = position_pencil.recognise(arm, task, alike, slow.why) if counted else None
+    return Geometry(slow.name, why, counted, corrected, doubts=pencil or slow, **named)
 
 
 def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geometry | None) -> Geometry | None:

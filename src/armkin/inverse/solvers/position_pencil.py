@@ -1,0 +1,160 @@
+"""Three turning joints near a special case: all four roots from an eigenvalue problem that the nearness does not blur.
+
+Of ``closed.three_joints``' two equations ``A g = r(q3)``, ``g = Rz(q2) y``, A is then nearly of rank one: by its
+singular values S0, ``S1 << S0``, ``S1 (V1 . g) = e(q3)`` and ``V0 . g = m(q3)``, both affine in (1, cos q3, sin q3).
+As ``|g| = |y|`` across joint 2, ``e^2 + S1^2 (m^2 - y1^2 - y2^2) = 0``. Multiplied out this is a quartic whose roots
+lie in pairs, S1 apart. It is also
+
+    det [ e - S1 y1, S1 (y2 - m) ; S1 (y2 + m), e + S1 y1 ] = 0,
+
+whose entries are affine, too: with the tangent of half an angle a quadratic pencil of two rows (Tisseur & Meerbergen,
+The Quadratic Eigenvalue Problem, 2001), linearised four eigenvalues. Rounding moves its entries by as much as those of
+one joint alone, and with them the roots by 1e-16 / S1: nothing is lost, unless two roots all but meet.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.closed.candidates import recorded
+from armkin.inverse.closed.geometry import Geometry, Rows
+from armkin.inverse.closed.three_joints import Position
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.tolerances import ANSWERED, APART_ROOTS, DOUBLE_ROOT, EXACT, NEARBY, TINY
+from armkin.inverse.tasks.task import Task
+from armkin.model.chain import Chain
+from armkin.model.rotation import inverse
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+CHUNK = 1024  # targets solved at once
+LEAST = 1e-10  # S1 / S0 from which on roots that are not one are told apart
+BLUR = 3e-8  # [rad] square root of how far rounding moves roots, times that of S1 / S0
+ALL = np.array(list(permutations(range(4))))  # which of four roots goes where
+
+
+class _Roots(NamedTuple):
+    """q (N, 4, 3); real (N, 4); off (N, 4) [rad]: imaginary part of joints 2 and 3; loose (N,): one is free."""
+
+    q: Array
+    real: Bool
+    off: Array
+    loose: Bool
+
+
+class Pencil:
+    """The equations of an arm of three turning joints, prepared."""
+
+    def __init__(self, arm: Arm, task: Task) -> None:
+        tip = arm.link[3][:3, 3]
+        position = Position(Chain(arm.link, arm.prismatic), tip, EXACT, 0.0)
+        self.arm, self.task, self.scale = arm, task, position.scale
+        self.from_base, self.rest = inverse(arm.link[0]), position.rest
+        self.weights = np.array([[1.0, 0.0], [0.0, 1.0 / position.scale]])
+        U, S, self.V = np.linalg.svd(self.weights @ position.A)
+        self.weights = U.T @ self.weights / position.scale
+        self.weights[0] /= S[0]
+        self.small, self.tight = float(S[1]), float(S[1] / max(S[0], TINY))
+        self.fixed = np.array([position._affine(w, [0.0, 0.0])[:3] for w in self.weights], float)
+        self.tip = position.Y / position.scale
+        self.touching = max(DOUBLE_ROOT, BLUR / max(self.tight, LEAST) ** 0.5)
+
+    def roots(self, target: Array) -> _Roots:
+        """All four roots of targets (N, 3), complex ones by their real parts."""
+        p = target @ self.from_base[:3, :3].T + self.from_base[:3, 3]
+        known = np.stack([p[:, 2], 0.5 * (p * p).sum(axis=1)], axis=1) - self.rest
+        main, alone = (np.broadcast_to(one, (len(p), 3)).copy() for one in self.fixed)
+        main[:, 0] += known @ self.weights[0]
+        alone[:, 0] += known @ self.weights[1]
+        half, cosine, sine = self._half_tangents(main, alone)
+        down = 1.0 / (1.0 + half * half)
+        c, s = (1.0 - half * half) * down, 2.0 * half * down
+        c, s = cosine * c - sine * s, sine * c + cosine * s
+
+        def at(row: Array) -> Array:
+            return row[..., 0, None] + row[..., 1, None] * c + row[..., 2, None] * s
+
+        h0, h1 = at(main), at(alone) / self.small
+        gx, gy = (self.V[0, k] * h0 + self.V[1, k] * h1 for k in range(2))
+        x, y, z = (at(row) for row in self.tip)
+        across = x * x + y * y
+        loose = np.abs(across) < NEARBY
+        across = np.where(loose, 1.0, across)
+        c2, s2 = (x * gx + y * gy) / across, (x * gy - y * gx) / across
+        off = np.maximum(_imaginary(c, s), _imaginary(c2, s2))
+        q2, q3 = np.arctan2(s2.real, c2.real), np.arctan2(s.real, c.real)
+        c2, s2 = np.cos(q2), np.sin(q2)
+        there = np.stack([c2 * x.real - s2 * y.real, s2 * x.real + c2 * y.real, z.real], axis=2)
+        there = there @ self.arm.link[1][:3, :3].T + self.arm.link[1][:3, 3] / self.scale
+        q1 = np.arctan2(p[:, 1], p[:, 0])[:, None] - np.arctan2(there[..., 1], there[..., 0])
+        free = (np.hypot(there[..., 0], there[..., 1]) < NEARBY) | loose
+        return _Roots(np.stack([q1, q2, q3], axis=2), half.imag == 0.0, off, free.any(axis=1))
+
+    def _half_tangents(self, main: Array, alone: Array) -> tuple[Array, Array, Array]:
+        """Eigenvalues (N, 4): tan((q3 - psi) / 2); cosine and sine of psi, (N, 1): at ``psi + pi`` e is largest."""
+        k, N = self.small, len(main)
+        M = np.empty((N, 3, 2, 2))
+        M[:, :, 0, 0], M[:, :, 0, 1] = alone - k * self.tip[0], k * (self.tip[1] - main)
+        M[:, :, 1, 0], M[:, :, 1, 1] = k * (self.tip[1] + main), alone + k * self.tip[0]
+        turn = np.hypot(alone[:, 1], alone[:, 2]) + TINY
+        turn = np.where(alone[:, 0] < 0.0, turn, -turn)[:, None]
+        cosine, sine = alone[:, 1:2] / turn, alone[:, 2:3] / turn
+        c, s = cosine[:, :, None], sine[:, :, None]
+        along, across = c * M[:, 1] + s * M[:, 2], c * M[:, 2] - s * M[:, 1]
+        companion = np.zeros((N, 4, 4))
+        companion[:, 0, 2] = companion[:, 1, 3] = 1.0
+        rest = np.concatenate([M[:, 0] + along, 2.0 * across], axis=2)
+        companion[:, 2:] = -nudged(np.linalg.solve, M[:, 0] - along, rest)
+        return np.linalg.eigvals(companion), cosine, sine
+
+
+def _imaginary(c: NDArray[np.complexfloating], s: NDArray[np.complexfloating]) -> Array:
+    """The imaginary part [rad] of an angle whose cosine and sine these are."""
+    return np.abs(np.log(np.maximum(np.abs(c + 1j * s), TINY)))
+
+
+def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | None:
+    """All roots of three turning joints near the class of `alike`, whose branches' places they take."""
+    pencil = Pencil(arm, task)
+    seeds = recorded(arm, task, alike)
+    if pencil.tight < LEAST or np.prod(seeds.axes) != 4:
+        return None
+
+    def rows(target: Array) -> Rows:
+        parts = [_solved(pencil, target[k : k + CHUNK]) for k in range(0, max(len(target), 1), CHUNK)]
+        q, doubt, guesses = (np.concatenate(column) for column in zip(*parts, strict=True))
+        order = _order(newton.wrapped_distance(arm, q[:, None], seeds.rows(target)[0][:, :, None]))
+        q = np.take_along_axis(q, order[:, :, None], axis=1)
+        return Rows(q, doubt, np.ones(len(target), bool), None, guesses)
+
+    return Geometry(f"near {alike.name}", why, True, rows=rows, labels=alike.labels, ordered=alike.ordered, branches=4)
+
+
+def _solved(pencil: Pencil, target: Array) -> tuple[Array, Bool, Array]:
+    """Branches (N, 4, 3), nan where a root is not real; which targets are in doubt; complex roots that all but are."""
+    arm, task, found = pencil.arm, pencil.task, pencil.roots(target)
+    row, place = np.nonzero(found.real)
+    better, size = newton.correct(arm, task, found.q[row, place], target[row])
+    q = np.full_like(found.q, np.nan)
+    q[row, place] = np.where((size <= ANSWERED)[:, None], better, np.nan)
+    missing = np.isnan(q[:, :, 0])
+    beside = missing & (found.real | (found.off < pencil.touching))
+    with np.errstate(invalid="ignore"):
+        apart = newton.wrapped_distance(arm, q[:, :, None], q[:, None]) + 9.0 * np.eye(4)
+        merged = (apart < max(APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
+    doubt = beside.any(axis=1) | merged | found.loose
+    return q, doubt, np.where(beside[:, :, None], found.q, np.nan)
+
+
+def _order(away: Array) -> NDArray[np.intp]:
+    """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
+    away = np.where(np.isnan(away), np.pi, away)
+    cost = away[:, np.arange(4), ALL].sum(axis=2)
+    return ALL[cost.argmin(axis=1)]
