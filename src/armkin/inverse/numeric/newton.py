@@ -115,6 +115,15 @@ def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:
     return largest
 
 
+def distances(arm: Arm, a: Array, b: Array) -> Array:
+    """`wrapped_distance` of each of a (N, A, n) to each of b (N, B, n): (N, A, B)."""
+    out = np.zeros((len(a), a.shape[1], b.shape[1]))
+    for i, slides in enumerate(arm.prismatic):  # one joint at a time: all at once leave the processor's cache
+        d = np.ascontiguousarray(a[:, :, None, i]) - np.ascontiguousarray(b[:, None, :, i])
+        np.maximum(out, np.abs(d / arm.reach if slides else wrapped(d)), out=out)
+    return out
+
+
 def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array, NDArray[np.int64]]:
     """Smallest singular value (M,) of the task's Jacobian, right vectors (M, n, n), and nullity (M,) below 1e-6."""
     return null_space_of(arm, task, scaled(arm, task, q, target)[1])

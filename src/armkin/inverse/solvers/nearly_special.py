@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
 from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
 
 
 CHUNK = 1024  # poses corrected at once
+NAMED_AT_ONCE = 256  # branches are named: buffers of so many are kept
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
 SICK = 0.08  # share of poses that a healthy elimination leaves open in its first two passes
 APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
@@ -116,8 +117,8 @@ def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geome
     solve, named = general_.rows, math.prod(2 if label else 1 for label in alike.labels)
 
     def places(q: Array, target: Array) -> NDArray[np.intp]:
-        starts = range(0, max(len(target), 1), CHUNK)
-        parts = [slice(k, k + CHUNK) for k in starts]
+        starts = range(0, max(len(target), 1), NAMED_AT_ONCE)
+        parts = [slice(k, k + NAMED_AT_ONCE) for k in starts]
         return np.concatenate([_places(arm, task, alike, off, q[some], target[some]) for some in parts])
 
     def rows(target: Array) -> Rows:
@@ -147,12 +148,8 @@ def _places(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target:
     there = ~np.isnan(q[:, :, 0])
     numbers = np.full(there.shape, -1)
     if q.size:
-        away = np.zeros((len(target), B, q.shape[1]))
         with np.errstate(invalid="ignore"):
-            for i in range(arm.n):  # one joint at a time: all at once leave the processor's cache
-                a, b = np.ascontiguousarray(q[:, None, :, i]), np.ascontiguousarray(seed[:, :, None, i])
-                far = (a - b) / arm.reach if arm.prismatic[i] else wrapped(a - b)
-                away = np.maximum(away, np.abs(far), out=away)
+            away = newton.distances(arm, seed, q)  # (N, B, M)
             real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
         away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
         nearest, back = away.argmin(axis=2), away.argmin(axis=1)
@@ -238,7 +235,7 @@ def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
 def _four(arm: Arm, q: Array) -> Bool:
     """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
     with np.errstate(invalid="ignore"):
-        near = newton.wrapped_distance(arm, q[:, :, None], q[:, None]) < APART_ROOTS
+        near = newton.distances(arm, q, q) < APART_ROOTS
     there = ~np.isnan(q[:, :, 0])
     return np.asarray((there.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
 

@@ -130,7 +130,7 @@ def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | Non
     def rows(target: Array) -> Rows:
         parts = [_solved(pencil, target[k : k + CHUNK]) for k in range(0, max(len(target), 1), CHUNK)]
         q, doubt, guesses = (np.concatenate(column) for column in zip(*parts, strict=True))
-        order = _order(newton.wrapped_distance(arm, q[:, None], seeds.rows(target)[0][:, :, None]))
+        order = _order(newton.distances(arm, seeds.rows(target)[0], q))
         q = np.take_along_axis(q, order[:, :, None], axis=1)
         return Rows(q, doubt, np.ones(len(target), bool), None, guesses)
 
@@ -147,7 +147,7 @@ def _solved(pencil: Pencil, target: Array) -> tuple[Array, Bool, Array]:
     missing = np.isnan(q[:, :, 0])
     beside = missing & (found.real | (found.off < pencil.touching))
     with np.errstate(invalid="ignore"):
-        apart = newton.wrapped_distance(arm, q[:, :, None], q[:, None]) + 9.0 * np.eye(4)
+        apart = newton.distances(arm, q, q) + 9.0 * np.eye(4)
         merged = (apart < max(APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
     doubt = beside.any(axis=1) | merged | found.loose
     return q, doubt, np.where(beside[:, :, None], found.q, np.nan)
