@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula import arrays
 from armkin.formula.arrays import Array
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 SMALL = 256  # poses: buffers of batches up to this are kept, as making them costs more than filling them
 UNCOPIED = 512  # elements of numpy's buffers: it copies operands that are repeated on a branch axis if two rows fit
+CACHE = 6_000_000  # [bytes] that buffers take: two thirds of the time of 15 MB, with a cache of 2 MB a core
 LENGTHS = 16  # of batches, for which a thread keeps buffers
 
 
@@ -32,16 +35,28 @@ class StraightLineCode:
         self._run_single: Callable[..., tuple[Any, ...]] | None = None
         self._kept = threading.local()
 
-    def workspace(self, length: int) -> list[NDArray[Any]]:
-        """Buffers for batches of that length, to be passed to `run`; every thread has its own, and keeps small ones."""
+    def at_once(self) -> int:
+        """How many poses are worked on at once: fewer than `CHUNK` where buffers of so many would leave the cache."""
+        each = sum(math.prod(b.axes) * np.dtype(b.dtype).itemsize for b in self._written()[1] if b.whole < 0)
+        return min(arrays.CHUNK, max(CACHE // each, SMALL))
+
+    def _written(self) -> tuple[numpy_code.Run, list[numpy_code.Buffer]]:
+        """The code for batches, and what buffers it needs."""
         from armkin.formula import numpy_code
 
         if self._batch is None:
             self._batch = numpy_code.write(self._recording)
+        return self._batch
+
+    def workspace(self, length: int) -> list[NDArray[Any]]:
+        """Buffers for batches of that length, to be passed to `run`; every thread has its own, and keeps small ones."""
+        from armkin.formula import numpy_code
+
+        _, needed = self._written()
         kept: dict[int, list[NDArray[Any]]] = self._kept.__dict__.setdefault("buffers", {})
         if length in kept:
             return kept[length]
-        buffers = numpy_code.workspace(self._batch[1], length)
+        buffers = numpy_code.workspace(needed, length)
         if length <= SMALL:
             if len(kept) >= LENGTHS:
                 kept.clear()

@@ -74,15 +74,16 @@ def nearest_copy(value: Array, near: Array | float, lower: float, upper: float) 
 
 def _principal(value: Array) -> Array:
     """Values in [-pi, pi]; half a turn, which has two, as the positive one."""
-    negative = value < SLACK - np.pi
-    return np.where(negative, value + TURN, value) if negative.any() else value
+    if value.min(initial=0.0) >= SLACK - np.pi:
+        return value
+    return np.where(value < SLACK - np.pi, value + TURN, value)
 
 
 def _half_turned(value: Array, near: Array | float, low: float, high: float) -> Array:
     """Principal values; of half a turn the copy that is legal and nearer."""
-    some = np.flatnonzero(value > np.pi - SLACK)
-    if not len(some):
+    if value.max(initial=0.0) <= np.pi - SLACK:
         return value
+    some = np.flatnonzero(value > np.pi - SLACK)
     one, close = value.take(some), np.broadcast_to(near, value.shape).flat[some]
     other = one - TURN
     legal = (one >= low) & (one <= high)

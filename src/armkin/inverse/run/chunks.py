@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
+TURNED_AT_ONCE = 512  # poses whose columns become rows: both stay in a core's own cache
+
+
 class Solved(NamedTuple):
     """A batch, how many branch columns the class has, the targets as they were solved, and their `rounding`.
 
@@ -56,6 +59,7 @@ def solve(
     near: (N, n), one: (n,) if it serves all; workers: threads.
     """
     runner, N = recorded(arm, task, geometry), len(given)
+    step = runner.code.at_once() if N > 1 else 1
     out = empty(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(given), np.zeros(N)
     tip = None if one is None else position(arm, one)
@@ -64,8 +68,8 @@ def solve(
         """Some rows, by a thread of its own; returns those on an edge."""
         workspace: list[NDArray[Any]] = []
         left: list[NDArray[np.intp]] = []
-        for start in range(rows.start, rows.stop, arrays.CHUNK):
-            some = slice(start, min(start + arrays.CHUNK, rows.stop))
+        for start in range(rows.start, rows.stop, step):
+            some = slice(start, min(start + step, rows.stop))
             goal, columns, close = given[some], None, near[some] if one is None else one
             if task.orientation == "full":
                 goal, rounding[some], columns = read_poses(goal)
@@ -84,7 +88,7 @@ def solve(
             left.append(start + _keep(goals, runner.axes, out.part(some), found, close, there))
         return left
 
-    parts = [part(slice(0, N))] if workers == 1 else shared(part, N, workers, arrays.CHUNK, arrays.CHUNK)
+    parts = [part(slice(0, N))] if workers == 1 else shared(part, N, workers, step, step)
     edge = np.concatenate([np.empty(0, np.intp), *(rows for one_part in parts for rows in one_part)])
     out.complete[...] = geometry.complete
     if geometry.doubts is None:
@@ -115,7 +119,7 @@ def _keep(
     shape, B = (*axes, N), math.prod(axes)
     miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
     valid = within = miss <= ACCEPTED**2
-    full, legal = bool(valid.all()), []
+    full, legal = bool(valid.all()), np.empty((*axes, arm.n, N))
     for i, value in enumerate(values):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
         inside: Truth = True
@@ -123,13 +127,13 @@ def _keep(
             value, inside = nearest_copy(value, float(near[i]) if near.ndim == 1 else near[:, i], lower, upper)
         elif lower > -np.inf or upper < np.inf:
             inside = (value >= lower - SLACK) & (value <= upper + SLACK)
-        legal.append(value)
+        legal[..., i, :] = value
         if inside is not True:
             within = (within.reshape(shape) & inside).reshape(B, N)
-    grid = part.q.reshape(N, *axes, arm.n).transpose(1, 2, 3, 0, 4)  # the branch axes in front of the poses
-    for i, value in enumerate(legal):
-        # values on all branch axes, one after the other, are written branch by branch in one loop
-        grid[..., i] = np.ascontiguousarray(np.broadcast_to(value, shape))
+    columns, rows = legal.reshape(-1, N), part.q.reshape(N, -1)
+    for start in range(0, N, TURNED_AT_ONCE):
+        some = slice(start, start + TURNED_AT_ONCE)
+        rows[some] = columns[:, some].T
     part.valid[...] = True if full else valid.T
     part.within[...] = part.valid if within is valid else within.T
     part.branch[...] = _every_branch(B, arrays.CHUNK)[:N]
