@@ -52,6 +52,8 @@ TOUCHING = 1e-4  # complex roots this close to the real line may be a double roo
 EXACT = 1e-12  # axes parallel or meeting to this count as exactly so
 NEAR = 1e-3  # and to this as nearly so: `armkin.inverse.solvers.nearly_special`
 NEARLY_SPECIAL = 0.015  # the same where the roots of three joints are counted: seeds lead to nearly all of them
+NO_SECOND = 1e-10  # second singular value over the first below which a matrix of two rows is of rank one
+BLUR_OF_PAIRS = 3e-8  # [rad] how far rounding parts two roots of such a matrix, times the square root of that quotient
 STEADY = 0.05  # singular value above which a branch of an arm near a class continues one of the class
 FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete
 

@@ -26,7 +26,16 @@ from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.linalg import nudged
-from armkin.inverse.numeric.tolerances import ANSWERED, APART_ROOTS, DOUBLE_ROOT, EXACT, NEARBY, TINY
+from armkin.inverse.numeric.tolerances import (
+    ANSWERED,
+    APART_ROOTS,
+    BLUR_OF_PAIRS,
+    DOUBLE_ROOT,
+    EXACT,
+    NEARBY,
+    NO_SECOND,
+    TINY,
+)
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain
 from armkin.model.rotation import inverse
@@ -35,8 +44,6 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 CHUNK = 1024  # targets solved at once
-LEAST = 1e-10  # S1 / S0 from which on roots that are not one are told apart
-BLUR = 3e-8  # [rad] square root of how far rounding moves roots, times that of S1 / S0
 ALL = np.array(list(permutations(range(4))))  # which of four roots goes where
 
 
@@ -64,7 +71,7 @@ class Pencil:
         self.small, self.tight = float(S[1]), float(S[1] / max(S[0], TINY))
         self.fixed = np.array([position._affine(w, [0.0, 0.0])[:3] for w in self.weights], float)
         self.tip = position.Y / position.scale
-        self.touching = max(DOUBLE_ROOT, BLUR / max(self.tight, LEAST) ** 0.5)
+        self.touching = max(DOUBLE_ROOT, BLUR_OF_PAIRS / max(self.tight, NO_SECOND) ** 0.5)
 
     def roots(self, target: Array) -> _Roots:
         """All four roots of targets (N, 3), complex ones by their real parts."""
@@ -124,7 +131,7 @@ def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | Non
     """All roots of three turning joints near the class of `alike`, whose branches' places they take."""
     pencil = Pencil(arm, task)
     seeds = recorded(arm, task, alike)
-    if pencil.tight < LEAST or np.prod(seeds.axes) != 4:
+    if pencil.tight < NO_SECOND or np.prod(seeds.axes) != 4:
         return None
 
     def rows(target: Array) -> Rows:
