@@ -25,7 +25,7 @@ from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.linalg import nudged
+from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import (
     ANSWERED,
     APART_ROOTS,
