@@ -34,7 +34,7 @@ ROUNDS = 8  # the best one counts: the first ones may run while machine code is 
 PAUSE = 2.5  # [s] between them
 STARTS = 5
 WINDOW: ViewportSize = {"width": 1440, "height": 900}
-POSES = {"three_dof": [10, 60, -60], "ur5e": [20, -70, 80, -60, 70, 10]}
+POSES: dict[str, list[float]] = {"three_dof": [10, 60, -60], "ur5e": [20, -70, 80, -60, 70, 10]}
 WATCH = """() => {
   window.seen = []; window.moved = 0;
   addEventListener('pointermove', () => { window.moved = performance.now(); }, true);
