@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -211,3 +212,29 @@ def test_what_is_played_is_where_the_tip_is_however_long_it_takes(arm: armkin.Ar
     assert off.max() < 0.5
     assert shown["shown_mm"] < 0.5
     assert len(time) < 30_000
+
+
+def test_an_edit_does_not_wait_for_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    import armkin.motion.path
+
+    with served() as server:
+        page = Page(server)
+        assert page.act("program", do="record", kind="joint", q=POSES[0])[0] == 200
+        begun, go_on, plan = threading.Event(), threading.Event(), armkin.motion.path.path
+
+        def slow(*asked: Any, **how: Any) -> Any:
+            begun.set()
+            assert go_on.wait(60)
+            return plan(*asked, **how)
+
+        monkeypatch.setattr(armkin.motion.path, "path", slow)
+        told: list[tuple[int, Any]] = []
+        planning = threading.Thread(target=lambda: told.append(page.act("plan")))
+        planning.start()
+        assert begun.wait(60)
+        assert page.act("program", do="record", kind="joint", q=POSES[1])[0] == 200
+        assert not told
+        go_on.set()
+        planning.join()
+        assert told[0][0] == 200  # of the program as it was
+        page.close()

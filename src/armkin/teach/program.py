@@ -140,6 +140,12 @@ class Program:
 
         return path(self.arm, self.file(), start=start, speed=speed)
 
+    def copied(self) -> Program:
+        """The moves and the head as they are now: to be planned while this one is edited."""
+        part = Program(self.arm)
+        part.head, part.moves, part.names = copy.deepcopy((self.head, self.moves, self.names))
+        return part
+
     def end_of(self, index: int, start: Array | None) -> Array:
         """Joint values where a move ends: (n,) [rad | mm]."""
         part = Program(self.arm)

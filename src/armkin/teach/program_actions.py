@@ -29,6 +29,7 @@ class ProgramActions:
         self.arm, self.program = arm, Program(arm)
         self._stands, self._tell = stands, tell
         self._lock = threading.Lock()
+        self._planning = threading.Lock()  # one plan at a time; edits do not wait for it
 
     def actions(self) -> dict[str, Action]:
         """Name -> action, for the page in control."""
@@ -63,9 +64,11 @@ class ProgramActions:
 
         One that hits something has `refused`, why, and `hit`, where the tip is then; a plan that is whole is played.
         """
-        with self._lock:
+        with self._planning:
+            with self._lock:
+                program = self.program.copied()
             try:
-                return played(self.arm, self.program.plan(self.start()))
+                return played(self.arm, program.plan(self.start()))
             except NoSolutionError as error:
                 if "joints" not in error.fields:
                     raise
@@ -77,8 +80,9 @@ class ProgramActions:
     def end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Where a move ends."""
         with self._lock:
-            index = request_checks.whole(fields, "index", max(len(self.program.moves), 1))
-            q = self.program.end_of(index, self.start())
+            program = self.program.copied()
+        index = request_checks.whole(fields, "index", max(len(program.moves), 1))
+        q = program.end_of(index, self.start())
         return {"q": units.joints_out(self.arm, q).tolist()}
 
     def _told(self) -> dict[str, Any]:

@@ -117,7 +117,8 @@ export class Program {
       return;
     }
     try {
-      this.take(/** @type {import("./types.js").Played} */ (await act("plan")));
+      const plan = /** @type {import("./types.js").Played} */ (await act("plan"));
+      if (this.planning.next === null) this.take(plan); // else it has been edited meanwhile
     } catch (error) {
       this.player.load(null);
       this.page.trail([]);
