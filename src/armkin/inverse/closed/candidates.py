@@ -156,11 +156,15 @@ class Recorded:
         closer about the best one.
         """
         shift, apart = self._steps(), 2.0 * np.pi / FREED
-        best = np.zeros((len(target), 1))
+        best, open_ = np.zeros((len(target), 1)), np.arange(len(target))
         for _ in range(CLOSER):
-            _, miss = self._shifted(target, near, best[:, None] + shift)
-            place = np.where(loose[:, None], miss, np.inf).min(axis=2).argmin(axis=1)
-            best, apart = best + shift[place], apart / 4
+            _, miss = self._shifted(target[open_], near[open_], best[open_, None] + shift)
+            size = np.where(loose[open_, None], miss, np.inf).min(axis=2)
+            best[open_] += shift[size.argmin(axis=1)]
+            open_ = open_[~(size.min(axis=1) <= ACCEPTED**2)]
+            if not len(open_):
+                break
+            apart /= 4
             shift = apart * np.arange(-4.0, 5.0)[:, None]
         return best
 
