@@ -41,6 +41,7 @@ from armkin.inverse.closed.subproblems import (
 from armkin.inverse.numeric.tolerances import (
     EXACT,
     NEAR,
+    NEARBY,
     NEARLY_SPECIAL,
     NO_COEFFICIENT,
     NO_LENGTH,
@@ -218,7 +219,7 @@ class Position:
         )
         second, doubt2 = linear(a, b, right, 1, size, prefer[1])
         # without a real third joint, the nearest one may well bring the tip onto axis 2: nothing is free there
-        return third, normalised(second), doubt | doubt2.where(_solves(alone, third))
+        return third, normalised(second), doubt | doubt2.where(_solves(alone, third, size))
 
     def _slide(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         """Joint 2 prismatic: g = y + d2 z."""
@@ -281,14 +282,14 @@ def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
     return total if power == 1 else arrays.add(total, arrays.mul(coefficients[2], third.c * third.c))
 
 
-def _solves(six: list[Entry], third: Pair) -> Truth:
-    """Whether joint 3 is a root of its equation, or nearly one."""
+def _solves(six: list[Entry], third: Pair, length: Entry) -> Truth:
+    """Whether joint 3 is a root of its equation, or nearly one; length: of the arm, as at zero all terms vanish."""
     third_power = third.s if third.s is not None else third.c * third.c
     terms = [six[0], arrays.mul(six[1], third.c), arrays.mul(six[2] if third.s is not None else six[3], third_power)]
     total, size = terms[0], abs(terms[0])
     for term in terms[1:]:
         total, size = arrays.add(total, term), arrays.add(size, abs(term))
-    solves: Truth = arrays.absolute(total) <= SEED * size
+    solves: Truth = arrays.absolute(total) <= arrays.add(SEED * size, NEARBY * length)
     return solves
 
 
