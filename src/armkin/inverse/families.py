@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 AT_ONCE = 48_000  # targets of the other joints solved together
 CIRCLES = 64  # targets whose arm angles are worked on together
-TRACED = 8  # and whose curves are traced together
+TRACED = 24  # and whose curves are traced together
 FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free
 
 
