@@ -15,7 +15,7 @@ one joint alone, and with them the roots by 1e-16 / S1: nothing is lost, unless 
 from __future__ import annotations
 
 from itertools import permutations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +85,7 @@ class Pencil:
         c, s = (1.0 - half * half) * down, 2.0 * half * down
         c, s = cosine * c - sine * s, sine * c + cosine * s
 
-        def at(row: Array) -> Array:
+        def at(row: Array) -> Any:  # complex
             return row[..., 0, None] + row[..., 1, None] * c + row[..., 2, None] * s
 
         h0, h1 = at(main), at(alone) / self.small
@@ -104,7 +104,7 @@ class Pencil:
         free = (np.hypot(there[..., 0], there[..., 1]) < NEARBY) | loose
         return _Roots(np.stack([q1, q2, q3], axis=2), half.imag == 0.0, off, free.any(axis=1))
 
-    def _half_tangents(self, main: Array, alone: Array) -> tuple[Array, Array, Array]:
+    def _half_tangents(self, main: Array, alone: Array) -> tuple[NDArray[Any], Array, Array]:
         """Eigenvalues (N, 4): tan((q3 - psi) / 2); cosine and sine of psi, (N, 1): at ``psi + pi`` e is largest."""
         k, N = self.small, len(main)
         M = np.empty((N, 3, 2, 2))
@@ -122,7 +122,7 @@ class Pencil:
         return np.linalg.eigvals(companion), cosine, sine
 
 
-def _imaginary(c: NDArray[np.complexfloating], s: NDArray[np.complexfloating]) -> Array:
+def _imaginary(c: NDArray[Any], s: NDArray[Any]) -> Array:
     """The imaginary part [rad] of an angle whose cosine and sine these are."""
     return np.abs(np.log(np.maximum(np.abs(c + 1j * s), TINY)))
 
@@ -164,4 +164,5 @@ def _order(away: Array) -> NDArray[np.intp]:
     """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
     away = np.where(np.isnan(away), np.pi, away)
     cost = away[:, np.arange(4), ALL].sum(axis=2)
-    return ALL[cost.argmin(axis=1)]
+    order: NDArray[np.intp] = ALL[cost.argmin(axis=1)]
+    return order
