@@ -7,19 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.numeric.tolerances import TINY
+from armkin.inverse.numeric.tolerances import BEFORE_MERGING, NO_ROOM, SAME_END, TINY
 from armkin.inverse.pieces import Int, margin, turning
 
 if TYPE_CHECKING:
     from armkin.inverse.follower import Follower, Postures
 
-HALVINGS = 60  # steps to where a branch ends, at most,
-SECANTS = 24  # of which the later ones halve,
+HALVINGS = 60  # steps to where a branch ends, at most
+SECANTS = 24  # of which the later ones halve
 BACK = 0.1  # of what is left, from past an end to where the branch is there
-CLOSE = 1e-10  # [rad] until two follow each other so closely
-NO_ROOM = 1e-13  # [rad, rad^2] or so little is left there
-INSIDE = 1e-8  # [rad] from where two branches merge to where they are still there,
-MERGING = 0.01  # [rad^2] and less than so far apart
+MERGING = 0.01  # [rad^2] branches that merge are less than so far apart
 PEAK = 12  # steps to where a branch is nearest to its limits, or farthest beyond them
 
 
@@ -65,7 +62,7 @@ class _Ends:
             # a secant along the branch that has gone past the end: it is close by
             guess = np.where(inside, guess, np.where(over[going], high - BACK * (high - low), 0.5 * (low + high)))
             out[going] = np.where(b == 0, high, np.where(inside | ~over[going], guess, out[going]))
-            left = (step > CLOSE) & (b != 0)
+            left = (step > SAME_END) & (b != 0)
             going, guess, inside = going[left], guess[left], inside[left]
             if not len(going):
                 break
@@ -186,7 +183,7 @@ def places_of(find: Follower, t: Array, found: Postures) -> Places:
     good, bad = gone.value(0, t), gone.value(1, t)
     rooms = ends.rooms(every, at(gone, 0)), np.full(len(every), np.nan), ends.rooms(every, at(gone, -1))
     merged = ends.between(good, bad, gone.value(-1, t), rooms)
-    q = find.found(gone.row, merged + np.clip(good - merged, -INSIDE, INSIDE))
+    q = find.found(gone.row, merged + np.clip(good - merged, -BEFORE_MERGING, BEFORE_MERGING))
     away, apart = _beside(q, gone.branch)
     own = q[every, gone.branch] + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away)
     room = margin(arm, np.where(np.isnan(own), at(gone, 0)[every, gone.branch], own))

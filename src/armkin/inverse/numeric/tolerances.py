@@ -54,6 +54,9 @@ NEAR = 1e-3  # and to this as nearly so: `armkin.inverse.solvers.nearly_special`
 NEARLY_SPECIAL = 0.015  # the same where the roots of three joints are counted: seeds lead to nearly all of them
 NO_SECOND = 1e-10  # second singular value over the first below which a matrix of two rows is of rank one
 BLUR_OF_PAIRS = 3e-8  # [rad] how far rounding parts two roots of such a matrix, times the square root of that quotient
+SAME_END = 1e-10  # [rad] places this close where a branch of seven joints ends are one
+NO_ROOM = 1e-13  # [rad, rad^2] what is left there that is nothing
+BEFORE_MERGING = 1e-8  # [rad] from where two branches merge to where they are still there
 STEADY = 0.05  # singular value above which a branch of an arm near a class continues one of the class
 FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete
 
