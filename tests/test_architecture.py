@@ -38,45 +38,55 @@ MAY_IMPORT: dict[str, str] = {
     "inverse/solvers": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination",
     "inverse/run": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/branches"
     " inverse/answers inverse/singular inverse/solvers",
+    "inverse/redundant": "keep_out errors formula model forward inverse/tasks inverse/numeric inverse/closed"
+    " inverse/branches inverse/answers inverse/solvers",
     "inverse": "keep_out errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
-    " inverse/branches inverse/answers inverse/singular inverse/solvers inverse/run",
+    " inverse/branches inverse/answers inverse/singular inverse/solvers inverse/run inverse/redundant",
     "engines": "errors",
     "columns": "errors files formula model forward inverse/tasks inverse/numeric inverse/branches inverse"
     " inverse/answers motors",
     "motors": "errors formula model forward",
     "path_file": "errors robot_file",
-    "motion": "keep_out keep_out/shapes"
-    " errors formula model forward inverse/tasks inverse/numeric inverse/branches inverse/answers inverse/solvers"
-    " inverse motors path_file",
+    "motion/timing": "errors formula model forward motors",
+    "motion/tool_path": "errors formula model forward inverse/tasks path_file motion/timing",
+    "motion/plan": "keep_out errors formula model forward inverse/tasks motion/timing motion/tool_path",
+    "motion/branches": "errors formula model forward inverse/tasks inverse/numeric inverse/branches inverse/answers"
+    " inverse motors motion/timing motion/tool_path motion/plan",
+    "motion": "keep_out keep_out/shapes errors formula model forward inverse/tasks inverse/numeric inverse/branches"
+    " inverse/answers inverse/solvers inverse motors path_file motion/timing motion/tool_path motion/plan"
+    " motion/branches",
     "reachability": "keep_out keep_out/shapes errors files formula robot_file model forward motors columns engines"
-    " inverse inverse/answers inverse/solvers inverse/tasks motion path_file",
+    " inverse inverse/answers inverse/solvers inverse/tasks motion motion/plan path_file",
     "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
-    "export/c": "keep_out keep_out/shapes"
-    " errors formula model forward inverse inverse/tasks inverse/numeric inverse/closed"
-    " inverse/elimination inverse/branches inverse/solvers",
+    "export/c": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
+    " inverse/closed inverse/elimination inverse/branches inverse/solvers",
     "export/js": "errors formula model forward inverse/solvers inverse/tasks inverse/closed inverse/numeric"
     " inverse/elimination inverse/branches keep_out motors export/c",
-    "compiled": "keep_out keep_out/shapes"
-    " errors formula model forward inverse inverse/tasks inverse/numeric inverse/branches inverse/closed"
-    " inverse/answers inverse/singular inverse/solvers inverse/run export/c columns",
-    "plot": "keep_out keep_out/shapes errors files formula model forward motion view reachability",
+    "compiled": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
+    " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export/c columns",
+    "plot": "keep_out keep_out/shapes errors files formula model forward motion motion/plan view reachability",
     "board/ports": "errors",
-    "board/firmware": "board/backend errors board_kinds installed_kinds formula model forward motors motion board/ports"
-    " robot_file",
-    "board/backend": "errors board_kinds installed_kinds formula robot_file model motion motors board/ports",
-    "board/grbl": "errors formula robot_file model motors motion board/ports board/backend",
+    "board/firmware/wire": "errors board/ports board/backend",
+    "board/firmware/segments": "errors formula model forward motors motion motion/timing board/backend"
+    " board/firmware/wire",
+    "board/firmware": "board/backend errors board_kinds installed_kinds formula model forward motors motion motion/plan"
+    " motion/timing board/ports robot_file board/firmware/wire board/firmware/segments",
+    "board/backend": "errors board_kinds installed_kinds formula robot_file model motion motion/plan motion/timing"
+    " motors board/ports",
+    "board/grbl": "errors formula robot_file model motors motion motion/timing board/ports board/backend",
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
-    "board/klipper": "errors formula model motors motion board/ports board/backend",
-    "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech",
-    "board/kinds": "errors board_kinds installed_kinds formula robot_file model motors motion board/ports board/backend"
-    " board/firmware board/grbl board/feetech board/klipper board/sim",
-    "flash": "errors board_kinds board/ports board/firmware",
-    "board": "keep_out keep_out/shapes errors signals formula model forward motors motion board/ports board/backend",
-    "teach": "keep_out keep_out/shapes"
-    " errors files formula robot_file model forward inverse inverse/tasks inverse/branches inverse/answers"
-    " inverse/solvers motors motion path_file reachability view board board/ports board/backend board/kinds board/sim"
-    " export/js compiled",
+    "board/klipper": "errors formula model motors motion motion/timing board/ports board/backend",
+    "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech board/firmware/wire",
+    "board/kinds": "errors board_kinds installed_kinds formula robot_file model motors motion motion/timing board/ports"
+    " board/backend board/firmware board/grbl board/feetech board/klipper board/sim board/firmware/wire"
+    " board/firmware/segments",
+    "flash": "errors board_kinds board/ports board/firmware board/firmware/wire",
+    "board": "keep_out keep_out/shapes errors signals formula model forward motors motion motion/plan motion/timing"
+    " board/ports board/backend",
+    "teach": "keep_out keep_out/shapes errors files formula robot_file model forward inverse inverse/tasks"
+    " inverse/branches inverse/solvers motors motion motion/plan motion/timing motion/tool_path path_file reachability"
+    " view board board/ports board/backend board/kinds board/sim export/js compiled inverse/answers",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 

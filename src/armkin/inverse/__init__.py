@@ -11,17 +11,7 @@ answers/      the answer as arrays, its rounding, the nearest legal pose where t
 singular/     what a solution is: isolated, boundary or self-motion manifold
 solvers/      which class an arm belongs to
 run/          how targets go through: one alone, chunks of a batch, threads
-held.py        joints that are held: the arm of the others, and its targets
-follower.py    answers of the other joints at any value of the redundant one
-followed.py    its branches, followed along it
-ends.py        where these end
-arm_angle.py   those curves in closed form, of a shoulder, an elbow and a wrist
-arcs.py        the same traced through all joints, of other joints without a closed form
-traced.py      and their families
-pieces.py      pieces of such curves: intervals of the redundant joint
-families.py    one joint more than the target asks for: intervals of the redundant joint
-position_first.py  four or five joints asked for a pose: the position exact, the rotation as near as it goes
-minima.py     the descent to those postures
+redundant/    more joints than the target has numbers: families along one joint, the least rotation at a position
 solve.py      `ik`
 choose.py     one branch a target, of an arm with joints held or swept, too; or why none is
 """

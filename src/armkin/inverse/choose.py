@@ -24,10 +24,10 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.branches.whole_turns import turns as copies_of
-from armkin.inverse.families import intervals_out
-from armkin.inverse.held import arm_without, others, redundant_alone
 from armkin.inverse.numeric.tolerances import EQUAL, HELD, SOLUTION
-from armkin.inverse.position_first import closest_each as nearest_positions
+from armkin.inverse.redundant.families import intervals_out
+from armkin.inverse.redundant.held import arm_without, others, redundant_alone
+from armkin.inverse.redundant.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits
 from armkin.keep_out.clearance import said as hits_said

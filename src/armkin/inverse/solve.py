@@ -24,11 +24,11 @@ from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination.merge import projection
-from armkin.inverse.families import families
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FAR
-from armkin.inverse.position_first import check as check_position_first
-from armkin.inverse.position_first import position_first as minima
+from armkin.inverse.redundant.families import families
+from armkin.inverse.redundant.position_first import check as check_position_first
+from armkin.inverse.redundant.position_first import position_first as minima
 from armkin.inverse.run import chunks
 from armkin.inverse.run import single as one_target
 from armkin.inverse.run.edges import examined
@@ -67,7 +67,7 @@ def ik(
     rounding: () or (...) how far the targets' numbers may be off [reaches, rad], by default what the arrays show: near,
     where it solves its target to within that, is a branch and the best one; position_first: arms of four or five joints
     asked for task "pose" keep the position and come as near to the rotation as they can
-    (`armkin.inverse.position_first`).
+    (`armkin.inverse.redundant.position_first`).
     Raises UsageError if the task does not fit the arm or a target is malformed.
 
     >>> import armkin, numpy as np

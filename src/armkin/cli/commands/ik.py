@@ -78,7 +78,7 @@ def ik(
     the nearest pose within limits is shown instead. Without a target, standard input's answers of fk are reached.
     """
     from armkin.inverse import choose
-    from armkin.inverse.position_first import check as position_first_is_for
+    from armkin.inverse.redundant.position_first import check as position_first_is_for
     from armkin.inverse.tasks.fitting import task_for
 
     given = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)

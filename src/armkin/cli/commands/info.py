@@ -99,7 +99,7 @@ def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
 def _task(arm: Arm, name: str | None) -> Solving:
     """The task and its solver, or why there is none."""
     import armkin
-    from armkin.inverse.families import described
+    from armkin.inverse.redundant.families import described
     from armkin.inverse.solvers.redundant import redundancy
     from armkin.inverse.tasks.fitting import task_for
     from armkin.model.arm import actual

@@ -43,8 +43,8 @@ class Solutions:
     far the columns of a pose's rotation were from orthonormal; `target` holds the rotation next to it, which
     the branches answer. angle: (..., B) [rad] how far each row's rotation is off, of `ik(..., position_first=True)`
     alone: rows are then sorted by it, and `status` tells of the first. interval: (..., B, 2) [rad] where an arm has one
-    joint more than the target asks for: the values of the redundant joint (`armkin.inverse.families`) along which a
-    row's posture moves within limits; of rows outside limits those of its whole family.
+    joint more than the target asks for: the values of the redundant joint (`armkin.inverse.redundant.families`) along
+    which a row's posture moves within limits; of rows outside limits those of its whole family.
     """
 
     arm: Arm

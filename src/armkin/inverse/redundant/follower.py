@@ -17,7 +17,7 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric.tolerances import ACCEPTED
-from armkin.inverse.pieces import turning
+from armkin.inverse.redundant.pieces import turning
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved, moved_entries
 

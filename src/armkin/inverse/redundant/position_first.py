@@ -21,7 +21,6 @@ from armkin.inverse.answers import closest
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.minima import Box, box_of, descend, flat_minima
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     EQUAL,
@@ -31,6 +30,7 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     WEAK,
 )
+from armkin.inverse.redundant.minima import Box, box_of, descend, flat_minima
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.residuals import residual

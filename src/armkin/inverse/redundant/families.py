@@ -17,18 +17,18 @@ from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.arcs import PLANES
-from armkin.inverse.arm_angle import Turning, arm_angle
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.followed import SAMPLES, Followed
-from armkin.inverse.follower import Follower, Ik
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import PROBE, SAME, SOLUTION
-from armkin.inverse.pieces import Curves, Pieces, motion
+from armkin.inverse.redundant.arcs import PLANES
+from armkin.inverse.redundant.arm_angle import Turning, arm_angle
+from armkin.inverse.redundant.followed import SAMPLES, Followed
+from armkin.inverse.redundant.follower import Follower, Ik
+from armkin.inverse.redundant.pieces import Curves, Pieces, motion
+from armkin.inverse.redundant.traced import Traced
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
-from armkin.inverse.traced import Traced
 from armkin.keep_out.clearance import clear
 from armkin.model import units
 from armkin.model.arm import actual

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.ends import Changes, hidden_stretches, places_of
-from armkin.inverse.follower import Follower, Postures, over_a_turn
 from armkin.inverse.numeric.tolerances import REACH, SOLUTION
-from armkin.inverse.pieces import Pieces, best_samples, motion, runs
+from armkin.inverse.redundant.ends import Changes, hidden_stretches, places_of
+from armkin.inverse.redundant.follower import Follower, Postures, over_a_turn
+from armkin.inverse.redundant.pieces import Pieces, best_samples, motion, runs
 from armkin.inverse.tasks.task import distance
 
 SAMPLES = 360  # of a turn of the redundant joint,

@@ -8,10 +8,10 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, NO_ROOM, SAME_END, TINY
-from armkin.inverse.pieces import Int, margin, turning
+from armkin.inverse.redundant.pieces import Int, margin, turning
 
 if TYPE_CHECKING:
-    from armkin.inverse.follower import Follower, Postures
+    from armkin.inverse.redundant.follower import Follower, Postures
 
 HALVINGS = 60  # steps to where a branch ends, at most
 SECANTS = 24  # of which the later ones halve

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.follower import Follower, over_a_turn
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import CONVERGING, SAME_SEED, SHORTEST_ARC
-from armkin.inverse.pieces import Int
+from armkin.inverse.redundant.follower import Follower, over_a_turn
+from armkin.inverse.redundant.pieces import Int
 from armkin.model.units import radian_or_reach
 
 PLANES = 60  # values of the redundant joint that the elimination answers

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.arcs import Points, curves_of, onto
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.follower import Follower
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CONVERGING, REACH
-from armkin.inverse.pieces import Int, Pieces, best_samples, holding_none, margin, motion, none, runs
+from armkin.inverse.redundant.arcs import Points, curves_of, onto
+from armkin.inverse.redundant.follower import Follower
+from armkin.inverse.redundant.pieces import Int, Pieces, best_samples, holding_none, margin, motion, none, runs
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
