@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import armkin
-from armkin.motion.placing import placing
+from armkin.motion.tool_path.placing import placing
 from armkin.path_file import read_drawing
 from armkin.path_file.drawing import Wishes
 from armkin.plot.path import plot_path

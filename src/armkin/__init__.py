@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from armkin.model.lock import lock as lock
     from armkin.model.lock import unlock as unlock
     from armkin.motion.path import path as path
-    from armkin.motion.path_plan import PathPlan as PathPlan
+    from armkin.motion.plan.path_plan import PathPlan as PathPlan
     from armkin.motion.time_law import time_law as time_law
     from armkin.motors import best_pulses as best_pulses
     from armkin.motors import joints as joints
@@ -90,7 +90,7 @@ _HOME = {
     "unlock": "model.lock",
     "path": "motion.path",
     "time_law": "motion.time_law",
-    "PathPlan": "motion.path_plan",
+    "PathPlan": "motion.plan.path_plan",
     "best_pulses": "motors",
     "joints": "motors",
     "pulses": "motors",

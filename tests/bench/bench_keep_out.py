@@ -31,8 +31,8 @@ from armkin.keep_out.shapes.capsule import Capsule
 from armkin.keep_out.shapes.floor import Floor
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan
-from armkin.motion.proved_free import proved
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.plan.proved_free import proved
+from armkin.motion.timing.trajectory import Trajectory
 
 ARMS = ("three_dof", "ur5e", "ar4", "cobra600")
 SAMPLES = 3000
@@ -353,8 +353,8 @@ def _path() -> None:
 
 def _curve(arm: Arm, corners: Array) -> Trajectory:
     """One curve of 10,000 cells through postures: smooth between them."""
-    from armkin.motion.cubics import Knots
-    from armkin.motion.curve import Curve
+    from armkin.motion.timing.cubics import Knots
+    from armkin.motion.timing.curve import Curve
 
     u = np.linspace(0.0, len(corners) - 1.0, 10_001)
     i = np.minimum(u.astype(int), len(corners) - 2)

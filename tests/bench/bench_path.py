@@ -27,14 +27,14 @@ from lines import random_line
 
 import armkin
 from armkin.inverse.tasks.fitting import task_for
-from armkin.motion.branch_chains import Chain, chains, fewest
-from armkin.motion.cubics import Knots
-from armkin.motion.curve import Curve
-from armkin.motion.geometry import spot
-from armkin.motion.linked_branches import linked
-from armkin.motion.path_plan import PathPlan
-from armkin.motion.profile import seven_phases
-from armkin.motion.time_optimal import Bounds, finer, optimal
+from armkin.motion.branches.branch_chains import Chain, chains, fewest
+from armkin.motion.branches.linked_branches import linked
+from armkin.motion.plan.path_plan import PathPlan
+from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.profile import seven_phases
+from armkin.motion.timing.time_optimal import Bounds, finer, optimal
+from armkin.motion.tool_path.geometry import spot
 
 SIX = ("three_dof", "irb2400", "puma560", "ar4", "labvolt_5150", "ur5e")
 ARMS = ("three_dof", "irb2400", "puma560", "irb120", "ar4", "labvolt_5150", "parol6", "ra02")

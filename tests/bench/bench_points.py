@@ -27,8 +27,8 @@ from lines import random_line
 
 import armkin
 from armkin.forward import condition
-from armkin.motion.path_plan import PathPlan
-from armkin.motion.placing import placing
+from armkin.motion.plan.path_plan import PathPlan
+from armkin.motion.tool_path.placing import placing
 from armkin.path_file import gcode
 from armkin.path_file.drawing import Wishes
 from armkin.robot_file import catalogue

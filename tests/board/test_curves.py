@@ -12,7 +12,7 @@ from armkin.board.firmware.trajectory_to_counts import cut
 from armkin.board.kinds import board_of
 from armkin.board.path_run import follow, parts
 from armkin.board.sim.queue import intervals
-from armkin.motion.curve import Curve
+from armkin.motion.timing.curve import Curve
 
 
 def some_path(seed: int) -> dict[str, object]:

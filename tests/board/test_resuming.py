@@ -20,7 +20,7 @@ from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
 from armkin.board_kinds import BOARDS
 from armkin.motion.joint_moves import straight
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import joints, places
 from command_line import ROOT, THREE_DOF, run
 

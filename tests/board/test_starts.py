@@ -14,7 +14,7 @@ from armkin.board.backend.starting import StartError
 from armkin.errors import NoSolutionError
 from armkin.motion.joint_moves import plan as plan_joints
 from armkin.motion.joint_moves import straight
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.timing.trajectory import Trajectory
 from command_line import run
 from starting_elsewhere import ELSEWHERE, EXAMPLES, KINDS, PATHS, Kind, carried_out, on
 

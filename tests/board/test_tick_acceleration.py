@@ -21,7 +21,7 @@ from armkin.board.sim.frames import RefusedError
 from armkin.board.sim.velocity import Velocity, times_valid
 from armkin.board_kinds import BOARDS
 from armkin.model import build as arms
-from armkin.motion.profile import Profile, trapezoid
+from armkin.motion.timing.profile import Profile, trapezoid
 from armkin.motors import pulses
 
 CLOCKS = {"three_dof": (16_000_000, 448), "ar4_pico6": (25_000_000, 100), "parol6_pico6": (25_000_000, 100)}

@@ -21,7 +21,7 @@ from armkin.board_kinds import BOARDS
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import build as arms
 from armkin.model.arm import Arm
-from armkin.motion import profile
+from armkin.motion.timing import profile
 from armkin.motors import joints, pulses
 from quick import least
 

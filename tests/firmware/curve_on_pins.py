@@ -21,8 +21,8 @@ from armkin.board.firmware.protocol import HALF, STEP, Segment, State
 from armkin.board.firmware.straight_lines import line
 from armkin.board.firmware.trajectory_to_counts import cut
 from armkin.formula.arrays import Array
-from armkin.motion.curve import Curve
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.trajectory import Trajectory
 
 CIRCLE: dict[str, Any] = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]}
 WINDOW = 0.1  # [s] in which an acceleration is read from edges

@@ -18,7 +18,7 @@ from armkin.board.firmware import protocol
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.protocol import Segment, whole
 from armkin.board.firmware.trajectory_to_counts import plan
-from armkin.motion.profile import Profile
+from armkin.motion.timing.profile import Profile
 
 NAMES = "XYZABCUV"  # the emulator's axes, in order
 

@@ -11,10 +11,12 @@ import pytest
 import armkin
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
-from armkin.motion import branch_path, fitting, playback
-from armkin.motion.b_spline import banded
-from armkin.motion.curve import Curve
-from armkin.motion.path_plan import PathPlan
+from armkin.motion.branches import branch_path
+from armkin.motion.plan import playback
+from armkin.motion.plan.path_plan import PathPlan
+from armkin.motion.timing.curve import Curve
+from armkin.motion.tool_path import fitting
+from armkin.motion.tool_path.b_spline import banded
 
 CENTRE = np.array([340.0, 80.0, 300.0])
 CORNER = np.deg2rad(20)

@@ -11,8 +11,8 @@ import pytest
 from lines import random_line
 
 import armkin
-from armkin.motion.branch_chains import chains, fewest
-from armkin.motion.linked_branches import linked
+from armkin.motion.branches.branch_chains import chains, fewest
+from armkin.motion.branches.linked_branches import linked
 
 
 @pytest.mark.parametrize("name", ["three_dof", "irb120", "ar4", "labvolt_5150"])

@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.inverse.tasks.fitting import task_for
-from armkin.motion.geometry import arc, spot
+from armkin.motion.tool_path.geometry import arc, spot
 
 TASK = task_for(armkin.load("three_dof"))
 

@@ -11,8 +11,8 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
-from armkin.motion.branch_path import samples
-from armkin.motion.path_plan import PathPlan
+from armkin.motion.branches.branch_path import samples
+from armkin.motion.plan.path_plan import PathPlan
 
 CIRCLE = {"circle": {"centre": [340, 80, 300], "normal": [0, 0, 1]}}
 
@@ -132,9 +132,9 @@ def test_branches_do_not_depend_on_the_blocks_they_are_solved_in(
 ) -> None:
     moves = {"moves": [{"point": [390, 80, 300]}, CIRCLE]}
     whole = armkin.path(three_dof, moves, start=three_dof.home)
-    monkeypatch.setattr("armkin.motion.linked_branches._BLOCK", 64)
-    monkeypatch.setattr("armkin.motion.branch_columns._BLOCK", 64)
-    monkeypatch.setattr("armkin.motion.path_plan._BLOCK", 100)
+    monkeypatch.setattr("armkin.motion.branches.linked_branches._BLOCK", 64)
+    monkeypatch.setattr("armkin.motion.branches.branch_columns._BLOCK", 64)
+    monkeypatch.setattr("armkin.motion.plan.path_plan._BLOCK", 100)
     parts = armkin.path(three_dof, moves, start=three_dof.home)
     assert parts.duration == pytest.approx(whole.duration, rel=1e-12)
     assert [b.carries for b in parts.branches] == [b.carries for b in whole.branches]

@@ -11,9 +11,9 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError
 from armkin.model.arm import Arm
-from armkin.motion import boundary
-from armkin.motion.branch_chains import Chain
-from armkin.motion.branch_columns import Samples
+from armkin.motion.branches import boundary
+from armkin.motion.branches.branch_chains import Chain
+from armkin.motion.branches.branch_columns import Samples
 
 
 def moving(name: str) -> Arm:

@@ -10,7 +10,7 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.rotation import rpy
-from armkin.motion.branch_columns import Columns, Samples
+from armkin.motion.branches.branch_columns import Columns, Samples
 
 
 def with_rates(name: str) -> armkin.Arm:

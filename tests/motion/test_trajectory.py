@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from armkin.model import build as arms
 from armkin.model.arm import Arm, from_links
 from armkin.motion.joint_moves import plan
-from armkin.motion.profile import trapezoid
-from armkin.motion.trajectory import Straight
+from armkin.motion.timing.profile import trapezoid
+from armkin.motion.timing.trajectory import Straight
 
 
 @pytest.fixture(scope="module")

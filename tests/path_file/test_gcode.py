@@ -13,7 +13,7 @@ import armkin
 from armkin.errors import PathFileError, UsageError
 from armkin.inverse.tasks.fitting import task_for
 from armkin.model import units
-from armkin.motion.placing import placing
+from armkin.motion.tool_path.placing import placing
 from armkin.path_file import gcode
 from armkin.path_file.drawing import Placing, Wishes
 from command_line import run

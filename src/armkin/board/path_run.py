@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.errors import UsageError
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.timing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from armkin.board.backend import Planned, Progress
     from armkin.board.backend.board import Board
-    from armkin.motion.path_plan import Marker, PathPlan
+    from armkin.motion.plan.path_plan import Marker, PathPlan
 
 Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a trajectory from counts, on some board
 

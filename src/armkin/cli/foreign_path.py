@@ -45,7 +45,7 @@ def moves(
 ) -> PathFile | None:
     """The moves of a drawing; None: the file is none. Raises UsageError for options that make no sense."""
     from armkin import path_file
-    from armkin.motion.placing import placing
+    from armkin.motion.tool_path.placing import placing
     from armkin.path_file.drawing import Wishes
 
     given = {"--at": at, "--scale": scale, "--feed": feed, "--lift": lift, "--grip-by": grip_by}

@@ -13,7 +13,7 @@ from armkin.errors import UsageError
 if TYPE_CHECKING:
     from armkin.board.backend import Backend
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 Ignore = Annotated[
     bool,

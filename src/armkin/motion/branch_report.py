@@ -9,16 +9,16 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
-from armkin.motion.branch_chains import Chain, why_ended
-from armkin.motion.path_plan import Branch, PathPlan, PathRun, Reconfiguration
-from armkin.motion.proved_free import hits_said
+from armkin.motion.branches.branch_chains import Chain, why_ended
+from armkin.motion.plan.path_plan import Branch, PathPlan, PathRun, Reconfiguration
+from armkin.motion.plan.proved_free import hits_said
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.branch_chains import Run
-    from armkin.motion.branch_columns import Columns
-    from armkin.motion.branch_path import Carried
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.branches.branch_chains import Run
+    from armkin.motion.branches.branch_columns import Columns
+    from armkin.motion.branches.branch_path import Carried
+    from armkin.motion.timing.trajectory import Trajectory
 
 _WHY = {
     "end": "carries all",

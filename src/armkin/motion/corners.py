@@ -11,13 +11,13 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.model.limits import check_limits
-from armkin.motion.branch_path import coupled
-from armkin.motion.cubics import Knots
-from armkin.motion.curve import Curve
-from armkin.motion.hold_cap import hold_cap
+from armkin.motion.branches.branch_path import coupled
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.time_optimal import Bounds, optimal
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.hold_cap import hold_cap
+from armkin.motion.timing.time_optimal import Bounds, optimal
+from armkin.motion.timing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -13,14 +13,14 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.model.lock import lock, unlock
-from armkin.motion import path_numbers
-from armkin.motion.cubics import Knots
-from armkin.motion.curve import Curve, Smoothed
 from armkin.motion.joint_moves import approach, check_jerk, check_rates, straight
-from armkin.motion.path_plan import PathPlan
 from armkin.motion.path_planner import planned
-from armkin.motion.proved_free import checked
-from armkin.motion.trajectory import Straight, Stretch
+from armkin.motion.plan.path_plan import PathPlan
+from armkin.motion.plan.proved_free import checked
+from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.trajectory import Straight, Stretch
+from armkin.motion.tool_path import path_numbers
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -21,7 +21,7 @@ from armkin.motion.path import path
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
 
 TOP = 250.0  # [mm/s] of the tool at 100 %: the most that ISO 10218-1 allows while somebody guides an arm by hand
 TURNING = np.deg2rad(60.0)  # [rad/s] likewise

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
-from armkin.motion.profile import at_rest, seven_phases, trapezoid
-from armkin.motion.trajectory import Straight, Trajectory
+from armkin.motion.timing.profile import at_rest, seven_phases, trapezoid
+from armkin.motion.timing.trajectory import Straight, Trajectory
 from armkin.motors import motor_accel, pulses, undriven
 
 if TYPE_CHECKING:

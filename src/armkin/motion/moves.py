@@ -10,8 +10,8 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.forward import fk
-from armkin.motion import geometry, path_numbers
-from armkin.motion.dense import Polyline
+from armkin.motion.tool_path import geometry, path_numbers
+from armkin.motion.tool_path.dense import Polyline
 
 if TYPE_CHECKING:
     from armkin.motion.walk import Walk

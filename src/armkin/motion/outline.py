@@ -8,11 +8,11 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.motion.branch_path import Pace
-from armkin.motion.geometry import line
+from armkin.motion.branches.branch_path import Pace
 from armkin.motion.moves import MOVES
 from armkin.motion.path_planner import TOLERANCE, corners_wished
-from armkin.motion.route import joined
+from armkin.motion.tool_path.geometry import line
+from armkin.motion.tool_path.route import joined
 from armkin.motion.walk import Walk, Wishes
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from armkin.inverse.solvers.redundant import redundancy
-from armkin.motion import path_numbers
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.path_plan import PathPlan
 from armkin.motion.path_planner import HOLD, planned
+from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.redundant import path_redundant
+from armkin.motion.tool_path import path_numbers
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
-from armkin.motion import wrist_turn
-from armkin.motion.branch_path import Pace
+from armkin.motion.branches import wrist_turn
+from armkin.motion.branches.branch_path import Pace
 from armkin.motion.joint_moves import check_jerk, check_share
 from armkin.motion.moves import MOVES
-from armkin.motion.path_plan import PathPlan
-from armkin.motion.proved_free import checked
+from armkin.motion.plan.path_plan import PathPlan
+from armkin.motion.plan.proved_free import checked
 from armkin.motion.walk import Walk, Wishes
 from armkin.motors import settled, undriven
 

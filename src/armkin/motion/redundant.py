@@ -18,13 +18,13 @@ from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.keep_out.clearance import clearance
 from armkin.model.arm import actual
-from armkin.motion import path_numbers
 from armkin.motion.held import path_held
 from armkin.motion.outline import routes
+from armkin.motion.tool_path import path_numbers
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import Move, PathFile
 
 VALUES = 72  # of the redundant joint that are asked, over its range

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.motion.cubics import Knots
-from armkin.motion.curve import Curve
 from armkin.motion.joint_moves import straight
-from armkin.motion.profile import at_rest, trapezoid
-from armkin.motion.trajectory import Straight
+from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.profile import at_rest, trapezoid
+from armkin.motion.timing.trajectory import Straight
 from armkin.motors import motor_accel, pulses
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Stretch
+    from armkin.motion.timing.trajectory import Stretch
 
 _STEP = 0.002  # [s] of the plan's time between grid points
 _SHORT = 0.05  # [s] of the plan's time: what is left of it is slow, and as good as straight

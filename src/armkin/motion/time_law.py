@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints, position
-from armkin.motion.branch_path import coupled
-from armkin.motion.curve import Curve, Smoothed
-from armkin.motion.hold_cap import hold_cap
+from armkin.motion.branches.branch_path import coupled
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.time_optimal import Bounds, finer, knots, optimal
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.hold_cap import hold_cap
+from armkin.motion.timing.time_optimal import Bounds, finer, knots, optimal
+from armkin.motion.timing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

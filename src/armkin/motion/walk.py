@@ -20,25 +20,26 @@ from armkin.inverse.solve import isolated as ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, said
-from armkin.motion import branch_report, geometry, path_numbers
-from armkin.motion.branch_path import Pace, carry, stands, stretches
-from armkin.motion.curve import Curve, Smoothed, way_of, ways_of
-from armkin.motion.dense import FIT, PLAN, Polyline
-from armkin.motion.geometry import Piece, Spot
-from armkin.motion.grid import Missed, deviation, missed
+from armkin.motion import branch_report
+from armkin.motion.branches.branch_path import Pace, carry, stands, stretches
+from armkin.motion.branches.grid import Missed, deviation, missed
 from armkin.motion.joint_moves import approach, straight
-from armkin.motion.path_numbers import OF_JOINTS
-from armkin.motion.path_plan import Marker, PathPlan
-from armkin.motion.profile import at_rest
-from armkin.motion.route import Reduced, joined
-from armkin.motion.trajectory import Straight, Stretch
+from armkin.motion.plan.path_plan import Marker, PathPlan
+from armkin.motion.timing.curve import Curve, Smoothed, way_of, ways_of
+from armkin.motion.timing.profile import at_rest
+from armkin.motion.timing.trajectory import Straight, Stretch
+from armkin.motion.tool_path import geometry, path_numbers
+from armkin.motion.tool_path.dense import FIT, PLAN, Polyline
+from armkin.motion.tool_path.geometry import Piece, Spot
+from armkin.motion.tool_path.path_numbers import OF_JOINTS
+from armkin.motion.tool_path.route import Reduced, joined
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
-    from armkin.motion.branch_chains import Run
-    from armkin.motion.cubics import Knots
-    from armkin.motion.route import Route
+    from armkin.motion.branches.branch_chains import Run
+    from armkin.motion.timing.cubics import Knots
+    from armkin.motion.tool_path.route import Route
     from armkin.path_file import Move, PathFile
 
 

@@ -9,13 +9,13 @@ import numpy as np
 from armkin.forward import position
 from armkin.model import units
 from armkin.motion.branch_report import closeness
-from armkin.motion.playback import times
+from armkin.motion.plan.playback import times
 from armkin.plot.canvas import flat, picture, space, true_proportions
 from armkin.view.skeleton import skeleton
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
 
 _SAMPLES = 600  # of what is drawn over time
 _MOST = 20_000  # points of the tool's way

@@ -17,7 +17,7 @@ from armkin.reachability.standing import Around, standing
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import PathFile
 
 STEP = 0.01  # of the arm's reach, from target to target along a path

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from armkin.board.backend.board import Board
     from armkin.formula.arrays import Array
     from armkin.motion.jog_line import Frame
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
     from armkin.teach.board_thread import BoardThread, Job
     from armkin.teach.tabs import Action, Fields, Tab
 

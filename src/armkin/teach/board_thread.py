@@ -25,7 +25,7 @@ from armkin.teach.request_checks import RefusedError
 if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 Job = Callable[[Backend], None]
 

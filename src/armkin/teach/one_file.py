@@ -17,7 +17,7 @@ from armkin.teach.scene import scene
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
 
 _STATIC = Path(__file__).parent / "static"
 _LOCAL = Path(__file__).parent / "local" / "local.js"

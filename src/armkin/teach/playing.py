@@ -8,11 +8,11 @@ import numpy as np
 
 from armkin.forward import fk
 from armkin.model import units
-from armkin.motion.playback import times
+from armkin.motion.plan.playback import times
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
 
 SHOWN = 0.2  # [mm] that the tip shown may be off where it is looked at, so that it is less than 0.5 in between
 MOST = 160_000  # samples of some 80 bytes; a plan that needs more is shown less exactly, and the page says so

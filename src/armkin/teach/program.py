@@ -12,14 +12,14 @@ from armkin.forward import fk
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
-from armkin.motion.path_numbers import check_numbers
+from armkin.motion.tool_path.path_numbers import check_numbers
 from armkin.robot_file.writing import flow
 from armkin.teach import request_checks
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import PathFile
 
 MOST = 2000  # moves

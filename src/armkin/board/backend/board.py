@@ -25,7 +25,7 @@ from armkin.board.backend.starting import check_jog, jog_goal
 from armkin.board.ports import BAUD, SIM
 from armkin.errors import LinkError, UsageError
 from armkin.motion.joint_moves import rate_lines, straight
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import settled
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from armkin.board.backend.starting import Laid
 from armkin.motion.joint_moves import plan
-from armkin.motion.trajectory import brake
+from armkin.motion.timing.trajectory import brake
 from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

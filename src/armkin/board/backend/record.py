@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.ports import read_note, record_path, remove_note, write_note
-from armkin.motion.trajectory import Straight
+from armkin.motion.timing.trajectory import Straight
 from armkin.motors import pulses
 
 if TYPE_CHECKING:

@@ -19,14 +19,14 @@ from armkin.board.backend.job import Job, braking
 from armkin.board.backend.starting import from_counts
 from armkin.errors import LinkError, NoSolutionError, PositionKnownError, UsageError
 from armkin.model.units import joints_out
-from armkin.motion.trajectory import Straight
+from armkin.motion.timing.trajectory import Straight
 from armkin.motors import motor_names, pulses
 
 if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 PERIOD = 0.02  # [s] between positions
 LATE = 0.05  # [s] that one goes on at most: a program that had no time for longer does not cut across its path

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from armkin.board.ports import LOG
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.limits import SLACK, fields, said
-from armkin.motion.proved_free import check_free, free_way
-from armkin.motion.trajectory import Straight
+from armkin.motion.plan.proved_free import check_free, free_way
+from armkin.motion.timing.trajectory import Straight
 from armkin.motors import joints, pulses, resolution, settled
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 _TURN = 2 * np.pi  # [rad] outside its limits at which a revolute joint's position is not believed
 _SAMPLES = 256  # of a curve that begins outside the limits

@@ -22,7 +22,7 @@ from armkin.motors import motor_accel, places
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Stretch
+    from armkin.motion.timing.trajectory import Stretch
 
 _LEAST, _MOST = 0.010, 0.050  # [s] a segment
 _GROWTH = 0.12  # of the time since the start, or to the end

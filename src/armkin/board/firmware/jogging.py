@@ -14,7 +14,7 @@ from armkin.board.firmware.protocol import State
 from armkin.board.firmware.session import DeviceError
 from armkin.errors import NoSolutionError, PositionLostError, UsageError
 from armkin.model import units
-from armkin.motion.proved_free import free_way
+from armkin.motion.plan.proved_free import free_way
 
 if TYPE_CHECKING:
     from armkin.board.firmware.machine import Machine

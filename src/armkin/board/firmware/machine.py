@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 
 class Machine(Backend):

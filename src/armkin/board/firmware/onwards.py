@@ -11,7 +11,7 @@ import numpy as np
 
 from armkin.board.firmware.protocol import STEP
 from armkin.motion.remainder import remainder
-from armkin.motion.trajectory import Trajectory
+from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import places
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from armkin.board.firmware.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Cutter, Move, changing, cycles_of
 from armkin.board.firmware.protocol import STEP, Segment
-from armkin.motion.profile import Profile, trapezoid
+from armkin.motion.timing.profile import Profile, trapezoid
 
 # A ramp's segments have one ratio of speeds, their fast end's over their slow end's: the acceleration within is right
 # to 0.53 (ratio - 1)^2, 1.5 % at 1.17. All of a ramp fits into the board's queue (32).

@@ -24,13 +24,13 @@ from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.motion.joint_moves import check_rates
 from armkin.motion.joint_moves import plan as plan_joints
-from armkin.motion.trajectory import Straight, brake
+from armkin.motion.timing.trajectory import Straight, brake
 from armkin.motors import joints as joints_of
 from armkin.motors import motor_names, pulses
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Stretch, Trajectory
+    from armkin.motion.timing.trajectory import Stretch, Trajectory
 
 
 TOLERANCE = 0.05  # [mm] between the chord of a segment and its curve

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from armkin.board.backend.job import Job
 from armkin.board.grbl.settings import Axis
-from armkin.motion.trajectory import Straight
+from armkin.motion.timing.trajectory import Straight
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
-    from armkin.motion.trajectory import Stretch, Trajectory
+    from armkin.motion.timing.trajectory import Stretch, Trajectory
 
 PIECE = 0.04  # [s] of a curved stretch in one line: 25 lines a second
 HEAD = "G21G94"  # in every line: another program may have left, or set between two, inches or inverse time

@@ -23,7 +23,7 @@ from armkin.errors import LinkError
 if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
     from armkin.robot_file.model import Gripper
 
 _REST = 30.0  # [s] that a hold may take

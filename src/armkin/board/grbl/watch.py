@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armkin.board.grbl.gcode import PIECE
 from armkin.errors import LinkError
-from armkin.motion.trajectory import Straight
+from armkin.motion.timing.trajectory import Straight
 from armkin.motors import places, pulses
 
 if TYPE_CHECKING:

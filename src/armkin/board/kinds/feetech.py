@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.board.backend.servo_arm import ServoArm
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 KIND = ForeignBoard("feetech", "bus", "bus", ())
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 Switches = Callable[[int, Sequence[int]], bool]  # number of an input, net steps of all axes -> level
 

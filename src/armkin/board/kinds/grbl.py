@@ -22,7 +22,7 @@ from armkin.motors import pulses
 if TYPE_CHECKING:
     from armkin.board.backend import Planned
     from armkin.board.ports import Port
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 KIND = ForeignBoard("grbl", "stepper", "spindle", ("X", "Y", "Z", "A", "B", "C"))
 

@@ -19,7 +19,7 @@ from armkin.board_kinds import ForeignBoard
 if TYPE_CHECKING:
     from armkin.board.backend import Planned
     from armkin.board.ports import Port
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 KIND = ForeignBoard("klipper", "stepper", "none", ("A", "B", "C", "D", "H", "I", "J", "K", "L"))
 

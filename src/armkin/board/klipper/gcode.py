@@ -20,7 +20,7 @@ from armkin.motors import places, pulses
 if TYPE_CHECKING:
     from armkin.board.backend.job import Job
     from armkin.formula.arrays import Array
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 HEAD = "G90\nM220 S100\nG92 X0"  # absolute values, no override of the speed, the time begins
 _ROWS = 256  # lines that are worked out at once

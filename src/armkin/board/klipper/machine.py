@@ -26,7 +26,7 @@ from armkin.errors import LinkError
 if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
-    from armkin.motion.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Trajectory
 
 _CHUNK = 10  # lines in one request
 _PENDING = 8  # requests that may wait: Klipper answers when it has taken them

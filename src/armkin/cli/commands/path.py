@@ -21,7 +21,7 @@ from armkin.model import units
 if TYPE_CHECKING:
     from armkin.board.backend import Planned
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
 
 _STEP = 0.01  # [s] between the rows of --out
 

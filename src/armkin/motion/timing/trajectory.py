@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import frames
-from armkin.motion.profile import Profile
+from armkin.motion.timing.profile import Profile
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

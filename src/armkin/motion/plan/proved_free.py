@@ -17,16 +17,16 @@ from armkin.keep_out.proof import hit_samples as find_hits
 from armkin.keep_out.way import Cubics, Way
 from armkin.model import units
 from armkin.model.lock import unlock
-from armkin.motion.curve import Curve, Smoothed
-from armkin.motion.profile import trapezoid
-from armkin.motion.trajectory import Straight, Stretch, Trajectory
+from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.profile import trapezoid
+from armkin.motion.timing.trajectory import Straight, Stretch, Trajectory
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from armkin.keep_out.guard import Guard
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Status
-from armkin.motion.branch_columns import Columns, Samples
-from armkin.motion.joint_steps import change, chord_bound, largest_form, levers, turns_of
+from armkin.motion.branches.branch_columns import Columns, Samples
+from armkin.motion.branches.joint_steps import change, chord_bound, largest_form, levers, turns_of
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -10,13 +10,13 @@ from armkin.formula.arrays import Array
 from armkin.forward import tip_and_jacobian
 from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.model.units import radian_or_reach
-from armkin.motion.cubics import Knots
-from armkin.motion.scan import Int
+from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.scan import Int
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
-    from armkin.motion.route import Route
+    from armkin.motion.tool_path.route import Route
 
 DAMPING = (2e-4, 0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
 _BLOCK = 8192  # points that are looked at together

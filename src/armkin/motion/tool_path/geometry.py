@@ -21,7 +21,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import quaternion
-from armkin.motion.b_spline import banded
+from armkin.motion.tool_path.b_spline import banded
 
 PER_RADIAN = 30.0  # [mm/rad]
 SMALL = 1e-9  # [mm] shorter pieces are no pieces

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.motion.scan import Int
+from armkin.motion.timing.scan import Int
 
 
 @dataclass(frozen=True)

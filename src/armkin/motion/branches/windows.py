@@ -9,11 +9,11 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
-from armkin.motion.joint_steps import turns_of
+from armkin.motion.branches.joint_steps import turns_of
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.route import Route
+    from armkin.motion.tool_path.route import Route
 
 _STEPS = 12  # of Newton's method
 _LONGEST = 0.1  # [rad] of one of them

@@ -15,18 +15,18 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find
-from armkin.motion.boundary import through_boundaries
-from armkin.motion.branch_chains import Chain, Run, chains, fewest
-from armkin.motion.branch_columns import Columns
-from armkin.motion.cubics import Knots
-from armkin.motion.curve import Curve, Smoothed
-from armkin.motion.grid import fine_enough
-from armkin.motion.hold_cap import hold_cap
-from armkin.motion.joint_steps import change
-from armkin.motion.linked_branches import ENDS, linked
-from armkin.motion.route import Route
-from armkin.motion.time_optimal import Bounds, finer, optimal
-from armkin.motion.wrist_turn import through_wrists
+from armkin.motion.branches.boundary import through_boundaries
+from armkin.motion.branches.branch_chains import Chain, Run, chains, fewest
+from armkin.motion.branches.branch_columns import Columns
+from armkin.motion.branches.grid import fine_enough
+from armkin.motion.branches.joint_steps import change
+from armkin.motion.branches.linked_branches import ENDS, linked
+from armkin.motion.branches.wrist_turn import through_wrists
+from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.hold_cap import hold_cap
+from armkin.motion.timing.time_optimal import Bounds, finer, optimal
+from armkin.motion.tool_path.route import Route
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from armkin.forward import position
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.path_plan import PathPlan
+    from armkin.motion.plan.path_plan import PathPlan
 
 _FIRST = 0.5  # [s] between two of the first samples, at most
 _INSIDE = (0.21, 0.5, 0.79)  # where between two samples it is looked at

@@ -13,7 +13,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.fitting import task_for
 from armkin.model import units
-from armkin.motion.geometry import Spot, spot
+from armkin.motion.tool_path.geometry import Spot, spot
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

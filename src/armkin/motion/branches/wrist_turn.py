@@ -14,15 +14,15 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian
-from armkin.motion.branch_chains import Chain
-from armkin.motion.branch_columns import Columns
-from armkin.motion.joint_steps import change
-from armkin.motion.on_route import corrected
-from armkin.motion.windows import Window
+from armkin.motion.branches.branch_chains import Chain
+from armkin.motion.branches.branch_columns import Columns
+from armkin.motion.branches.joint_steps import change
+from armkin.motion.branches.on_route import corrected
+from armkin.motion.branches.windows import Window
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.route import Route
+    from armkin.motion.tool_path.route import Route
 
 _NEAR = 2.0  # tolerances: a wrist that stays farther from straight is not looked at
 _ARM = 0.1  # [rad] of the first three joints between two postures that are a flip of the wrist apart

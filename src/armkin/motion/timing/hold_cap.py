@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.motion.cubics import Knots
-from armkin.motion.speed_bounds import TINY, in_parts
-from armkin.motion.trajectory import BRAKE
+from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.speed_bounds import TINY, in_parts
+from armkin.motion.timing.trajectory import BRAKE
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Status
-from armkin.motion.branch_chains import Chain
-from armkin.motion.branch_columns import Columns
-from armkin.motion.joint_steps import change, chord_bound, levers, turns_of
-from armkin.motion.linked_branches import ENDS
+from armkin.motion.branches.branch_chains import Chain
+from armkin.motion.branches.branch_columns import Columns
+from armkin.motion.branches.joint_steps import change, chord_bound, levers, turns_of
+from armkin.motion.branches.linked_branches import ENDS
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

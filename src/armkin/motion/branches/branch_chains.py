@@ -16,14 +16,14 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
-from armkin.motion.branch_columns import Columns, Int
-from armkin.motion.joint_steps import turns_of
-from armkin.motion.linked_branches import ENDS
-from armkin.motion.proved_free import hit_samples as motion_hits
+from armkin.motion.branches.branch_columns import Columns, Int
+from armkin.motion.branches.joint_steps import turns_of
+from armkin.motion.branches.linked_branches import ENDS
+from armkin.motion.plan.proved_free import hit_samples as motion_hits
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.windows import Window
+    from armkin.motion.branches.windows import Window
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.motion.b_spline import Int, Layout
-from armkin.motion.chords import CORNER, Chords, turns
-from armkin.motion.least_knots import Rows, least_knots
+from armkin.motion.tool_path.b_spline import Int, Layout
+from armkin.motion.tool_path.chords import CORNER, Chords, turns
+from armkin.motion.tool_path.least_knots import Rows, least_knots
 
 REVERSAL = np.deg2rad(160.0)  # a larger one is a stop
 _SCALES = (4.0, 16.0)  # tolerances: from so far off a corner is still one, and a recorder's noise is none

@@ -12,11 +12,11 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.model import units
-from armkin.motion import path_numbers
-from armkin.motion.b_spline import Int
-from armkin.motion.chords import distinct, turns
-from armkin.motion.fitting import REVERSAL, Fitted, fitted
-from armkin.motion.geometry import Dense, Piece, Spot, between, line, unit_speed, vector, weights
+from armkin.motion.tool_path import path_numbers
+from armkin.motion.tool_path.b_spline import Int
+from armkin.motion.tool_path.chords import distinct, turns
+from armkin.motion.tool_path.fitting import REVERSAL, Fitted, fitted
+from armkin.motion.tool_path.geometry import Dense, Piece, Spot, between, line, unit_speed, vector, weights
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula.arrays import Array
 from armkin.forward import condition, jacobian
-from armkin.motion.curve import Curve, Smoothed
-from armkin.motion.route import Reduced
-from armkin.motion.trajectory import Stretch, Trajectory, grouped
+from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.trajectory import Stretch, Trajectory, grouped
+from armkin.motion.tool_path.route import Reduced
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

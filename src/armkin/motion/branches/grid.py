@@ -8,16 +8,16 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
-from armkin.motion.cubics import Knots
-from armkin.motion.joint_steps import chord_bound, levers
-from armkin.motion.on_route import DAMPING, corrected, exact_cubics
-from armkin.motion.scan import Int
-from armkin.motion.time_optimal import knots
+from armkin.motion.branches.joint_steps import chord_bound, levers
+from armkin.motion.branches.on_route import DAMPING, corrected, exact_cubics
+from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.scan import Int
+from armkin.motion.timing.time_optimal import knots
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.route import Route
-    from armkin.motion.windows import Window
+    from armkin.motion.branches.windows import Window
+    from armkin.motion.tool_path.route import Route
 
 _TIMES = 16.0  # as many points, at most, where the tolerance needs them
 _ROUNDS = 8  # in which intervals are divided

@@ -17,7 +17,7 @@ from armkin.inverse.solve import isolated as ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.model.arm import actual
 from armkin.model.limits import outside
-from armkin.motion.joint_steps import change
+from armkin.motion.branches.joint_steps import change
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
