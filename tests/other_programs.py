@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.framing import wire
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.framing import wire
 
 OURS = (  # a second program that speaks our protocol, one that takes the board for another, noise
     wire(protocol.hello(1, 77)),

@@ -8,7 +8,7 @@ import select
 import time
 from collections.abc import Callable
 
-from armkin.board.firmware.protocol import State
+from armkin.board.firmware.wire.protocol import State
 from armkin.board.sim.board import SimBoard
 from armkin.board_kinds import BOARDS
 from pty_port import Patient, Pty

@@ -22,7 +22,7 @@ from emulator import EmulatedBoard
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.ports import SerialPort
 from armkin.errors import LinkError
 from armkin.model import build as arms

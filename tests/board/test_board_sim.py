@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from armkin.board.firmware import motion_frame, protocol
-from armkin.board.firmware.protocol import AxisImage, Error, Flag, GuardImage, Image, Segment, State, Status, whole
-from armkin.board.firmware.straight_lines import line
+from armkin.board.firmware.segments.straight_lines import line
+from armkin.board.firmware.wire import motion_frame, protocol
+from armkin.board.firmware.wire.protocol import AxisImage, Error, Flag, GuardImage, Image, Segment, State, Status, whole
 from armkin.board.sim.board import SimBoard
 from armkin.board_kinds import BOARDS
 

@@ -7,8 +7,8 @@ import pytest
 
 import armkin
 from armkin.board.backend.job import braking
-from armkin.board.firmware.counts_to_segments import cycles_of
-from armkin.board.firmware.trajectory_to_counts import cut
+from armkin.board.firmware.segments.counts_to_segments import cycles_of
+from armkin.board.firmware.segments.trajectory_to_counts import cut
 from armkin.board.kinds import board_of
 from armkin.board.path_run import follow, parts
 from armkin.board.sim.queue import intervals

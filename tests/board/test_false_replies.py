@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armkin.board.firmware import gripping, homing, jogging, protocol
+from armkin.board.firmware import gripping, homing, jogging
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.protocol import Info, Status
-from armkin.board.firmware.reply_checks import BoardSaysError, ReplacedError
-from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import Info, Status
+from armkin.board.firmware.wire.reply_checks import BoardSaysError, ReplacedError
 from armkin.board.kinds.firmware import Switches
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort

@@ -15,9 +15,9 @@ from armkin.board.backend import StoppedError
 from armkin.board.firmware import homing
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.protocol import State
-from armkin.board.firmware.session import ReplacedError
-from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.wire.protocol import State
+from armkin.board.firmware.wire.session import ReplacedError
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
 from armkin.board_kinds import BOARDS

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armkin.board.firmware import motion_frame, protocol
+from armkin.board.firmware.wire import motion_frame, protocol
 
 PACK: dict[type, Callable[..., bytes]] = {
     protocol.Ack: protocol.pack_ack,

@@ -12,9 +12,9 @@ import pytest
 import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.onwards import onwards, places_on
-from armkin.board.firmware.protocol import HALF, STEP
-from armkin.board.firmware.trajectory_to_counts import Cut, cut, plan
+from armkin.board.firmware.segments.onwards import onwards, places_on
+from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
+from armkin.board.firmware.wire.protocol import HALF, STEP
 from armkin.board.ports import note_path
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.firmware import framing, streaming
+from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.protocol import Type
+from armkin.board.firmware.wire import framing
+from armkin.board.firmware.wire.protocol import Type
 from armkin.board.sim.board import SimBoard
 from armkin.board.sim.port import SimPort
 from armkin.board_kinds import BOARDS

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armkin.board.firmware import straight_lines
-from armkin.board.firmware.protocol import BLOCK, HALF, STEP, AxisImage, Image, Segment
-from armkin.board.firmware.straight_lines import Pieces
+from armkin.board.firmware.segments import straight_lines
+from armkin.board.firmware.segments.straight_lines import Pieces
+from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.streaming import later
-from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.wire.protocol import BLOCK, HALF, STEP, AxisImage, Image, Segment
 from armkin.board.sim.frames import RefusedError
 from armkin.board.sim.velocity import Velocity, times_valid
 from armkin.board_kinds import BOARDS

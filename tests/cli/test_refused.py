@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.firmware.session import Session
+from armkin.board.firmware.wire.session import Session
 from armkin.errors import LinkError, PathFileError, UsageError
 from armkin.motion.joint_moves import check_rates
 from command_line import THREE_DOF, run

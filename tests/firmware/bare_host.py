@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 from emulator import EmulatedBoard
 
-from armkin.board.firmware import motion_frame, protocol
-from armkin.board.firmware.protocol import HALF, STEP, Ack, GuardImage, Info, Segment, State, Status, whole
+from armkin.board.firmware.wire import motion_frame, protocol
+from armkin.board.firmware.wire.protocol import HALF, STEP, Ack, GuardImage, Info, Segment, State, Status, whole
 
 CLOCK = 16_000_000
 R = TypeVar("R", Ack, Info, Status)

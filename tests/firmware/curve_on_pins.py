@@ -14,12 +14,12 @@ from bare_host import BareHost, Batch, batches
 from emulator import EmulatedBoard, Trace
 
 import armkin
-from armkin.board.firmware import protocol
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.counts_to_segments import CLOCK
-from armkin.board.firmware.protocol import HALF, STEP, Segment, State
-from armkin.board.firmware.straight_lines import line
-from armkin.board.firmware.trajectory_to_counts import cut
+from armkin.board.firmware.segments.counts_to_segments import CLOCK
+from armkin.board.firmware.segments.straight_lines import line
+from armkin.board.firmware.segments.trajectory_to_counts import cut
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import HALF, STEP, Segment, State
 from armkin.formula.arrays import Array
 from armkin.motion.timing.curve import Curve
 from armkin.motion.timing.trajectory import Trajectory

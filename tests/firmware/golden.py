@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from emulator import FIRMWARE, EmulatedBoard
 
-from armkin.board.firmware import protocol
+from armkin.board.firmware.wire import protocol
 
 CREDIT = 0x83
 

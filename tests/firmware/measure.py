@@ -14,10 +14,10 @@ from emulator import BUILD, FIRMWARE, EmulatedBoard, make
 from numpy.typing import NDArray
 
 import armkin
-from armkin.board.firmware import protocol
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.protocol import Segment, whole
-from armkin.board.firmware.trajectory_to_counts import plan
+from armkin.board.firmware.segments.trajectory_to_counts import plan
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import Segment, whole
 from armkin.motion.timing.profile import Profile
 
 NAMES = "XYZABCUV"  # the emulator's axes, in order

@@ -10,8 +10,8 @@ from bare_host import WIDE, BareHost, Batch, batches, image_for
 from emulator import PICO, EmulatedBoard
 from numpy.typing import NDArray
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import HALF, STEP, Segment, whole
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import HALF, STEP, Segment, whole
 
 CLOCK = 25_000_000
 CYCLES = 5  # of the emulator's cycle counter, one of the board's clock

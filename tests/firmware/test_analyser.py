@@ -16,7 +16,7 @@ from measure import counts_at_home
 from measure_pico import ready
 from numpy.typing import NDArray
 
-from armkin.board.firmware.protocol import Segment, whole
+from armkin.board.firmware.wire.protocol import Segment, whole
 
 SEEN = "XYZA"
 SAMPLES = 125  # a microsecond

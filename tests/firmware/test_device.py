@@ -10,8 +10,8 @@ import pytest
 from bare_host import CLOCK, WIDE, BareHost, Batch, image_for
 from emulator import EmulatedBoard
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Error, Flag, State, whole
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import Error, Flag, State, whole
 
 MODERATE = replace(WIDE, lower=-50_000, upper=50_000, max_rate=8000, max_accel=160_000)
 KNOWN = {0: 0, 1: 0, 2: 0, 3: 0, 4: 1500}

@@ -133,7 +133,7 @@ def test_a_session_opens_while_the_real_boot_loader_listens(kind: str, last: byt
     last: a byte after every greeting. 0x1b begins a message of the Mega's boot loader, which then takes the next four
     bytes for that message's head; one greeting in 256 ends so by chance, and what told the loader to leave was lost.
     """
-    from armkin.board.firmware.session import Session
+    from armkin.board.firmware.wire.session import Session
     from armkin.board.ports import SerialPort
 
     class Port(SerialPort):

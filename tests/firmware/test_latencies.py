@@ -13,7 +13,7 @@ import armkin
 from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.protocol import Ack, Error, Info, Status
+from armkin.board.firmware.wire.protocol import Ack, Error, Info, Status
 
 ARM = armkin.load("three_dof")
 

@@ -14,9 +14,10 @@ from emulator import EmulatedBoard
 from stepped_port import SteppedPort
 
 import armkin
-from armkin.board.firmware import session, streaming
+from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.wire import session
 
 ARM = armkin.load("three_dof")
 LOADS = {"quiet": 0.0, "busy": 3.0}

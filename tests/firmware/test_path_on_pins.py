@@ -18,7 +18,7 @@ from emulator import EmulatedBoard
 from pins import net
 
 import armkin
-from armkin.board.firmware import protocol
+from armkin.board.firmware.wire import protocol
 from armkin.motors import motor_accel
 from command_line import ROOT, THREE_DOF, patiently, run
 

@@ -14,8 +14,8 @@ from emulator import BUILD, PICO, EmulatedBoard, build_firmware
 from golden import talks
 from measure_pico import CLOCK, KNOWN, SIX, net, ready, segments_per_second, stepping
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Error, Flag, State, whole
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import Error, Flag, State, whole
 
 MODERATE = replace(WIDE, lower=-50_000, upper=50_000, max_rate=8000, max_accel=160_000)
 TMC2209 = {"step_high": 1, "step_low": 1, "dir_setup": 1, "wake": 1}

@@ -84,7 +84,7 @@ def test_a_six_axis_arm_finds_its_switches(
     The last joint, which homes fast; with --long all six.
     """
     # the emulator takes 5 s of a core for a second of six fast axes: the host must not take that for a standstill
-    monkeypatch.setattr("armkin.board.firmware.session._STALLED", 120.0)
+    monkeypatch.setattr("armkin.board.firmware.wire.session._STALLED", 120.0)
     robot = ROOT / "robots" / f"{name}.yaml"
     arm = armkin.load(robot)
     wanted = range(6) if pytestconfig.getoption("--long") else range(5, 6)

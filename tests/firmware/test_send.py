@@ -12,8 +12,8 @@ from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.protocol import Flag
-from armkin.board.firmware.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.wire.protocol import Flag
 from armkin.board.ports import SerialPort
 from armkin.model import build as arms
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, process, run
@@ -142,7 +142,7 @@ def test_servos_ramp_from_the_pose_that_they_are_said_to_have(tmp_path: Path) ->
 
 
 def test_what_the_host_knows_of_the_boards_is_what_they_say() -> None:
-    from armkin.board.firmware.session import Session
+    from armkin.board.firmware.wire.session import Session
     from armkin.board_kinds import BOARDS
 
     for kind, known in BOARDS.items():

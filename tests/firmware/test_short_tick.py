@@ -13,7 +13,7 @@ from golden import Talk, talks
 from measure import counts_at_home
 from numpy.typing import NDArray
 
-from armkin.board.firmware.protocol import STEP, Segment
+from armkin.board.firmware.wire.protocol import STEP, Segment
 
 # [cycles] that an instruction may keep a tick, and a lock of the main loop or the servo's interrupt
 INSTRUCTION, LOCKED = 6, 130

@@ -16,8 +16,8 @@ from curve_on_pins import counts_of, late_us, predicted
 from emulator import EmulatedBoard
 
 import armkin
-from armkin.board.firmware.counts_to_segments import CLOCK
-from armkin.board.firmware.trajectory_to_counts import Cut
+from armkin.board.firmware.segments.counts_to_segments import CLOCK
+from armkin.board.firmware.segments.trajectory_to_counts import Cut
 from armkin.board.kinds import board_of
 from armkin.board.planner import Planner
 from armkin.formula.arrays import Array

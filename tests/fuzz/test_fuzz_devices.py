@@ -11,7 +11,8 @@ import pytest
 from attack import attack, generator
 
 from armkin import load
-from armkin.board.firmware import session, streaming
+from armkin.board.firmware import streaming
+from armkin.board.firmware.wire import session
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.klipper.axes import axes_of as klipper_axes_of

@@ -25,7 +25,7 @@ import armkin
 from armkin import installed_kinds
 from armkin.board.backend.board import Board
 from armkin.board.backend.starting import Laid
-from armkin.board.firmware.protocol import State
+from armkin.board.firmware.wire.protocol import State
 from armkin.board.kinds import board_of
 from armkin.board.kinds.firmware import FirmwareBoard
 from armkin.board.kinds.klipper import KlipperBoard

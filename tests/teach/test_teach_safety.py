@@ -17,7 +17,7 @@ from pins import net, rests_within
 from served import MOVES, Elsewhere, Page, served
 from switches import assert_found, fit_switches, with_switches
 
-from armkin.board.firmware.session import Session
+from armkin.board.firmware.wire.session import Session
 from command_line import COUNTS, POSE, ROOT, run
 
 HOME = [0, 90, -90]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from armkin.board.firmware.session import Session
+from armkin.board.firmware.wire.session import Session
 from armkin.board.ports import SerialPort, list_ports
 from armkin.board_kinds import BOARDS, board_name
 from armkin.errors import LinkError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from armkin.board.firmware.protocol import Error, Flag, Info, State, Status
+from armkin.board.firmware.wire.protocol import Error, Flag, Info, State, Status
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armkin.board.firmware.straight_lines import line
+from armkin.board.firmware.segments.straight_lines import line
 from armkin.errors import GripperKnownError, GripperLostError, LinkError, UsageError
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.backend.board import LostSteps
-from armkin.board.firmware import protocol
-from armkin.board.firmware.session import DeviceError
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.session import DeviceError
 from armkin.errors import NoHomingError, UsageError
 from armkin.model.lock import joint_index
 from armkin.model.units import scale
@@ -24,7 +24,7 @@ from armkin.motors import joints, pulses
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.machine import Machine
-    from armkin.board.firmware.protocol import Status
+    from armkin.board.firmware.wire.protocol import Status
     from armkin.model.arm import Arm
 
 _SLOW = 26  # /256: the second approach runs at a tenth

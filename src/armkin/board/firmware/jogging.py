@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.backend.starting import check_jog
-from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import State
-from armkin.board.firmware.session import DeviceError
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import State
+from armkin.board.firmware.wire.session import DeviceError
 from armkin.errors import NoSolutionError, PositionLostError, UsageError
 from armkin.model import units
 from armkin.motion.plan.proved_free import free_way

@@ -13,11 +13,13 @@ import numpy as np
 
 from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.starting import from_counts, unbelievable
-from armkin.board.firmware import protocol, streaming, trajectory_to_counts
+from armkin.board.firmware import streaming
 from armkin.board.firmware.board_status import WHY, as_json
-from armkin.board.firmware.onwards import onwards, places_on
-from armkin.board.firmware.protocol import Error, Flag, Status
-from armkin.board.firmware.session import DeviceError, Session
+from armkin.board.firmware.segments import trajectory_to_counts
+from armkin.board.firmware.segments.onwards import onwards, places_on
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import Error, Flag, Status
+from armkin.board.firmware.wire.session import DeviceError, Session
 from armkin.board_kinds import board_name
 from armkin.errors import HeldError, LinkError, PositionKnownError, PositionLostError
 from armkin.model.units import joints_out
@@ -25,7 +27,7 @@ from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.firmware.counts_to_segments import Counts, Move
+    from armkin.board.firmware.segments.counts_to_segments import Counts, Move
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm

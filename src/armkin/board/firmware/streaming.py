@@ -10,18 +10,18 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.go_back_n import QUESTION
-from armkin.board.firmware.motion_frame import Batch, motion_size
-from armkin.board.firmware.protocol import Error, Segment, State, Status
-from armkin.board.firmware.reply_checks import DeviceError
-from armkin.board.firmware.straight_lines import UNHEARD, Pieces
+from armkin.board.firmware.segments.straight_lines import UNHEARD, Pieces
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.go_back_n import QUESTION
+from armkin.board.firmware.wire.motion_frame import Batch, motion_size
+from armkin.board.firmware.wire.protocol import Error, Segment, State, Status
+from armkin.board.firmware.wire.reply_checks import DeviceError
 
 if TYPE_CHECKING:
     from armkin.board.backend import Progress
-    from armkin.board.firmware.counts_to_segments import Counts, Move
-    from armkin.board.firmware.session import Session
-    from armkin.board.firmware.trajectory_to_counts import Cut
+    from armkin.board.firmware.segments.counts_to_segments import Counts, Move
+    from armkin.board.firmware.segments.trajectory_to_counts import Cut
+    from armkin.board.firmware.wire.session import Session
 
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
 _LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.05

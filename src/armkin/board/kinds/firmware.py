@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.board import Board, Gripped, LostSteps
-from armkin.board.firmware import find_boards, gripping, homing, jogging, resuming
+from armkin.board.firmware import gripping, homing, jogging, resuming
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
-from armkin.board.firmware.session import Session
-from armkin.board.firmware.trajectory_to_counts import Cut, cut, plan
+from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
+from armkin.board.firmware.wire import find_boards
+from armkin.board.firmware.wire.session import Session
 from armkin.board.ports import BAUD, SIM, SerialPort
 from armkin.errors import HomingIncompleteError
 from armkin.model import units

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armkin.board.firmware.protocol import Image, RowImage
+from armkin.board.firmware.wire.protocol import Image, RowImage
 from armkin.board.sim.setup import Setup
 
 

@@ -10,8 +10,8 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Error, Flag, Info, State, Status, Type
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import Error, Flag, Info, State, Status, Type
 from armkin.board.sim.commands import Commands
 from armkin.board.sim.frames import RefusedError
 from armkin.board.sim.inputs import Inputs

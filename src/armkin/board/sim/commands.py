@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from armkin.board.firmware.protocol import Error, State, Type
+from armkin.board.firmware.wire.protocol import Error, State, Type
 from armkin.board.sim.frames import RefusedError, axes_of
 from armkin.board.sim.frames import batch as read_batch
 from armkin.board.sim.homing import Search

@@ -5,8 +5,8 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Error, Image, Segment
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import Error, Image, Segment
 from armkin.board_kinds import Board
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 
-from armkin.board.firmware.protocol import Error
+from armkin.board.firmware.wire.protocol import Error
 from armkin.board.sim.cruise import Cruise
 
 _DEBOUNCE = 0.004  # [s]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armkin.board.firmware.protocol import STEP, Error, Segment
+from armkin.board.firmware.wire.protocol import STEP, Error, Segment
 from armkin.board.sim.axes import within
 from armkin.board.sim.frames import Batch, RefusedError
 from armkin.board.sim.queue import Queue

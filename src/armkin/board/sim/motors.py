@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from armkin.board.firmware.protocol import HALF, STEP, Error, Segment, State
+from armkin.board.firmware.wire.protocol import HALF, STEP, Error, Segment, State
 from armkin.board.sim.axes import Axes
 from armkin.board.sim.cruise import Cruise
 from armkin.board.sim.homing import Homing, Search

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import accumulate
 
-from armkin.board.firmware.protocol import HALF, STEP, Segment
+from armkin.board.firmware.wire.protocol import HALF, STEP, Segment
 from armkin.board.sim.axes import Axes
 
 _TOO_FAST = 0.030  # [s] time to a stop from which an abrupt stop loses steps

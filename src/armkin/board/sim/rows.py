@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armkin.board.firmware.protocol import Error, GuardImage, Image
+from armkin.board.firmware.wire.protocol import Error, GuardImage, Image
 from armkin.board.sim.axes import row_value
 from armkin.board.sim.frames import RefusedError
 

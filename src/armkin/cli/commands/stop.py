@@ -44,8 +44,8 @@ def stop(
             return
     elif is_socket(port):
         raise UsageError(f"no armkin moves an arm by {port}; M112 stops Klipper at once, and loses the position")
-    from armkin.board.firmware import protocol
-    from armkin.board.firmware.session import Session
+    from armkin.board.firmware.wire import protocol
+    from armkin.board.firmware.wire.session import Session
     from armkin.board.stopping import stoppable
 
     with stoppable() as asked:
@@ -63,7 +63,7 @@ def stop(
 
 def _port(given: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
-    from armkin.board.firmware.find_boards import answering, likely
+    from armkin.board.firmware.wire.find_boards import answering, likely
     from armkin.board.ports import holder
     from armkin.board.stopping import stoppable
 

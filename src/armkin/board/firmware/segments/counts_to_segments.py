@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.firmware.protocol import BLOCK, COARSE, FINE, HALF, STEP, Segment, nearest_rate
+from armkin.board.firmware.wire.protocol import BLOCK, COARSE, FINE, HALF, STEP, Segment, nearest_rate
 
 Counts = NDArray[np.int64]
 

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
 
-from armkin.board.firmware import protocol, reply_checks
-from armkin.board.firmware.protocol import Ack, Error, Info, Status
-from armkin.board.firmware.serial_line import Line
+from armkin.board.firmware.wire import protocol, reply_checks
+from armkin.board.firmware.wire.protocol import Ack, Error, Info, Status
+from armkin.board.firmware.wire.serial_line import Line
 
 _RESEND = 0.03  # [s] without progress, beyond the time of the slowest answer
 _GAP = 0.004  # [s] after all that was sent has left and an answer had its time

@@ -15,8 +15,16 @@ from itertools import islice, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.firmware.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Cutter, Move, changing, cycles_of
-from armkin.board.firmware.protocol import STEP, Segment
+from armkin.board.firmware.segments.counts_to_segments import (
+    CLOCK,
+    MIN_INTERVAL,
+    Counts,
+    Cutter,
+    Move,
+    changing,
+    cycles_of,
+)
+from armkin.board.firmware.wire.protocol import STEP, Segment
 from armkin.motion.timing.profile import Profile, trapezoid
 
 # A ramp's segments have one ratio of speeds, their fast end's over their slow end's: the acceleration within is right

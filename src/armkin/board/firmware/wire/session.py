@@ -6,12 +6,12 @@ import secrets
 from collections.abc import Callable, Iterator
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware import protocol, reply_checks
-from armkin.board.firmware.go_back_n import Window
-from armkin.board.firmware.protocol import Ack, Error, Info, State, Status
-from armkin.board.firmware.reply_checks import DeviceError as DeviceError
-from armkin.board.firmware.reply_checks import ReplacedError as ReplacedError
-from armkin.board.firmware.serial_line import Line
+from armkin.board.firmware.wire import protocol, reply_checks
+from armkin.board.firmware.wire.go_back_n import Window
+from armkin.board.firmware.wire.protocol import Ack, Error, Info, State, Status
+from armkin.board.firmware.wire.reply_checks import DeviceError as DeviceError
+from armkin.board.firmware.wire.reply_checks import ReplacedError as ReplacedError
+from armkin.board.firmware.wire.serial_line import Line
 from armkin.board.ports import Port, leave_boot_loader
 from armkin.errors import LinkError
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from armkin.board.firmware.session import Session
+from armkin.board.firmware.wire.session import Session
 from armkin.board.ports import BAUD, SerialPort, list_ports
 from armkin.errors import LinkError
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armkin.board.firmware.protocol import VERSION, Ack, Error, Info, State, Status
+from armkin.board.firmware.wire.protocol import VERSION, Ack, Error, Info, State, Status
 from armkin.errors import LinkError
 
 _INFO: dict[str, tuple[int, int]] = {

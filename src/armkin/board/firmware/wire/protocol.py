@@ -12,26 +12,26 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
-from armkin.board.firmware.configuration_image import AxisImage as AxisImage
-from armkin.board.firmware.configuration_image import GuardImage as GuardImage
-from armkin.board.firmware.configuration_image import Image as Image
-from armkin.board.firmware.configuration_image import RowImage as RowImage
-from armkin.board.firmware.framing import MAX_FRAME as MAX_FRAME
-from armkin.board.firmware.framing import Splitter as Splitter
-from armkin.board.firmware.framing import cobs_decode as cobs_decode
-from armkin.board.firmware.framing import cobs_encode as cobs_encode
-from armkin.board.firmware.framing import unwire as unwire
-from armkin.board.firmware.framing import wire as wire
-from armkin.board.firmware.segment_format import BLOCK as BLOCK
-from armkin.board.firmware.segment_format import COARSE as COARSE
-from armkin.board.firmware.segment_format import FINE as FINE
-from armkin.board.firmware.segment_format import HALF as HALF
-from armkin.board.firmware.segment_format import STEP as STEP
-from armkin.board.firmware.segment_format import Segment as Segment
-from armkin.board.firmware.segment_format import nearest_rate as nearest_rate
-from armkin.board.firmware.segment_format import read_segment as read_segment
-from armkin.board.firmware.segment_format import segment_size as segment_size
-from armkin.board.firmware.segment_format import whole as whole
+from armkin.board.firmware.wire.configuration_image import AxisImage as AxisImage
+from armkin.board.firmware.wire.configuration_image import GuardImage as GuardImage
+from armkin.board.firmware.wire.configuration_image import Image as Image
+from armkin.board.firmware.wire.configuration_image import RowImage as RowImage
+from armkin.board.firmware.wire.framing import MAX_FRAME as MAX_FRAME
+from armkin.board.firmware.wire.framing import Splitter as Splitter
+from armkin.board.firmware.wire.framing import cobs_decode as cobs_decode
+from armkin.board.firmware.wire.framing import cobs_encode as cobs_encode
+from armkin.board.firmware.wire.framing import unwire as unwire
+from armkin.board.firmware.wire.framing import wire as wire
+from armkin.board.firmware.wire.segment_format import BLOCK as BLOCK
+from armkin.board.firmware.wire.segment_format import COARSE as COARSE
+from armkin.board.firmware.wire.segment_format import FINE as FINE
+from armkin.board.firmware.wire.segment_format import HALF as HALF
+from armkin.board.firmware.wire.segment_format import STEP as STEP
+from armkin.board.firmware.wire.segment_format import Segment as Segment
+from armkin.board.firmware.wire.segment_format import nearest_rate as nearest_rate
+from armkin.board.firmware.wire.segment_format import read_segment as read_segment
+from armkin.board.firmware.wire.segment_format import segment_size as segment_size
+from armkin.board.firmware.wire.segment_format import whole as whole
 
 VERSION = 2
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.counts_to_segments import Counts, Cutter, changing
-from armkin.board.firmware.protocol import STEP, Segment
+from armkin.board.firmware.segments.counts_to_segments import Counts, Cutter, changing
+from armkin.board.firmware.wire.protocol import STEP, Segment
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian
 from armkin.motors import motor_accel, places

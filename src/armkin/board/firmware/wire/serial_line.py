@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from armkin.board.firmware import protocol
-from armkin.board.firmware.protocol import Ack, Info, Status
+from armkin.board.firmware.wire import protocol
+from armkin.board.firmware.wire.protocol import Ack, Info, Status
 from armkin.board.ports import Port
 
 _COPIES = 3  # of every frame, on a bad line, and of questions that nothing goes on without

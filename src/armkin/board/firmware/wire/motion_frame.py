@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armkin.board.firmware.protocol import (
+from armkin.board.firmware.wire.protocol import (
     GENTLE_PARTS,
     MOTION_END,
     MOTION_GENTLE,
@@ -14,7 +14,7 @@ from armkin.board.firmware.protocol import (
     Type,
     mask_of,
 )
-from armkin.board.firmware.segment_format import Segment, pack, segment_size
+from armkin.board.firmware.wire.segment_format import Segment, pack, segment_size
 
 
 def motion(

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.board.backend.starting import Laid
-from armkin.board.firmware.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
-from armkin.board.firmware.curves import CurveSegments, rates
-from armkin.board.firmware.straight_lines import Pieces, along, count
+from armkin.board.firmware.segments.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
+from armkin.board.firmware.segments.curves import CurveSegments, rates
+from armkin.board.firmware.segments.straight_lines import Pieces, along, count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.protocol import STEP
+from armkin.board.firmware.wire.protocol import STEP
 from armkin.motion.remainder import remainder
 from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import places
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.trajectory_to_counts import Cut
+    from armkin.board.firmware.segments.trajectory_to_counts import Cut
     from armkin.formula.arrays import Array
 
 _NEAR = 1.5  # steps that every motor of an arm on its plan is within

@@ -1,0 +1,7 @@
+"""A trajectory as moves in counts, and these as segments of constant acceleration.
+
+trajectory_to_counts.py  a trajectory as moves in counts, refused where it is too fast
+counts_to_segments.py    pieces of constant acceleration as exact segments
+straight_lines.py        which pieces a straight line has; curves.py: any other stretch
+onwards.py               what is left of a plan that was held
+"""
