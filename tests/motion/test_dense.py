@@ -283,7 +283,9 @@ def test_lines_between_tight_bends_are_as_fast_as_on_a_far_finer_grid(
         assert isinstance(stretch, Curve)
         pace = armkin.jacobian(three_dof, stretch.path.q)[:, :3] @ stretch.path.d[..., None]
         np.testing.assert_allclose(np.linalg.norm(pace, axis=1), 1.0, atol=1e-4)
-    monkeypatch.setitem(branch_path.stretches.__kwdefaults__, "grid", 8000)
+    defaults = branch_path.stretches.__kwdefaults__
+    assert defaults is not None
+    monkeypatch.setitem(defaults, "grid", 8000)
     fine = armkin.path(three_dof, points, corners="tolerance", tool_speed=20.0)
     assert on_path(plan) <= 1.004 * on_path(fine)
     assert plan.limits["accel"].max() <= 1.002
