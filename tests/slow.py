@@ -208,8 +208,10 @@ SLOW: dict[str, tuple[str, ...]] = {
     "inverse/test_exact_postures.py": (),
     "inverse/test_constants.py": ("test_no_word_hangs_on_the_others",),
     "inverse/test_families.py": (
+        "test_a_joint_that_turns_about_the_tool_is_redundant_where_its_axis_alone_is_asked_for",
         "test_a_nearly_stretched_arm_has_its_short_families",
         "test_a_row_is_the_posture_of_its_interval_nearest_to_near",
+        "test_a_tool_beside_the_last_axis_has_families_of_the_first_joint",
         "test_as_many_legal_postures_as_intervals_at_any_value",
         "test_the_arm_angle_knows_all_families_of_a_class_whatever_its_zeros_and_elbow",
         "test_the_command_answers_without_options",

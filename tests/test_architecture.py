@@ -64,7 +64,8 @@ MAY_IMPORT: dict[str, str] = {
     "export/js": "errors formula model forward inverse/solvers inverse/tasks inverse/closed inverse/numeric"
     " inverse/elimination inverse/branches keep_out motors export/c",
     "compiled": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
-    " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export/c columns",
+    " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export/c columns"
+    " inverse/redundant",
     "plot": "keep_out keep_out/shapes errors files formula model forward motion motion/plan view reachability",
     "board/ports": "errors",
     "board/firmware/wire": "errors board/ports board/backend",

@@ -37,7 +37,7 @@ DOF = THREE_DOF
         ("info", "a robot file or the name of a shipped robot (armkin robots)"),
         ("import robots/ur5e.yaml", "armkin info robots/ur5e.yaml"),
         ("import ur5e", "armkin info ur5e"),
-        ("export kinova_gen3 --c -o arm.c", "ik --lock and Python's armkin.lock hold joints"),
+        ("export so101 --task xyz --c -o arm.c", "ik --lock and Python's armkin.lock hold joints"),
     ],
 )
 def test_a_slip_is_answered_with_what_is_meant(line: str, says: str) -> None:

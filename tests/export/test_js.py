@@ -203,7 +203,8 @@ def test_a_name_in_the_module_ends_no_script_and_no_line() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "task", "count"), [("panda", None, 30), ("iiwa7", None, 20), ("planar_3dof", "xy", 20)]
+    ("name", "task", "count"),
+    [("panda", None, 30), ("iiwa7", None, 20), ("planar_3dof", "xy", 20), ("ur5e", "xyz_axis", 20)],
 )
 def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
     name: str, task: str | None, count: int, tmp_path: Path

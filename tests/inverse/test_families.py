@@ -266,3 +266,59 @@ def test_intervals_shorter_than_a_sample_are_listed(k: int, degrees: float, coun
     value = float(np.deg2rad(degrees))
     assert len(held_answers(arm, 6, value, target[k], None)) == count
     assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == count
+
+
+def axis_targets(arm: armkin.Arm, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Postures within limits (N, n), and where their tools are and point to (N, 6)."""
+    low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
+    q = np.random.default_rng(seed).uniform(low, high, (count, arm.n))
+    T = armkin.fk(arm, q)
+    return q, np.concatenate([T[:, :3, 3], T[:, :3, 2]], axis=1)
+
+
+@pytest.mark.parametrize("name", ["ur5e", "puma560", "jaco_j2n6s300"])
+def test_a_joint_that_turns_about_the_tool_is_redundant_where_its_axis_alone_is_asked_for(name: str) -> None:
+    """Refused before: 6 joints for 5 constraints. Each branch of a pose is a family, at any value of the last joint."""
+    arm = armkin.load(name)
+    q, target = axis_targets(arm, 40, 5)
+    s, pose = armkin.ik(arm, target, "xyz_axis", near=q), armkin.ik(arm, armkin.fk(arm, q), near=q)
+    assert (s.status == Status.EXACT).all()
+    assert s.complete.all()
+    assert (s.valid.sum(axis=1) == pose.valid.sum(axis=1)).all()
+    assert s.interval is not None
+    best = np.take_along_axis(s.q, s.best[:, None, None], axis=1)[:, 0]
+    np.testing.assert_allclose(best, q, atol=1e-9)
+    turn = np.clip([-np.pi, np.pi], arm.lower[5], arm.upper[5])
+    np.testing.assert_allclose(s.interval[s.valid], np.broadcast_to(turn, (s.valid.sum(), 2)))
+    mm, rad = s.residual()
+    assert np.nanmax(mm) <= 1e-9 * arm.reach
+    assert np.nanmax(rad) <= 1e-9
+    turned = np.where(s.valid[..., None], s.q, 0.0)
+    turned[..., 5] = 0.5
+    there = armkin.fk(arm, turned)
+    off = np.abs(np.concatenate([there[..., :3, 3], there[..., :3, 2]], axis=-1) - target[:, None])
+    assert off[s.valid].max() <= 1e-9 * arm.reach
+    fast = armkin.compile(arm).ik(target, "xyz_axis", near=q)
+    np.testing.assert_allclose(fast.q, s.q, atol=1e-9)
+    assert (fast.complete == s.complete).all()
+
+
+def test_a_tool_beside_the_last_axis_has_families_of_the_first_joint() -> None:
+    """An internal error before: the axis is three numbers for two constraints."""
+    arm = armkin.load("fanuc_crx10ia")
+    q, target = axis_targets(arm, 3, 6)
+    s = armkin.ik(arm, target, "xyz_axis", near=q)
+    assert s.method == "families of J1"
+    best = np.take_along_axis(s.q, s.best[:, None, None], axis=1)[:, 0]
+    np.testing.assert_allclose(best, q, atol=1e-9)
+    mm, rad = s.residual()
+    assert np.nanmax(mm) <= 1e-9 * arm.reach
+    assert np.nanmax(rad) <= 1e-9
+
+
+def test_a_batch_of_a_redundant_arm_may_be_compiled() -> None:
+    """`--compiled` with a task by name was refused: 7 joints for 6 constraints."""
+    arm = armkin.load("panda")
+    q, target = postures(arm, None, 2, 7)
+    fast, own = armkin.compile(arm).ik(target, "pose", near=q), armkin.ik(arm, target, near=q)
+    np.testing.assert_allclose(fast.q, own.q, atol=1e-9)

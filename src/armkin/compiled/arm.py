@@ -25,9 +25,11 @@ from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.numeric.tolerances import FAR, SOLUTION
+from armkin.inverse.redundant.families import families
 from armkin.inverse.run.workers import check, shared
 from armkin.inverse.singular import near_itself
 from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.task import distance, read_targets
 from armkin.keep_out.clearance import Clearance, clearance, least, named
 from armkin.model.arm import actual
@@ -172,7 +174,7 @@ class _CompiledTask:
     def ik(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None = None) -> Solutions:
         """All branches of targets in the task's shape; said: how far the caller says that they are rounded."""
         if not self.branches:
-            return solve.ik(self.arm, targets, self.name, near=near, rounding=said)
+            return self._without_a_form(targets, near, said)
         alone = self._single is not None and said is None
         if alone and type(targets) is np.ndarray and targets.shape == self.goal_shape:
             found = self._alone(targets, near)
@@ -229,6 +231,12 @@ class _CompiledTask:
             complete=out.complete.reshape(lead),
             rounding=rounding.reshape(lead),
         )
+
+    def _without_a_form(self, targets: ArrayLike, near: ArrayLike | None, said: ArrayLike | None) -> Solutions:
+        """As `armkin.ik`; of an arm with a redundant joint the others by machine code."""
+        if (spare := redundancy(self.arm, self.name)) is not None:
+            return families(_of_others, self.arm, spare, targets, near, said)
+        return solve.ik(self.arm, targets, self.name, near=near, rounding=said)
 
     def _quick(self, call: Any) -> Single | None:
         """The short way of one target, for arms whose branches and joint values need no more than C gives."""
@@ -315,8 +323,16 @@ class _CompiledTask:
         return solve._commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=said))
 
 
+def _of_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = True, **options: Any) -> Solutions:
+    """`armkin.ik` of an arm whose redundant joint is held, from machine code."""
+    return compile(arm).ik(targets, task, **options)
+
+
 def _class_of(arm: Arm, name: str | None) -> tuple[Task | None, Geometry | None]:
-    """The task and the solver of an arm; none of both for one whose usual task does not fit it: it still has poses."""
+    """The task and the solver of an arm; none of both for one whose usual task does not fit it, which still has poses,
+    and for one with a redundant joint."""
+    if redundancy(arm, name) is not None:
+        return None, None
     try:
         return solver(arm, name)
     except UsageError:

@@ -47,12 +47,14 @@ def onto(find: Follower, row: Int, q: Array, last: Array, fixed: bool = False) -
     """
     arm, task, unit = find.arm, find.free.task, radian_or_reach(find.arm)
     target = find.target[row]
-    right = np.zeros((len(q), arm.n, 2))
-    right[:, -1, 1] = 1.0
     tangent = last
     for _ in range(NEWTON):
-        right[:, :-1, 0], J = newton.scaled(arm, task, q, target)
-        x = nudged(np.linalg.solve, np.concatenate([J, last[:, None]], axis=1), right)
+        missing, J = newton.scaled(arm, task, q, target)
+        rows = np.concatenate([J, last[:, None]], axis=1)
+        right = np.zeros((*rows.shape[:2], 2))
+        right[:, :-1, 0], right[:, -1, 1] = missing, 1.0
+        # the direction of a tool's axis is three numbers for two constraints
+        x = nudged(np.linalg.solve, rows, right) if rows.shape[1] == arm.n else np.linalg.pinv(rows) @ right
         step, tangent = x[:, :, 0], x[:, :, 1] / np.linalg.norm(x[:, :, 1], axis=1, keepdims=True)
         q = q + step * np.minimum(1.0, LONGEST / np.maximum(np.abs(step).max(axis=1), LONGEST))[:, None] * unit
         if np.abs(step).max(initial=0.0) < CONVERGING:

@@ -3,11 +3,13 @@
 The redundant joint is the last or the first one, whichever leaves a closed form. Its motion only moves the target of
 the other joints, T = Z(q) T' or T' Z(q), so one solver, prepared once, answers every value of it. A family is a piece
 of a curve of answers along which the joint is monotone; a row is a legal interval of one. The curves are known by the
-arm angle (`arm_angle`), or followed along the joint (`followed`).
+arm angle (`arm_angle`), or followed along the joint (`followed`). Where the joint turns about the tool's z axis, which
+alone is asked for, each branch of the others is one.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,6 +52,8 @@ def families(
 
     q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad].
     """
+    if free.still:
+        return _still(ik, arm, free, targets, near, rounding)
     task = free.task
     values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
     goal, lead, off = read_targets(task, values)
@@ -98,9 +102,44 @@ def families(
     )
 
 
+def _still(
+    ik: Ik, arm: Arm, free: Redundancy, targets: ArrayLike, near: ArrayLike | None, rounding: ArrayLike | None
+) -> Solutions:
+    """The branches of the others, which the redundant joint's motion leaves as they are: each is a family."""
+    r = free.joint
+    lead = shaped(free.task, arrays.real(targets, "targets"))[1]
+    close = read_near(arm, near, lead)
+    s = ik(free.rest, targets, free.task.name, near=np.delete(close, r, axis=-1), rounding=rounding)
+    close = np.broadcast_to(close, (*lead, arm.n)).copy()
+    value = np.clip(close[..., r], arm.lower[r], arm.upper[r])[..., None]
+    turns = (arm.upper[r] - arm.lower[r]) * abs(arm.ratio[r]) >= 2 * np.pi
+    interval = np.full((*s.valid.shape, 2), np.nan)
+    interval[s.valid] = [-np.pi, np.pi] if turns else [arm.lower[r], arm.upper[r]]
+    method, why, _ = described(arm, free)
+    return replace(
+        s,
+        arm=arm,
+        task=free.task,
+        near=close,
+        q=np.insert(s.q, r, np.where(s.valid, value, np.nan), axis=-1),
+        status=np.where(s.status == Status.BOUNDARY, Status.EXACT, s.status).astype(
+            np.int8
+        ),  # a family moves the joint
+        free=np.insert(s.free, r, False, axis=-1),
+        method=method,
+        why=why,
+        interval=interval,
+    )
+
+
 def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     """The method of an arm with a redundant joint, why, and whether it guarantees all families."""
     joint = arm.joint_names[free.joint]
+    if free.still:
+        why = (
+            f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: {free.geometry.why}"
+        )
+        return f"families of {joint}", why, free.geometry.complete
     closed = bool(free.joint) and arm_angle(actual(arm)) is not None
     if closed:
         how = "in closed form by the arm angle"

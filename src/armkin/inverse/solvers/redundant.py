@@ -13,6 +13,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
+from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task
@@ -32,6 +33,11 @@ class Redundancy(NamedTuple):
     geometry: Geometry  # of the rest
 
     @property
+    def still(self) -> bool:
+        """Whether the redundant joint moves no target: it turns about the tool's z axis, which alone is asked for."""
+        return bool(self.joint) and self.task.orientation == "axis"
+
+    @property
     def labelled(self) -> bool:
         """Whether a branch keeps its index along the turn, as that of a closed form does."""
         return self.geometry.ordered and self.geometry.pairs is not None
@@ -41,7 +47,8 @@ class Redundancy(NamedTuple):
 def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
     """What is redundant of an arm that has one joint more than its task asks for; None for every other.
 
-    Chosen by structure, the same for every target: the last joint if that leaves a closed form, else the first.
+    Chosen by structure, the same for every target: the last joint if that leaves a closed form, else the first. Of an
+    arm asked for the direction of its tool's z axis the last joint if it turns about that axis.
     """
     try:
         task = task_for(arm, task_name)
@@ -52,7 +59,7 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
     if task_name is None:
         return redundancy(arm, task.name)  # the same rest, prepared once
     found = []
-    for joint in ([arm.n - 1] if task.orientation == "full" else []) + [0]:
+    for joint in ([arm.n - 1] if task.orientation == "full" or _turns_about_the_tool(arm, task) else []) + [0]:
         if arm.prismatic[joint]:
             continue
         rest = lock(arm, {arm.joint_names[joint]: 0.0})
@@ -64,8 +71,16 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
     return next(iter(closed or found[:1]), None)
 
 
+def _turns_about_the_tool(arm: Arm, task: Task) -> bool:
+    """Whether the last joint turns about the tool's z axis, which alone is asked for: it moves no target."""
+    off = np.array([arm.link[-1][:2, 3] / arm.reach, arm.link[-1][:2, 2]])
+    return task.orientation == "axis" and task.position == 3 and bool(np.abs(off).max() <= EXACT)
+
+
 def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
     """Targets (M, m) or (M, 4, 4) as those of the rest, for values t (M,) of the redundant joint."""
+    if free.still:
+        return target.copy()
     c, s = np.cos(t), np.sin(t)
     Z = np.broadcast_to(np.eye(4), (len(t), 4, 4)).copy()
     Z[:, 0, 0], Z[:, 0, 1], Z[:, 1, 0], Z[:, 1, 1] = c, s, -s, c
@@ -103,6 +118,8 @@ def held_by_near(arm: Arm, free: Redundancy) -> Geometry:
 def moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], own: Pair) -> list[Entry]:
     """`moved` of one target's entries, for the cosine and sine of the redundant joint."""
     c, s = own
+    if free.still:
+        return goal
     if free.joint:
         L = arm.link[-1]
         back = pose.rotate(pose.constant(inverse(L)), c, arrays.sub(0.0, s))

@@ -28,6 +28,7 @@ _FEWEST = 2  # of a section where slopes are exact: they need no neighbours
 _GROWTH = 3.0  # of an interval beside the next one, at most: motions speed up and slow down beside bends
 _GROWS = 1.3  # times that: what is hardly longer stays
 _AROUND = 0.5  # [mm] of the way, about a given point
+_ALIKE = 1e-3  # distances of points that differ by less, relative, are alike: the first place is told
 _REST = 32  # intervals from rest to rest, at least, where there are many rests
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
@@ -236,8 +237,10 @@ def missed(arm: Arm, route: Route, path: Knots) -> Missed:
             near = np.clip(s[i + k] + np.linspace(-_AROUND, _AROUND, 401), path.s[0], path.s[-1])
             off = given[k] - position(arm, path.at(near)[0])[:, : given.shape[1]]
             distance[k] = min(distance[k], float(np.linalg.norm(off, axis=1).min()))
-        if worst is None or distance[k] > worst[0]:
-            worst = float(distance[k]), float(s[i + k])
+        most = float(distance[k])
+        if worst is None or most > worst[0] * (1 + _ALIKE):
+            worst = most, float(s[i + int((distance >= most * (1 - _ALIKE)).argmax())])
+        worst = max(most, worst[0]), worst[1]
     return worst
 
 

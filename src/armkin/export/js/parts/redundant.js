@@ -13,6 +13,7 @@ function product(a, b, out) {
 function moved(target, t) {
   const given = target.flatMap((/** @type {number | number[]} */ row) => row);
   const full = ARM.orientation === 'full';
+  if (REDUNDANT.joint && !full) return target; // it turns about the tool's axis, which alone is asked for
   if (given.length !== (full ? 16 : ARM.labels.length)) return target; // refused with its own words
   const [c, s] = [Math.cos(t), Math.sin(t)];
   const back = [c, s, 0, 0, -s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
