@@ -329,6 +329,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_seven_joints_need_one_that_is_held",
     ),
     "teach/test_teach_mended.py": (),
+    "teach/test_teach_other_pages.py": (),
     "teach/test_teach_program.py": ("test_what_is_played_is_where_the_tip_is_however_long_it_takes",),
     "teach/test_teach_safety.py": (),
     "teach/test_teach_slice.py": (),

@@ -260,69 +260,6 @@ def test_without_webgl_everything_else_works(browser: Browser) -> None:
         assert server.actions.stands() == tuple(COUNTS)
 
 
-def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: Path) -> None:
-    with served(board="sim") as server, opened(browser, server.address) as page:
-        base = server.address.split("/#")[0]
-        asked: list[str] = []
-        before = server.actions.act
-        server.actions.act = lambda name, tab, fields: asked.append(name) or before(name, tab, fields)  # type: ignore[func-returns-value, method-assign, assignment]
-        other = page.context.browser.new_context().new_page()  # type: ignore[union-attr]
-        evil = tmp_path / "evil.html"
-        evil.write_text(
-            f"""<body><iframe id=frame src="{base}/"></iframe>
-            <form id=form method=post enctype="text/plain" action="{base}/api/stop" target=hidden>
-            <input name='{{"q": "' value='"}}'></form><iframe name=hidden></iframe></body>"""
-        )
-        other.goto(f"file://{evil}")
-        tried = other.evaluate(
-            """async base => {
-              const send = async (options) => {
-                try { return (await fetch(base + "/api/stop", { method: "POST", body: "{}", ...options })).status; }
-                catch (error) { return "refused"; }
-              };
-              const key = { "Content-Type": "application/json", "X-Armkin-Key": "guess" };
-              document.getElementById("form").submit();
-              const events = new EventSource(base + "/events?tab=guess");
-              await new Promise((resolve) => { events.onerror = resolve; events.onopen = resolve; });
-              return [await send({ headers: key }), (await send({ mode: "no-cors" })) || "opaque", events.readyState];
-            }""",
-            base,
-        )
-        assert tried[0] == "refused"
-        assert tried[2] == 2  # closed
-        other.wait_for_timeout(300)
-        frame = other.frames[1]
-        assert "three_dof" not in (frame.evaluate("document.body ? document.body.innerText : ''") or "")
-        assert asked == []
-        other.context.close()
-
-
-def test_two_pages_and_a_take_over_on_purpose(browser: Browser) -> None:
-    with (
-        served(board="sim") as server,
-        opened(browser, server.address) as first,
-        opened(browser, server.address) as second,
-    ):
-        until(second, "document.querySelector('#control').textContent.includes('another page')")
-        assert second.evaluate("document.querySelector('#panels').inert")
-        aim(first, 390, 80, 300)
-        first.click("#record")
-        first.wait_for_selector("#player:not([hidden])")
-        until(second, "document.querySelector('#name-0')")
-        second.wait_for_timeout(300)
-        assert second.inner_text("#trouble") == second.inner_text("#planned") == ""  # who watches asks for nothing
-        first.fill("#speed", "5")
-        until(second, "document.querySelector('#box-0').value === '10.1529'")
-        first.click("#send")
-        until(second, "document.querySelector('#standing').textContent.startsWith('send')")
-        second.click("#stop")  # works in both
-        idle(first, "stopped")
-        second.click("#take")
-        until(first, "document.querySelector('#panels').inert")
-        until(second, "!document.querySelector('#panels').inert")
-        second.wait_for_selector("#player:not([hidden])")  # whoever holds control has the plan
-
-
 def test_the_program_is_saved_and_loaded(page: Page, tmp_path: Path) -> None:
     for target in ((390, 80, 300), (350, -50, 260)):
         aim(page, *target)

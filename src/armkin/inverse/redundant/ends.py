@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, NO_ROOM, SAME_END, TINY
-from armkin.inverse.redundant.pieces import Int, margin, turning
+from armkin.inverse.redundant.pieces import Int, golden_section, margin, turning
 
 if TYPE_CHECKING:
     from armkin.inverse.redundant.follower import Follower, Postures
@@ -126,23 +126,14 @@ def hidden_stretches(find: Follower, t: Array, found: Postures) -> tuple[Changes
     row, k, branch = np.nonzero(turning(room))
     sign = np.sign(room[row, k, branch])
     rows = _Ends(find, row, branch, True)
-    every, ratio = np.arange(len(row)), (5**0.5 - 1) / 2
+    every = np.arange(len(row))
 
-    def height(some: Int, value: Array) -> Array:
-        """Above zero: such a stretch."""
-        return -sign[some] * rows.rooms(some, find.found(row[some], value))
+    def depth(value: Array) -> Array:
+        """Below zero: such a stretch."""
+        return sign * rows.rooms(every, find.found(row, value))
 
-    low, high = t[k], t[k] + (t[1] - t[0])
-    left, right = high - ratio * (high - low), low + ratio * (high - low)
-    at_left, at_right = height(every, left), height(every, right)
-    for _ in range(PEAK if len(row) else 0):
-        go = at_left >= at_right
-        low, high = np.where(go, low, left), np.where(go, right, high)
-        new = np.where(go, high - ratio * (high - low), low + ratio * (high - low))
-        at_new = height(every, new)
-        left, right = np.where(go, new, right), np.where(go, left, new)
-        at_left, at_right = np.where(go, at_new, at_right), np.where(go, at_left, at_new)
-    peak, top = np.where(at_left >= at_right, left, right), np.maximum(at_left, at_right)
+    _, _, peak, least = golden_section(depth, t[k], t[k] + (t[1] - t[0]), PEAK)
+    top = -least
     some = np.flatnonzero(top > 0)
     row, k, branch, sign, peak, top = (column[some] for column in (row, k, branch, sign, peak, top))
     near = _Ends(find, np.tile(row, 2), np.tile(branch, 2), True)

@@ -27,7 +27,7 @@ from armkin.inverse.redundant.arcs import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.followed import SAMPLES, Followed
 from armkin.inverse.redundant.follower import Follower, Ik
-from armkin.inverse.redundant.pieces import Curves, Pieces, motion
+from armkin.inverse.redundant.pieces import Curves, Pieces, golden_section, motion
 from armkin.inverse.redundant.traced import Traced
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
@@ -122,9 +122,7 @@ def _still(
         task=free.task,
         near=close,
         q=np.insert(s.q, r, np.where(s.valid, value, np.nan), axis=-1),
-        status=np.where(s.status == Status.BOUNDARY, Status.EXACT, s.status).astype(
-            np.int8
-        ),  # a family moves the joint
+        status=np.where(s.status == Status.BOUNDARY, np.int8(Status.EXACT), s.status),  # a family moves the joint
         free=np.insert(s.free, r, False, axis=-1),
         method=method,
         why=why,
@@ -136,10 +134,8 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     """The method of an arm with a redundant joint, why, and whether it guarantees all families."""
     joint = arm.joint_names[free.joint]
     if free.still:
-        why = (
-            f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: {free.geometry.why}"
-        )
-        return f"families of {joint}", why, free.geometry.complete
+        why = f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: "
+        return f"families of {joint}", why + free.geometry.why, free.geometry.complete
     closed = bool(free.joint) and arm_angle(actual(arm)) is not None
     if closed:
         how = "in closed form by the arm angle"
@@ -245,17 +241,7 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
     beside = [costs(some, p.at + PROBE * (end - p.at)) for end in (p.low, p.high)]
     some = some[np.minimum(*beside) < motion(arm, p.start, near[some])]
     p = curves.pieces.of(some)
-    low, high = p.low, p.high
-    ratio = (5**0.5 - 1) / 2
-    left, right = high - ratio * (high - low), low + ratio * (high - low)
-    at_left, at_right = costs(some, left), costs(some, right)
-    for _ in range(curves.steps if len(some) else 0):
-        go = at_left <= at_right
-        low, high = np.where(go, low, left), np.where(go, right, high)
-        new = np.where(go, high - ratio * (high - low), low + ratio * (high - low))
-        cost = costs(some, new)
-        left, right = np.where(go, new, right), np.where(go, left, new)
-        at_left, at_right = np.where(go, cost, at_right), np.where(go, at_left, cost)
+    low, high, *_ = golden_section(lambda t: costs(some, t), p.low, p.high, curves.steps)
     if len(some):  # where a joint passes its near in what is left the motion has a kink: by a secant
         ends = [curves.at(p, t)[0] - near[some] for t in (low, high)]
         passes = np.where(ends[0] * ends[1] < 0, np.abs(ends[1] - ends[0]), 0.0)

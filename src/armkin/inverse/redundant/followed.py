@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric.tolerances import REACH, SOLUTION
 from armkin.inverse.redundant.ends import Changes, hidden_stretches, places_of
 from armkin.inverse.redundant.follower import Follower, Postures, over_a_turn
@@ -110,20 +110,18 @@ def _cut(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
         turns = 2 * np.pi * np.round((0.5 * (pieces.a + pieces.b) - begin) / (2 * np.pi))
         inside = (pieces.row == row) & (pieces.branch == branch) & (pieces.a < begin + turns) & (end + turns < pieces.b)
         for p in np.flatnonzero(inside):
-            one, turn = pieces.of(np.array([p])), turns[p]
+            one = pieces.of(np.array([p]))
+            before, behind = np.array([begin + turns[p]]), np.array([end + turns[p]])
+            sides = [(one.a, before), (behind, one.b)]
+            if pieces.b[p] - pieces.a[p] >= 2 * np.pi:  # a whole turn is one piece that begins behind the gap
+                sides = [(behind, before + 2 * np.pi)]
             parts = [pieces.of(np.arange(len(pieces.row)) != p)]
-            for a, b in ((one.a, one.a * 0 + begin + turn), (one.b * 0 + end + turn, one.b)):
-                if pieces.b[p] - pieces.a[p] >= 2 * np.pi:  # a whole turn is one piece that begins behind the gap
-                    a, b = one.a * 0 + end + turn, one.a * 0 + begin + turn + 2 * np.pi
+            for a, b in sides:
                 holds = (a <= one.at) & (one.at <= b)
                 at = np.where(holds, one.at, 0.5 * (a + b))
-                there = find.one(one.row, one.branch, at)
-                parts.append(one._replace(
-                    a=a, b=b, first=a, last=b, low=np.clip(one.low, a, b) if holds else a, at=at,
-                    high=np.clip(one.high, a, b) if holds else b, start=there.q,
-                ))  # fmt: skip
-                if pieces.b[p] - pieces.a[p] >= 2 * np.pi:
-                    break
+                low, high = (np.clip(one.low, a, b), np.clip(one.high, a, b)) if holds else (a, b)
+                start = find.one(one.row, one.branch, at).q
+                parts.append(one._replace(a=a, b=b, first=a, last=b, low=low, at=at, high=high, start=start))
             pieces = Pieces(*(np.concatenate(column) for column in zip(*parts, strict=True)))
             break
     return pieces
@@ -149,7 +147,7 @@ def _all_short(find: Follower, found: Postures) -> Bool:
     short = np.asarray(found.valid.any(axis=(1, 2)) & ~together.any(axis=(1, 2)))
     for k in np.flatnonzero(short).tolist():
         q, valid = found.q[k], found.valid[k]
-        step = np.abs(np.remainder(np.roll(q, -1, axis=0) - q + np.pi, 2 * np.pi) - np.pi)
+        step = np.abs(wrapped(np.roll(q, -1, axis=0) - q))
         way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
         short[k] = 2.0 * way.max(initial=0.0) < REACH
     return short

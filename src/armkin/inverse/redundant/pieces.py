@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -136,3 +137,21 @@ def turning(values: Array) -> Bool:
         on, back = 2 * values - np.roll(values, 1, axis=1), 2 * following - np.roll(values, -2, axis=1)
         up, down = (values < 0) & (following < 0), (values > 0) & (following > 0)
         return np.asarray((up & (on > 0) & (back > 0)) | (down & (on < 0) & (back < 0)))
+
+
+def golden_section(
+    cost: Callable[[Array], Array], low: Array, high: Array, steps: int
+) -> tuple[Array, Array, Array, Array]:
+    """A minimum each of a cost between low and high (M,): the ends that are left, the lower of the two places between
+    them, and its cost."""
+    ratio = (5**0.5 - 1) / 2
+    left, right = high - ratio * (high - low), low + ratio * (high - low)
+    at_left, at_right = cost(left), cost(right)
+    for _ in range(steps if len(low) else 0):
+        go = at_left <= at_right
+        low, high = np.where(go, low, left), np.where(go, right, high)
+        new = np.where(go, high - ratio * (high - low), low + ratio * (high - low))
+        at_new = cost(new)
+        left, right = np.where(go, new, right), np.where(go, left, new)
+        at_left, at_right = np.where(go, at_new, at_right), np.where(go, at_left, at_new)
+    return low, high, np.where(at_left <= at_right, left, right), np.minimum(at_left, at_right)
