@@ -135,7 +135,8 @@ def hidden_stretches(find: Follower, t: Array, found: Postures) -> tuple[Changes
     _, _, peak, least = golden_section(depth, t[k], t[k] + (t[1] - t[0]), PEAK)
     top = -least
     some = np.flatnonzero(top > 0)
-    row, k, branch, sign, peak, top = (column[some] for column in (row, k, branch, sign, peak, top))
+    row, k, branch = row[some], k[some], branch[some]
+    sign, peak, top = sign[some], peak[some], top[some]
     near = _Ends(find, np.tile(row, 2), np.tile(branch, 2), True)
     sample = np.concatenate([k, (k + 1) % len(t)])
     at_sample = room[near.row, sample, near.branch]
