@@ -1,9 +1,8 @@
 // @ts-check
 /** The 3-D view: drawn when something has changed, never in a loop. */
 import {
-  AmbientLight, AxesHelper, Box3, BufferGeometry, CustomBlending, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper,
-  HemisphereLight, Line, LineBasicMaterial, Mesh, MeshBasicMaterial, MeshLambertMaterial, NotEqualStencilFunc, OneFactor,
-  PerspectiveCamera, ReplaceStencilOp, Scene, SphereGeometry, Vector3, WebGLRenderer,
+  AxesHelper, Box3, BufferGeometry, Float32BufferAttribute, Line, LineBasicMaterial, Mesh, MeshBasicMaterial, MeshLambertMaterial,
+  PerspectiveCamera, Scene, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "/vendor/three/OrbitControls.js";
 import { Figure, Shapes } from "./bodies.js";
@@ -13,13 +12,12 @@ import { Ghosts } from "./ghosts.js";
 import { Gizmo } from "./gizmo.js";
 import { Pointing } from "./pointing.js";
 import { printing } from "./printing.js";
+import { Floor, glass, light } from "./scenery.js";
 import { Slice } from "./slice.js";
 
 const EYES = { space: [1.25, -1.5, 0.85], front: [2.1, 0, 0.12], side: [0, -2.1, 0.12], top: [0, -0.001, 2.3] };
 
 const RED = 0xd62728; // what hits something
-const AMBER = 0xe69f00; // what must not be hit
-const SUN = [1.2, -1.6, 3]; // where the light comes from
 
 // Points of the picture for one of the window's. Edges are smooth because there are more of them, at rest; the
 // browser's own smoothing would cost as much in every picture of a moving arm.
@@ -64,9 +62,9 @@ export class View {
     this.solid = new Figure(this.shapes, this.tube, this.drum);
     this.ghosts = new Ghosts(this.shapes);
     this.scene.add(this.solid.group, this.ghosts.group, this.place);
-    this.obstacles();
-    this.lights();
-    this.floor();
+    if (arm.obstacles?.length) this.scene.add(glass(arm.obstacles));
+    light(this.scene);
+    this.floor = new Floor(arm, this.shapes, this.scene);
     const length = 0.14 * arm.reach;
     this.base = new AxesHelper(length);
     this.base.matrixAutoUpdate = false;
@@ -95,56 +93,12 @@ export class View {
     return SOFTWARE.test(String(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER)));
   }
 
-  lights() {
-    const sun = new DirectionalLight(0xffffff, 2.4);
-    sun.position.set(SUN[0], SUN[1], SUN[2]);
-    this.scene.add(sun, new HemisphereLight(0xffffff, 0x8090a0, 1.3), new AmbientLight(0xffffff, 0.25));
-  }
-
-  /** What the arm must not touch: seen through, and hiding nothing. */
-  obstacles() {
-    if (!this.arm.obstacles?.length) return;
-    const surface = new BufferGeometry();
-    surface.setAttribute("position", new Float32BufferAttribute(this.arm.obstacles, 3));
-    surface.computeVertexNormals();
-    const glass = new MeshLambertMaterial({ color: AMBER, transparent: true, opacity: 0.3, side: DoubleSide, depthWrite: false });
-    this.scene.add(new Mesh(surface, glass));
-  }
-
-  /** A grid, and the arm's shadow on it: the arm itself, flattened along the light. */
-  floor() {
-    const r = this.arm.reach;
-    const step = 10 ** Math.floor(Math.log10(r / 2));
-    const half = Math.ceil((1.4 * r) / step) * step;
-    const z = Math.min(this.arm.base[2][3], 0);
-    this.grid = new GridHelper(2 * half, (2 * half) / step);
-    this.grid.rotateX(Math.PI / 2);
-    this.grid.position.z = z - 0.001 * r;
-    // The stencil lets every point be darkened once, however many bodies lie above it.
-    const shade = new MeshBasicMaterial({
-      color: 0x000000, opacity: 0.2, side: DoubleSide, depthWrite: false,
-      blending: CustomBlending, blendSrcAlpha: OneFactor, // not "transparent", to be drawn first: nothing is under it
-      stencilWrite: true, stencilRef: 1, stencilFunc: NotEqualStencilFunc, stencilZPass: ReplaceStencilOp,
-    });
-    this.shadow = new Figure(this.shapes, shade, shade);
-    const [x, y] = [SUN[0] / SUN[2], SUN[1] / SUN[2]];
-    const ground = z - 0.002 * r;
-    this.shadow.group.matrixAutoUpdate = false;
-    this.shadow.group.traverse((one) => (one.renderOrder = -1));
-    this.shadow.group.matrix.set(1, 0, -x, x * ground, 0, 1, -y, y * ground, 0, 0, 0, ground, 0, 0, 0, 1);
-    this.scene.add(this.grid, this.shadow.group);
-    this.step = step;
-  }
-
   /** Take the colours of the page's theme. */
   theme() {
     const dark = document.documentElement.dataset.theme === "dark";
     this.tube.color.set(dark ? 0xc6d0da : 0xdfe4e9);
     this.drum.color.set(dark ? 0x4d9de0 : 0x0072b2);
-    const lines = /** @type {any} */ (this.grid).material;
-    lines.vertexColors = false;
-    lines.color.set(dark ? 0x4a5663 : 0xb4bec8);
-    lines.needsUpdate = true;
+    this.floor.colour(dark ? 0x4a5663 : 0xb4bec8);
     this.draw();
   }
 
@@ -193,7 +147,7 @@ export class View {
     this.solid.pose(q);
     this.solid.paint(red, this.wrong);
     this.canvas.dataset.red = red.join(" "); // for tests
-    this.shadow?.pose(q);
+    this.floor.shadow.pose(q);
     if (this.solid.tool) this.tool.matrix.fromArray(this.solid.tool).transpose();
     this.tool.matrixWorldNeedsUpdate = true;
     this.draw();
@@ -223,7 +177,7 @@ export class View {
   legend() {
     const apart = this.arm.obstacles?.length ? ", obstacles apart" : "";
     const reach = this.cloud?.visible ? `; points: the tip in ${POSTURES} poses spread within the limits${apart}` : "";
-    get("legend").textContent = `a square is ${this.step} mm${reach}${this.slice.words}`;
+    get("legend").textContent = `a square is ${this.floor.step} mm${reach}${this.slice.words}`;
   }
 
   /** Draw the tip's way through a program. @param {number[][]} tips @param {number[]} [hit] where it hits something */
