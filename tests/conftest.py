@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import signal
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -44,6 +46,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+# What is collected stays until the end: looking through it for garbage again and again took a third of the collecting.
+gc.disable()
 
 _HERE = Path(__file__).parent
 # Helpers that compile the firmware, or run it in the emulator.
@@ -86,7 +91,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if _is_slow(item):
             item.add_marker(pytest.mark.slow)
-        if not _needs_emulator(item):
+        if not _needs_emulator(item.path, getattr(item, "module", None)):
             continue
         item.add_marker(pytest.mark.emulator)
         item.add_marker(pytest.mark.xdist_group(item.path.name))  # one worker has a file: it shares what is compiled
@@ -96,15 +101,29 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         items.sort(key=lambda item: not _is_slow(item))
 
 
+def pytest_collection_finish() -> None:
+    """What tests leave is garbage again, what was collected is not looked at any more."""
+    gc.freeze()
+    gc.enable()
+
+
+@cache
+def _slow_names(path: Path) -> tuple[str, ...] | None:
+    """The slow tests of a file; all of them: ()."""
+    return SLOW.get(path.relative_to(_HERE).as_posix()) if path.is_relative_to(_HERE) else None
+
+
 def _is_slow(item: pytest.Item) -> bool:
-    names = SLOW.get(Path(item.path).relative_to(_HERE).as_posix()) if _HERE in Path(item.path).parents else None
+    names = _slow_names(item.path)
     return names is not None and (not names or getattr(item, "originalname", item.name) in names)
 
 
-def _needs_emulator(item: pytest.Item) -> bool:
-    if "firmware" in Path(item.path).parts:
+@cache
+def _needs_emulator(path: Path, module: ModuleType | None) -> bool:
+    """Whether the tests of a file do."""
+    if "firmware" in path.parts:
         return True
-    used = vars(item.module).values() if isinstance(item, pytest.Function) else ()
+    used = vars(module).values() if module else ()
     return any(getattr(x, "__name__" if isinstance(x, ModuleType) else "__module__", None) in _HELPERS for x in used)
 
 

@@ -17,7 +17,9 @@ from armkin.inverse.run import single as one_target
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import Arm
 
-CLOSED = [name for name in NAMES if solver(shipped(name)[0], None)[1].pairs]
+# without a closed form, of which none is answered in plain numbers
+GENERAL = {"fanuc_crx10ia", "jaco_j2n6s300", "kinova_gen3", "moveo", "niryo_ned2", "panda", "xarm6"}
+CLOSED = [name for name in NAMES if name not in GENERAL]
 FIELDS = [f.name for f in fields(armkin.Solutions)]
 
 
@@ -49,7 +51,8 @@ def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutio
 @pytest.mark.parametrize("limits", ["own", "half a turn", "narrow", "wide", "none"])
 def test_one_is_as_in_a_batch(name: str, limits: str) -> None:
     arm, screw = shipped(name)
-    task, _ = solver(arm, None)
+    task, geometry = solver(arm, None)
+    assert geometry.pairs
     turn = np.where(arm.prismatic, 300.0, np.pi)
     lower, upper = {
         "own": (arm.lower, arm.upper),

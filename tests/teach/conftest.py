@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from served import Page, served
@@ -15,10 +17,14 @@ sys.path.append(str(Path(__file__).parents[1] / "firmware"))
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests in a browser. Without one they fail, and say what to install."""
     for item in items:
-        used = vars(item.module).values() if isinstance(item, pytest.Function) else ()
-        if any(getattr(one, "__module__", None) == "browsing" for one in used):
+        if isinstance(item, pytest.Function) and _needs_browser(item.module):
             item.add_marker(pytest.mark.browser)
             item.add_marker(pytest.mark.xdist_group(item.path.name))  # one worker has a file: it shares a browser
+
+
+@cache
+def _needs_browser(module: ModuleType) -> bool:
+    return any(getattr(one, "__module__", None) == "browsing" for one in vars(module).values())
 
 
 @pytest.fixture
