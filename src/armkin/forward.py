@@ -11,7 +11,7 @@ merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws). The ratios r are 1 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +23,13 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
 from armkin.formula.shapes import Figures, Frames, Jacobians, Joints, Points, Poses
-from armkin.formula.trace import LazyCode
+from armkin.formula.trace import SMALL, LazyCode
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+
+Motion = Entry | tuple[Entry, Entry]  # a joint's value; of one that turns also cosine and sine of its actual angle
+FEW = 16  # poses that plain Python does sooner than arrays
 
 
 def fk(arm: Arm, q: ArrayLike) -> Poses:
@@ -127,16 +130,22 @@ def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, sca
     return np.where(known[..., 0], values, np.nan)
 
 
-def move(arm: Arm, P: Pose, joint: int, value: Entry) -> Pose:
+def move(arm: Arm, P: Pose, joint: int, value: Motion) -> Pose:
     """The pose after a joint's motion: ``P Z(r q)``, r the joint's ratio."""
-    value = _turned(arm, joint, value)
-    return pose.slide(P, value) if arm.prismatic[joint] else pose.rotate(P, *arrays.cos_sin(value))
+    if arm.prismatic[joint]:
+        return pose.slide(P, _slid(arm, joint, value))
+    return pose.rotate(P, *_turned(arm, joint, value))
 
 
-def _turned(arm: Arm, joint: int, value: Entry) -> Entry:
+def _slid(arm: Arm, joint: int, value: Any) -> Entry:
     """The actual joint value for a commanded one."""
     ratio = float(arm.ratio[joint])
     return value if ratio == 1.0 else arrays.mul(ratio, value)
+
+
+def _turned(arm: Arm, joint: int, value: Motion) -> tuple[Entry, Entry]:
+    """Cosine and sine of the actual angle for a commanded one."""
+    return value if isinstance(value, tuple) else arrays.cos_sin(_slid(arm, joint, value))
 
 
 def one_pose(arm: Arm, q: ArrayLike, what: str) -> Array:
@@ -161,7 +170,7 @@ def as_joints(arm: Arm, q: ArrayLike) -> Joints:
     return values
 
 
-def tip_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
+def tip_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's pose, row by row: 16 entries."""
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
@@ -169,7 +178,7 @@ def tip_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
     return _rows(P)
 
 
-def _frames(arm: Arm, q: list[Entry]) -> list[Entry]:
+def _frames(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """All frames, row by row: 16 (n + 2) entries."""
     out = _rows(pose.constant(arm.base))
     P = pose.constant(arm.link[0])
@@ -180,12 +189,12 @@ def _frames(arm: Arm, q: list[Entry]) -> list[Entry]:
     return out + _rows(P)
 
 
-def jacobian_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
+def jacobian_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The Jacobian, row by row: 6 n entries."""
     return _both(arm, q)[16:]
 
 
-def _both(arm: Arm, q: list[Entry]) -> list[Entry]:
+def _both(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's pose and the Jacobian, row by row: 16 + 6 n entries."""
     P = pose.constant(arm.link[0])
     axes = []
@@ -206,14 +215,14 @@ def _rows(P: Pose) -> list[Entry]:
     return [*P[0::3], *P[1::3], *P[2::3], 0.0, 0.0, 0.0, 1.0]
 
 
-def point_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
+def point_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's position, from the tool back to the base: a point is cheaper to carry than a pose."""
     p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
     for i in reversed(range(arm.n)):
         if arm.prismatic[i]:
-            p = [p[0], p[1], arrays.add(p[2], _turned(arm, i, q[i]))]
+            p = [p[0], p[1], arrays.add(p[2], _slid(arm, i, q[i]))]
         else:
-            c, s = arrays.cos_sin(_turned(arm, i, q[i]))
+            c, s = _turned(arm, i, q[i])
             x, y, z = p
             p = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
         p = pose.apply(pose.constant(arm.link[i]), p)
@@ -234,7 +243,7 @@ def _single(arm: Arm, q: Array) -> Array:
     return np.asarray(T)
 
 
-Formula = Callable[["Arm", list[Entry]], list[Entry]]
+Formula = Callable[["Arm", Sequence[Motion]], list[Entry]]
 
 
 @lru_cache(maxsize=256)
@@ -243,21 +252,52 @@ def _recorded(arm: Arm, formula: Formula) -> LazyCode:
     return LazyCode(lambda q: formula(arm, q), arm.n)
 
 
+@lru_cache(maxsize=256)
+def _recorded_of_turns(arm: Arm, formula: Formula) -> LazyCode:
+    """A formula of what `_turns` returns as straight-line code."""
+    return LazyCode(lambda inputs: formula(arm, _motions(arm, inputs)), 2 * arm.n - int(arm.prismatic.sum()))
+
+
+def _turns(arm: Arm, q: Array) -> list[Array]:
+    """Of joint values (N, n) slides, and actual cosines and sines of what turns, joint by joint: (N,) each."""
+    values, turning = np.ascontiguousarray(q.T), ~arm.prismatic
+    angles: Any = values[turning] * arm.ratio[turning, None]
+    turns: Any = arrays.cos_sin(angles)
+    pairs = zip(*turns, strict=True)
+    each = zip(values, arm.prismatic.tolist(), strict=True)
+    return [x for value, slides in each for x in ([value] if slides else next(pairs))]
+
+
+def _motions(arm: Arm, turns: Sequence[Entry]) -> list[Motion]:
+    """The same joint by joint."""
+    rest = iter(turns)
+    return [next(rest) if slides else (next(rest), next(rest)) for slides in arm.prismatic.tolist()]
+
+
 def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
-    """Run a formula over the batch axes of q in chunks that stay in the cache."""
+    """Run a formula over the batch axes of q, of small batches with all cosines and sines taken at once.
+
+    Large ones in chunks that stay in the cache.
+    """
     out = np.empty(values.shape[:-1] + shape)
     flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, math.prod(shape))
-    code = _recorded(arm, formula).get(len(flat_q))
-    if code is None:
-        entry: Any  # numpy takes any
-        for k, entry in enumerate(formula(arm, list(flat_q.T))):
-            flat_out[:, k] = entry
+    if len(flat_q) > SMALL:
+        large = _recorded(arm, formula).always()
+        workspace = large.workspace(min(len(flat_q), arrays.CHUNK))
+        for start in range(0, len(flat_q), arrays.CHUNK):
+            columns = np.ascontiguousarray(flat_q[start : start + arrays.CHUNK].T)
+            if columns.shape[1] < arrays.CHUNK <= len(flat_q):
+                workspace = large.workspace(columns.shape[1])
+            for k, entry in enumerate(large.run(list(columns), workspace)):
+                flat_out[start : start + arrays.CHUNK, k] = entry
         return out
-    workspace = code.workspace(min(len(flat_q), arrays.CHUNK))
-    for start in range(0, len(flat_q), arrays.CHUNK):
-        columns = np.ascontiguousarray(flat_q[start : start + arrays.CHUNK].T)
-        if columns.shape[1] < arrays.CHUNK <= len(flat_q):
-            workspace = code.workspace(columns.shape[1])
-        for k, entry in enumerate(code.run(list(columns), workspace)):
-            flat_out[start : start + arrays.CHUNK, k] = entry
+    turns, code = _turns(arm, flat_q), _recorded_of_turns(arm, formula).get(len(flat_q))
+    if code is not None and len(flat_q) <= FEW:
+        numbers = code.numbers()
+        for k, one in enumerate(zip(*(x.tolist() for x in turns), strict=True)):
+            flat_out[k] = numbers(*one)
+        return out
+    found: Any = formula(arm, _motions(arm, turns)) if code is None else code.run(turns, code.workspace(len(flat_q)))
+    for k, entry in enumerate(found):
+        flat_out[:, k] = entry
     return out
