@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from armkin.cli import compiled_ik
 from armkin.errors import NoSolutionError, UsageError
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.reachability import from_place, planning
+from armkin.reachability import beside, from_place, planning
 from armkin.reachability import place as places
 from armkin.reachability.standing import Around, standing
 from command_line import ROOT, run
@@ -35,6 +36,35 @@ def test_places_are_what_each_says_when_asked_directly(name: str) -> None:
         i, j, k = (int(rng.integers(size)) for size in found.reached.shape)
         at = np.array([found.x[i], found.y[j]])
         assert from_place.legal_from(question, at, float(found.yaw[k])).sum() == found.reached[i, j, k]
+
+
+@pytest.mark.parametrize("name", ["so100", "so101", "three_dof", "ra02", "labvolt_5150", "planar_2dof"])
+def test_joint_1_beside_the_base_s_axis_is_read_off_by_radius(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every place of a grid, against each asked by itself; where the axis is on the base's, it is moved off."""
+    arm, rng = armkin.load(name), np.random.default_rng(8)
+    if not arm.link[0][:2, 3].any():
+        link = arm.link.copy()
+        link[0][:2, 3] = [0.11 * arm.reach, -0.07 * arm.reach]
+        link.flags.writeable = False
+        arm = replace(arm, link=link)
+    q = rng.uniform(-1.2, 1.2, (6, arm.n)) * np.where(arm.prismatic, 0.1 * arm.reach, 1.0)
+    targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
+    ask: dict[str, Any] = {"step": arm.reach / 7, "yaw": 0.11, "z": -0.03 * arm.reach}
+    read: list[int] = []
+    off = beside.by_radius
+
+    def counted(*given: Any) -> Any:
+        found = off(*given)
+        assert found is not None
+        read.append(int(found[0].sum()) - int(found[1].sum()))
+        return found
+
+    monkeypatch.setattr(from_place, "by_radius", counted)
+    [found] = armkin.place(arm, targets, **ask)
+    assert sum(read) > 0.5 * found.reached.sum() > 0
+    monkeypatch.setattr(from_place, "RADII", 10**9)  # not worth it: each place is asked
+    [asked] = armkin.place(arm, targets, **ask)
+    assert np.array_equal(found.reached, asked.reached)
 
 
 def test_machine_code_finds_the_same_places(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ forward kinematics -> whole turns and limits -> the few doubted ones through `do
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -157,6 +157,20 @@ def _answered(
         complete=out.complete.reshape(lead),
         rounding=shown.reshape(lead),
     )
+
+
+def columns(
+    arm: Arm, targets: Array, task: str | None = None, *, kept: bool = False
+) -> Iterator[chunks.Columns] | None:
+    """Branches of targets (N, m) or (N, 4, 4) in columns, part by part, for those who count them and list none.
+
+    None for an arm without a closed form, or whose joints move by ratios. kept: whether the arrays of a part stay when
+    the next one is asked for. Raises RedundantArmError where the answers of a target are curves.
+    """
+    definition, geometry = solver(arm, task)
+    if geometry.pairs is None or actual(arm) is not arm:
+        return None
+    return chunks.columns(arm, definition, geometry, targets, kept)
 
 
 def isolated(arm: Arm, targets: ArrayLike, task: str | None = None, **more: Any) -> Solutions:

@@ -14,6 +14,7 @@ voxels.py    cubic voxels of the cells, for pictures
 map.py       `reach`: all rings, in chunks, by any engine
 place.py     `place`: where to put an arm for given targets or a path; place_file.py: its columns
 from_place.py  what an arm reaches from a place; standing.py: the arm there, among what stands with the targets
+beside.py    places of an arm whose joint 1 stands upright beside the base's axis: by the distance from it alone
 carrying.py  which branches carry a way of the tool from a place; planning.py: the path's plan from the best ones
 keeping.py   chunks of both, answered by an engine and kept beside a file
 """

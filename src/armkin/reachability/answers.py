@@ -62,12 +62,12 @@ class Question:
 
         Not with measures, as its distance to the limits differs.
         """
-        return self.arcs and not self.measures and _whole_turn(self.grid.arm, 0)
+        return self.arcs and not self.measures and whole_turn(self.grid.arm, 0)
 
     @cached_property
     def round_rolls(self) -> bool:
         """Whether the last joint has one at every roll."""
-        return self.roll_arcs and _whole_turn(self.grid.arm, -1)
+        return self.roll_arcs and whole_turn(self.grid.arm, -1)
 
     @property
     def solves_a_ring(self) -> int:
@@ -78,7 +78,7 @@ class Question:
     @cached_property
     def roll_words(self) -> Words:
         """Bits of an arc of rolls by length and first index: (L + 1, L, W)."""
-        return _packed(_arcs(self.grid.rolls_count if self.roll_arcs and not self.round_rolls else 1))
+        return packed(_arcs(self.grid.rolls_count if self.roll_arcs and not self.round_rolls else 1))
 
     @property
     def turns(self) -> int:
@@ -278,21 +278,25 @@ def inside(arm: Arm, q: Array, joints: range) -> Bool:
     """Whether some copies of these joints are within limits: (..., n) -> (...)."""
     inside = np.ones(q.shape[:-1], bool)
     for j in joints:
-        low, high = arm.lower[j] - SLACK, arm.upper[j] + SLACK
-        value = q[..., j]
-        if not arm.prismatic[j]:
-            if not (math.isfinite(low) and math.isfinite(high)):
-                continue
-            middle = 0.5 * (low + high)
-            value = value - TURN * np.rint((value - middle) / TURN)
-        inside &= (value >= low) & (value <= high)
+        inside &= within(arm, q[..., j], j)
     return inside
+
+
+def within(arm: Arm, value: Array, joint: int) -> Bool:
+    """Whether some copy of a joint's values is within limits."""
+    low, high = arm.lower[joint] - SLACK, arm.upper[joint] + SLACK
+    if not arm.prismatic[joint]:
+        if not (math.isfinite(low) and math.isfinite(high)):
+            return np.ones(value.shape, bool)
+        middle = 0.5 * (low + high)
+        value = value - TURN * np.rint((value - middle) / TURN)
+    return np.asarray((value >= low) & (value <= high))
 
 
 def arc(arm: Arm, q: Array, joint: int, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The turns i 2 pi / count at which a joint, q + sense times the turn, is within limits: the first, how many."""
     low, high = float(arm.lower[joint]) - SLACK, float(arm.upper[joint]) + SLACK
-    if _whole_turn(arm, joint):
+    if whole_turn(arm, joint):
         return np.zeros(q.shape, np.intp), np.full(q.shape, count)
     if sense < 0:
         q, low, high = -q, -high, -low
@@ -302,7 +306,7 @@ def arc(arm: Arm, q: Array, joint: int, count: int, sense: int) -> tuple[NDArray
     return (first % count).astype(np.intp), length
 
 
-def _whole_turn(arm: Arm, joint: int) -> bool:
+def whole_turn(arm: Arm, joint: int) -> bool:
     low, high = float(arm.lower[joint]), float(arm.upper[joint])
     return not (math.isfinite(low) and math.isfinite(high)) or high - low + 2 * SLACK >= TURN
 
@@ -313,7 +317,7 @@ def _arcs(count: int) -> Bool:
     return np.asarray((place - first) % count < length)
 
 
-def _packed(bits: Bool) -> Words:
+def packed(bits: Bool) -> Words:
     """Flags (..., L) as words of 64: (..., W)."""
     L = bits.shape[-1]
     whole = np.zeros((*bits.shape[:-1], -(-L // 64) * 64), bool)

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.solve import ik, isolated
+from armkin.inverse.solve import columns, ik, isolated
 from armkin.inverse.tasks.task import Task
 from armkin.model.lock import lock, unlock
 from armkin.model.rotation import rotation_about
 from armkin.reachability import carrying
-from armkin.reachability.answers import TURN, arc, inside
+from armkin.reachability.answers import TURN, arc, packed, within
+from armkin.reachability.beside import RADII, by_radius
 from armkin.reachability.cells import STRAIGHT
 from armkin.reachability.standing import Around, free
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 Solve = Callable[["Arm", Array, str], Solutions]  # `armkin.ik` of an arm, targets and a task
 
+TURNING = ("xy_theta", "xyz_yaw")  # tasks of which an angle turns with the arm
 BLOCK = 8_192  # targets that are asked together: what is known of them stays in the cache
 BEYOND = 1e-6  # reaches: farther away nothing solves a target
 
@@ -57,12 +59,22 @@ class Question(NamedTuple):
     @property
     def arcs(self) -> bool:
         """Whether a yaw adds to joint 1 alone, and the yaws divide the circle."""
-        arm, axis = self.arm, self.arm.link[0]
-        upright = np.abs(axis[:2, 2]).max() <= STRAIGHT and np.abs(axis[:2, 3]).max() <= STRAIGHT * arm.reach
+        on_axis = np.abs(self.arm.link[0][:2, 3]).max() <= STRAIGHT * self.arm.reach
+        return self._upright and bool(on_axis) and abs(self.yaws * self.step - TURN) < STRAIGHT
+
+    @property
+    def beside(self) -> bool:
+        """Whether what joints behind joint 1 are asked depends on the target's distance from that alone."""
+        turning = self.task.orientation != "none" or self.task.name in TURNING
+        return self._upright and not turning and not self.arcs
+
+    @property
+    def _upright(self) -> bool:
+        """Whether joint 1 turns about a line upright, as it is commanded, and nothing is kept out."""
+        arm = self.arm
         free = not arm.keep_out and not self.around.keep_out
-        plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and free
-        whole = abs(self.yaws * self.step - TURN) < STRAIGHT
-        return bool(upright) and plain and whole and arm.n == self.task.constraints
+        plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and arm.n == self.task.constraints
+        return plain and free and bool(np.abs(arm.link[0][:2, 2]).max() <= STRAIGHT)
 
     @property
     def sense(self) -> int:
@@ -79,7 +91,7 @@ def counted(question: Question, at: Array) -> NDArray[np.int64]:
     """How many targets are reached from positions (P, 2) at each yaw: (P, K); of values to hold, at the best one."""
     if question.values:
         return _most(question, at)
-    at_once = max(BLOCK // len(question.targets), 1)
+    at_once = len(at) if question.beside else max(BLOCK // len(question.targets), 1)
     blocks = [at[start : start + at_once] for start in range(0, len(at), at_once)]
     return np.concatenate([_counted(question, block, _legal_yaws(question, block)) for block in blocks])
 
@@ -162,29 +174,64 @@ def _legal_yaws(question: Question, at: Array) -> NDArray[np.bool_]:
         turns = (np.arange(K) * question.step).tolist()
         return np.stack([np.stack([legal_from(question, one, turn) for turn in turns], axis=1) for one in at])
     target, place = np.tile(np.arange(N), len(at)), np.repeat(at, N, axis=0)
+    if question.beside and len(at) * K > 4 * RADII and (read := _by_radius(question, at)) is not None:
+        return read
     legal = (_by_arcs if question.arcs else _yaw_by_yaw)(question, target, place)
     return legal.reshape(len(at), N, K)
 
 
+def _by_radius(question: Question, at: Array) -> NDArray[np.bool_] | None:
+    """The same by what the joints behind joint 1 do at a target's distance from it; None without a closed form."""
+    high = question.targets.copy()
+    if question.task.position > 2:
+        high[:, 2] -= question.z
+    turns: Array = np.asarray(np.arange(question.yaws) * question.step, float)
+    if (found := by_radius(question.arm, question.task.name, high, at, turns)) is None:
+        return None
+    legal, asked = found
+    p, i, k = np.nonzero(asked)
+    for start in range(0, len(p), BLOCK):
+        some = slice(start, start + BLOCK)
+        beside = _beside(question._replace(targets=question.targets[i[some]]), at[p[some]])
+        turn = turns[k[some]]
+        goals = _turned(question.task, beside, turn, np.cos(turn), np.sin(turn))
+        legal[p[some], i[some], k[some]] = _any_legal(question, goals)
+    return legal
+
+
 def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
     """At which yaws targets (M,) are reached from places (M, 2), by one solve each: (M, K)."""
-    arm, K = question.arm, question.yaws
-    legal = np.zeros((len(target), K), bool)
+    legal = np.zeros((len(target), question.yaws), bool)
     some = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
-    if len(some):
-        goals = _beside(question._replace(targets=question.targets[target[some]]), place[some])
-        s = question.solve(arm, goals, question.task.name)
-        allowed = s.valid & inside(arm, s.q, range(1, arm.n))
-        first, length = arc(arm, s.q[:, :, 0], 0, K, question.sense)
-        legal[some] = _covered(first, np.where(allowed, length, 0), K)
-        edge = some[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)]
+    goals = _beside(question._replace(targets=question.targets[target[some]]), place[some])
+    left = np.arange(len(some))
+    if (parts := columns(question.arm, goals, question.task.name)) is not None:
+        edges = [left[:0]]
+        for part in parts:
+            legal[some[part.rows]] = _turned_legal(question, part.values, part.valid)
+            edges.append(part.rows.start + part.left)
+        left = np.concatenate(edges)
+    if len(left):
+        s, rows = question.solve(question.arm, goals[left], question.task.name), some[left]
+        legal[rows] = _turned_legal(question, list(s.q.transpose(2, 1, 0)), s.valid.T)
+        edge = rows[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)]
         legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
     return legal
 
 
+def _turned_legal(question: Question, values: list[Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """At which yaws some branch is within limits: n joints' values at yaw 0 (B, M), valid (B, M) -> (M, K)."""
+    arm, K = question.arm, question.yaws
+    allowed = valid
+    for j in range(1, arm.n):
+        allowed = allowed & within(arm, values[j], j)
+    first, length = arc(arm, values[0], 0, K, question.sense)
+    return _covered(first, np.where(allowed, length, 0), K)
+
+
 def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
     """The same by a solve for each yaw, many together."""
-    K, task, legal = question.yaws, question.task.name, np.zeros((len(target), question.yaws), bool)
+    K, legal = question.yaws, np.zeros((len(target), question.yaws), bool)
     turns: Array = np.asarray(np.arange(K) * question.step, float)
     cosine, sine = np.cos(turns), np.sin(turns)
     at_once = max(BLOCK // K, 1)
@@ -193,7 +240,25 @@ def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> N
         m, k = np.nonzero(_within_reach(question, target[some], place[some], turns))
         beside = _beside(question._replace(targets=question.targets[target[some]]), place[some])
         goals = _turned(question.task, beside[m], turns[k], cosine[k], sine[k])
-        legal[start + m, k] = question.solve(question.arm, goals, task).within_limits.any(axis=1)
+        legal[start + m, k] = _any_legal(question, goals)
+    return legal
+
+
+def _any_legal(question: Question, goals: Array) -> NDArray[np.bool_]:
+    """Which targets, in the arm's frame, some branch within limits reaches: (N,)."""
+    arm, legal, left = question.arm, np.zeros(len(goals), bool), np.arange(len(goals))
+    isolated_answers = arm.n == question.task.constraints
+    if isolated_answers and (parts := columns(arm, goals, question.task.name)) is not None:
+        edges = [left[:0]]
+        for part in parts:
+            allowed = part.valid
+            for j in range(arm.n):
+                allowed = allowed & within(arm, part.values[j], j)
+            legal[part.rows] = allowed.any(axis=0)
+            edges.append(part.rows.start + part.left)
+        left = np.concatenate(edges)
+    if len(left):
+        legal[left] = question.solve(arm, goals[left], question.task.name).within_limits.any(axis=1)
     return legal
 
 
@@ -212,16 +277,23 @@ def _within_reach(question: Question, target: NDArray[np.intp], place: Array, tu
 
 
 def _covered(first: NDArray[np.intp], length: NDArray[np.intp], count: int) -> NDArray[np.bool_]:
-    """Which places of circles of `count` lie on one of their arcs at least: (M, B), (M, B) -> (M, count)."""
-    row, end = np.arange(len(first))[:, None] * (count + 1), first + length
-    size = len(first) * (count + 1)
-    steps = np.bincount((row + first).ravel(), minlength=size)
-    steps -= np.bincount((row + np.minimum(end, count)).ravel(), minlength=size)
-    steps = steps.reshape(len(first), count + 1)
-    k, b = np.nonzero(end > count)  # goes on at 0
-    np.add.at(steps, (k, np.zeros_like(k)), 1)
-    np.add.at(steps, (k, end[k, b] - count), -1)
-    return np.asarray(steps.astype(np.int16).cumsum(axis=1, dtype=np.int16)[:, :count] > 0)
+    """Which places of circles of `count` lie on one of their arcs at least: (B, M), (B, M) -> (M, count)."""
+    until = _until(count)
+    words = np.zeros((first.shape[1], until.shape[1]), np.uint64)
+    for begin, end in zip(first, first + length, strict=True):
+        words |= until.take(begin, axis=0) ^ until.take(end, axis=0)
+    bits = np.unpackbits(words.astype("<u8").view(np.uint8), axis=1, count=count, bitorder="little")
+    return bits.view(bool)
+
+
+@lru_cache(maxsize=4)
+def _until(count: int) -> NDArray[np.uint64]:
+    """A bit for each place on the way from 0 to a place, of a circle gone round twice: (2 count + 1, words).
+
+    Places passed twice are 0 again, so that an arc is what its end has and its beginning has not, or the other way.
+    """
+    once = packed(np.arange(count) < np.arange(count + 1)[:, None])
+    return np.concatenate([once, once[-1] ^ once[1:]])
 
 
 def _on_one_branch(question: Question, at: Array, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -283,7 +355,7 @@ def _turned(task: Task, targets: Array, turn: Array, c: Array, s: Array) -> Arra
         return targets
     for first in (0, 3) if task.orientation == "axis" else (0,):
         _turn_back(targets[:, first], targets[:, first + 1], c, s)
-    if task.name in ("xy_theta", "xyz_yaw"):
+    if task.name in TURNING:
         targets[:, task.position] -= turn
     return targets
 

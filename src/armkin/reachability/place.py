@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from armkin.path_file import PathFile
 
 MOST = 10**7  # places
-SOLVES = 40_000  # of a chunk
+SOLVES, ANSWERS = 40_000, 10**7  # of a chunk: where each is solved, and where most are read off
 Room = Callable[[int, int, int], float]  # of a place by its index: how far its joints stay from limits, as a share
 FEW, TRIES = 3, 12  # places that a path is planned from, and most that are tried for them
 
@@ -271,7 +271,7 @@ def _axes(
 def _blocks(question: Question, at: Array) -> Iterator[Array]:
     one = next(each_value(question))
     solves = len(one.targets) * (1 if one.arcs else one.yaws) * max(len(question.values), 1)
-    count = max(SOLVES // solves, 1)
+    count = max((ANSWERS // len(one.targets) // one.yaws if one.beside else SOLVES // solves), 1)
     for start in range(0, len(at), count):
         yield at[start : start + count]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula import arrays
-from armkin.formula.arrays import Array, Truth
+from armkin.formula.arrays import Array, Bool, Truth
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
@@ -137,16 +138,7 @@ def _keep(
     part.valid[...] = True if full else valid.T
     part.within[...] = part.valid if within is valid else within.T
     part.branch[...] = _every_branch(B, arrays.CHUNK)[:N]
-    # on an edge are those in doubt, and those with a branch that is nearly there
-    if np.shape(doubt)[-1:] != (N,):
-        doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
-    doubted = np.flatnonzero(doubt) % N
-    if not full:
-        clear = miss > NEARBY**2
-        if np.count_nonzero(clear) + np.count_nonzero(valid) < miss.size:  # nearly there, or not a number
-            doubted = np.concatenate([doubted, np.flatnonzero(~(valid | clear)) % N])
-    if len(doubted):
-        doubted = np.unique(doubted)
+    doubted = _on_edge(doubt, miss, None if full else valid)
     if there is not None and len(there):
         doubted = np.union1d(doubted, near_itself.take(goals, part, there))
     if not full:
@@ -154,6 +146,56 @@ def _keep(
         part.status[count == 0] = Status.UNREACHABLE
         pack(part, count)
     return doubted
+
+
+def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> NDArray[np.intp]:
+    """Which targets are in doubt, or have a branch that is nearly there; miss, valid: (B, N); valid None: all are."""
+    N = miss.shape[1]
+    if np.shape(doubt)[-1:] != (N,):
+        doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
+    doubted = np.flatnonzero(doubt) % N
+    if valid is not None:
+        clear = miss > NEARBY**2
+        if np.count_nonzero(clear) + np.count_nonzero(valid) < miss.size:  # nearly there, or not a number
+            doubted = np.concatenate([doubted, np.flatnonzero(~(valid | clear)) % N])
+    return np.unique(doubted) if len(doubted) else doubted
+
+
+class Columns(NamedTuple):
+    """Branches of some targets, as the formulas have them: a column an axis' last.
+
+    values: n arrays (B, N) [rad | mm], of turns any copy; miss: (B, N) squared residual; valid: (B, N); left: targets
+    on an edge, whose branches these are not.
+    """
+
+    rows: slice
+    values: list[Array]
+    miss: Array
+    valid: Bool
+    left: NDArray[np.intp]
+
+
+def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool = False) -> Iterator[Columns]:
+    """Branches of targets (N, m) or (N, 4, 4) by a closed form, for those who count them and list none.
+
+    kept: whether the arrays of each part stay when the next one is asked for.
+
+    A target that is not `left` has the branches that `armkin.ik` finds; `left` are for `armkin.ik`.
+    """
+    runner = recorded(arm, task, geometry)
+    step, B, tip = runner.code.at_once(), math.prod(runner.axes), position(arm, arm.home)
+    workspace: list[NDArray[Any]] = []
+    for start in range(0, len(target), step):
+        goal = target[start : start + step]
+        N = len(goal)
+        if kept or not workspace or workspace[-1].shape[-1] != N:
+            workspace = runner.code.workspace(N)
+        *found, doubt, _ = runner.code.run(entries(task, goal), workspace)
+        shape = (*runner.axes, N)
+        *values, miss = (np.broadcast_to(one, shape).reshape(B, N) for one in found)
+        valid: Bool = np.asarray(miss <= ACCEPTED**2)
+        left = np.union1d(_on_edge(doubt, miss, valid), near_itself.reached(arm, task, goal, tip))
+        yield Columns(slice(start, start + N), values, miss, valid, left)
 
 
 @lru_cache(maxsize=8)

@@ -1,0 +1,151 @@
+"""Places of an arm whose joint 1 stands upright beside the base's axis, for targets that say nothing about azimuth.
+
+A yaw then moves joint 1's foot, and each yaw is a question of its own; but what the joints behind it are asked depends
+on the target's distance from that foot alone. They are solved at radii so close to each other that between most of
+them nothing happens: a branch is there, or is missing by more than the radii are apart, and each joint is farther from
+its limits than it moves from radius to radius. What lies there is read off, with joint 1's azimuth. Elsewhere, near
+limits and where branches begin, end or meet, the place itself is asked: `by_radius` says where.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+from armkin.inverse.solve import columns
+from armkin.model.limits import SLACK
+from armkin.reachability.answers import TURN, whole_turn
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+RADII = 256  # from joint 1's axis to the reach
+AT_ONCE = 16  # targets whose radii are solved together: they stay in the cache
+ROUNDING = 1e-6  # [rad, mm, reaches]: what is nearer to a limit, or to being there, is asked
+
+
+class Radii(NamedTuple):
+    """Branches of T targets in C cells between radii that are `apart` [mm].
+
+    first: (T, B, C) joint 1 [rad] at azimuth 0. sure, open: (T, B, C) how far [rad] it may be from the middle of its
+    limits, so that the branch is legal anywhere in the cell, or may be; below 0: nowhere.
+    """
+
+    apart: float
+    first: Array
+    sure: Array
+    open: Array
+
+
+def by_radius(
+    arm: Arm, task: str, targets: Array, place: Array, turns: Array
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
+    """Which targets (N, m), at heights above the places, are reached from places (P, 2) at yaws (K,): (P, N, K), and
+    which of the rest have to be asked; None for an arm without a closed form."""
+    N, K = len(targets), len(turns)
+    legal, asked = np.zeros((N, len(place) * K), bool), np.zeros((N, len(place) * K), bool)
+    c, s = np.cos(turns), np.sin(turns)
+    x, y = arm.link[0][:2, 3]
+    foot_x = (place[:, :1] + (c * x - s * y)).ravel()
+    foot_y = (place[:, 1:] + (s * x + c * y)).ravel()
+    yaw = np.tile(turns, len(place))
+    middle, up = _middle(arm, 0), 1.0 if arm.link[0][2, 2] > 0 else -1.0
+    for start in range(0, N, AT_ONCE):
+        some = targets[start : start + AT_ONCE]
+        if (table := _radii(arm, task, some)) is None:
+            return None
+        for i, target in enumerate(some):
+            dx, dy = target[0] - foot_x, target[1] - foot_y
+            cell = (np.sqrt(dx * dx + dy * dy) * (1.0 / table.apart)).astype(np.int32)
+            open_ = np.append((table.open[i] >= 0.0).any(axis=0), False)
+            near = np.flatnonzero(open_.take(cell, mode="clip"))
+            at = cell.take(near)
+            seen = np.arctan2(dy.take(near), dx.take(near))
+            seen -= yaw.take(near)
+            seen *= up
+            seen -= middle
+            yes, maybe = np.zeros(len(near), bool), np.zeros(len(near), bool)
+            for first, sure, most in zip(table.first[i], table.sure[i], table.open[i], strict=True):
+                if (most < 0.0).all():
+                    continue
+                away = first.take(at)
+                away += seen
+                away -= TURN * np.rint(away * (1.0 / TURN))
+                away = np.abs(away, out=away)
+                yes |= away <= sure.take(at)
+                maybe |= away <= most.take(at)
+            legal[start + i, near], asked[start + i, near] = yes, maybe & ~yes
+    shape = (N, len(place), K)
+    return legal.reshape(shape).transpose(1, 0, 2), asked.reshape(shape).transpose(1, 0, 2)
+
+
+def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
+    """The branches of some targets, solved at every radius."""
+    T, count = len(targets), RADII + 1
+    apart = arm.reach * (1.0 + ROUNDING) / RADII
+    goals = np.repeat(targets, count, axis=0)
+    goals[:, :2] = arm.link[0][:2, 3]
+    goals[:, 0] += np.tile(np.arange(count) * apart, T)
+    if (found := columns(arm, goals, task, kept=True)) is None:
+        return None
+    parts = list(found)
+    values = [np.concatenate([part.values[j] for part in parts], axis=1).reshape(-1, T, count) for j in range(arm.n)]
+    miss = np.concatenate([part.miss for part in parts], axis=1).reshape(-1, T, count)
+    valid = np.concatenate([part.valid for part in parts], axis=1).reshape(-1, T, count)
+    left = np.zeros(T * count, bool)
+    left[np.concatenate([part.rows.start + part.left for part in parts])] = True
+    # nan, of a branch that is nowhere near, is neither sure nor out of the question: it is asked
+    gap = np.sqrt(miss)
+    out = _least(gap) > _moved(gap) + apart / arm.reach
+    sure = valid[..., :-1] & valid[..., 1:]
+    for j in range(1, arm.n):
+        if not arm.prismatic[j] and whole_turn(arm, j):
+            continue
+        room, moved = _room(arm, values[j], j), _moved(values[j], not arm.prismatic[j])
+        sure &= _least(room) > moved
+        out |= _least(-room) > moved
+    doubted = left.reshape(T, count)
+    doubted = doubted[:, :-1] | doubted[:, 1:]
+    sure, out = sure & ~doubted, out & ~doubted
+    half, moved = _half(arm, 0), _moved(values[0], True)
+    rows = (1, 0, 2)
+    return Radii(
+        apart,
+        values[0][..., :-1].transpose(rows),
+        np.where(sure, half - moved, -1.0).transpose(rows),
+        np.where(out, -1.0, np.where(np.isnan(moved), np.inf, half + moved)).transpose(rows),
+    )
+
+
+def _least(of: Array) -> Array:
+    """The lesser of what stands at a cell's two ends."""
+    return np.minimum(of[..., :-1], of[..., 1:])
+
+
+def _moved(value: Array, turns: bool = False) -> Array:
+    """How far a value may move within a cell: as far as in that cell or in those beside it."""
+    step = np.diff(value, axis=-1)
+    if turns:
+        step -= TURN * np.rint(step / TURN)
+    step = np.abs(step) + ROUNDING
+    wide = np.concatenate([step[..., :1], step, step[..., -1:]], axis=-1)
+    return np.asarray(np.maximum(np.maximum(wide[..., :-2], wide[..., 2:]), step))
+
+
+def _middle(arm: Arm, joint: int) -> float:
+    return 0.0 if whole_turn(arm, joint) else 0.5 * float(arm.lower[joint] + arm.upper[joint])
+
+
+def _half(arm: Arm, joint: int) -> float:
+    return np.inf if whole_turn(arm, joint) else 0.5 * float(arm.upper[joint] - arm.lower[joint]) + SLACK
+
+
+def _room(arm: Arm, value: Array, joint: int) -> Array:
+    """How far from its limits a joint is; negative outside."""
+    if arm.prismatic[joint]:
+        return np.asarray(np.minimum(value - arm.lower[joint], arm.upper[joint] - value))
+    away = value - _middle(arm, joint)
+    return np.asarray(_half(arm, joint) - np.abs(away - TURN * np.rint(away / TURN)))
