@@ -138,30 +138,36 @@ ARM_INLINE void arm_move_lanes(const arm_many *a, arm_many c, arm_many s, arm_ma
     }
 }
 
-/* Reflections (Householder) that turn the first n columns of m rows, `row` numbers long, into a triangle. */
+/* A reflection (Householder) that turns column k of m rows, `row` numbers long, into a triangle's. */
+static void arm_reflect_lanes(arm_many *a, int m, int k, int row)
+{
+    arm_many *column = a + k, square = arm_all(0), size, first, factor;
+    int i, j;
+    for (i = k; i < m; i++)
+        square += column[i * row] * column[i * row];
+    size = arm_roots(square);
+    first = column[k * row];
+    size = arm_pick((arm_flags)(first > 0), -size, size);
+    factor = 1 / (size * (size - first));
+    factor = arm_pick((arm_flags)(square > 0), factor, arm_all(0));
+    column[k * row] = first - size;
+    for (j = k + 1; j < row; j++) {
+        arm_many along = arm_all(0), *other = a + j;
+        for (i = k; i < m; i++)
+            along += column[i * row] * other[i * row];
+        along *= factor;
+        for (i = k; i < m; i++)
+            other[i * row] -= along * column[i * row];
+    }
+    column[k * row] = size;
+}
+
+/* Reflections that turn the first n columns into a triangle. */
 static void arm_triangle_lanes(arm_many *a, int m, int n, int row)
 {
-    int i, j, k;
-    for (k = 0; k < n && k < m - 1; k++) {
-        arm_many *column = a + k, square = arm_all(0), size, first, factor;
-        for (i = k; i < m; i++)
-            square += column[i * row] * column[i * row];
-        size = arm_roots(square);
-        first = column[k * row];
-        size = arm_pick((arm_flags)(first > 0), -size, size);
-        factor = 1 / (size * (size - first));
-        factor = arm_pick((arm_flags)(square > 0), factor, arm_all(0));
-        column[k * row] = first - size;
-        for (j = k + 1; j < row; j++) {
-            arm_many along = arm_all(0), *other = a + j;
-            for (i = k; i < m; i++)
-                along += column[i * row] * other[i * row];
-            along *= factor;
-            for (i = k; i < m; i++)
-                other[i * row] -= along * column[i * row];
-        }
-        column[k * row] = size;
-    }
+    int k;
+    for (k = 0; k < n && k < m - 1; k++)
+        arm_reflect_lanes(a, m, k, row);
 }
 
 /* The right sides, columns from `right` to `end`, of a triangle of n rows become its solutions. */

@@ -1,11 +1,19 @@
 #define ARM_WORTH 3 /* poses whose roots are found in lockstep: fewer are as quick one by one */
 
-/* A candidate of one of some poses. */
+/* A candidate of one of some poses; v: its products, where they are known. */
 typedef struct {
     arm_seed seed;
+    const double *v;
     double x;
-    int lane, known; /* known: joint values have been found */
+    int lane;
 } arm_many_seed;
+
+/* The roots of one pose, by groups. */
+typedef struct {
+    arm_group group[ARM_MOST];
+    double tilt[ARM_MOST];
+    int order[ARM_MOST], groups;
+} arm_lane_groups;
 
 /* What one pass says of lane t. */
 static void arm_read_lane(const arm_pencil *pencil, const arm_many_poses *of, int t, arm_solved *out)
@@ -17,19 +25,6 @@ static void arm_read_lane(const arm_pencil *pencil, const arm_many_poses *of, in
     }
     out->most = of->most[t];
     out->open = of->open[t] != 0;
-}
-
-/* The equations there, too. */
-static void arm_read_equations(const arm_pencil *pencil, const arm_many_poses *of, int t, arm_solved *out)
-{
-    const int p = pencil->wide ? 16 : 12;
-    int i;
-    for (i = 0; i < p * (p + pencil->size); i++)
-        out->E[i] = of->E[i][t];
-    for (i = 0; i < 12; i++)
-        out->Y[i] = of->Y[i][t];
-    for (i = 0; i < 80; i++)
-        out->ends.recover[i] = i % 16 < 15 ? of->recover[15 * (i / 16) + i % 16][t] : 0;
 }
 
 /* The same the other way round. */
@@ -49,38 +44,23 @@ static void arm_write_lane(const arm_pencil *pencil, const arm_solved *from, int
         of->recover[i][t] = from->ends.recover[16 * (i / 15) + i % 15];
 }
 
-/* Candidates of lane t, of roots `solved`: those that are taken apart are known. */
-static int arm_seeds_of_lane(const arm_pencil *pencil, const arm_many_poses *of, int t, arm_solved *solved,
+/* Candidates of lane t, whose roots are `solved`; *apart: its groups that were taken apart, after which it points. */
+static int arm_seeds_of_lane(const arm_solved *solved, const arm_lane_groups *of, int t, const arm_many_group **apart,
     arm_many_seed *out)
 {
-    double tilt[ARM_MOST];
-    int order[ARM_MOST], i, j, k, groups, count = 0, whole = 0;
-    arm_group group[ARM_MOST];
-    groups = arm_groups(pencil, solved->re, solved->im, ARM_MAIN_TILT, pencil->wide, order, tilt, group);
-    for (i = 0; i < groups; i++) {
-        int found = -1;
-        if (group[i].d && count + group[i].d <= ARM_MOST) {
-            arm_seed apart[ARM_SHARED];
-            if (!whole++)
-                arm_read_equations(pencil, of, t, solved);
-            found = arm_shared(pencil, solved->E, solved->Y, &solved->ends, group[i].mean, group[i].d, apart);
-            for (j = 0; j < found; j++) {
-                out[count + j].seed = apart[j];
-                out[count + j].lane = t;
-                out[count + j].known = 1;
-            }
-        }
-        if (found >= 0) {
-            count += found;
-            continue;
-        }
-        for (k = group[i].from; k < group[i].end && count < ARM_MOST; k++) {
+    int i, k, count = 0;
+    for (i = 0; i < of->groups; i++) {
+        const arm_group *group = &of->group[i];
+        const arm_many_group *known = group->d ? (*apart)++ : 0;
+        const int all = known && known->found >= 0;
+        for (k = 0; k < (all ? known->found : group->end - group->from) && count < ARM_MOST; k++) {
             arm_many_seed *one = &out[count++];
-            one->seed.tilt = tilt[order[k]];
-            one->seed.root = order[k];
-            one->x = solved->re[order[k]];
+            const int root = of->order[group->from + (all ? 0 : k)];
+            one->seed.tilt = all ? 0 : of->tilt[root];
+            one->seed.root = all ? -1 : root;
+            one->x = all ? known->x : solved->re[root];
+            one->v = all ? known->v + 16 * k : 0;
             one->lane = t;
-            one->known = 0;
         }
     }
     return count;
@@ -90,34 +70,35 @@ static int arm_seeds_of_lane(const arm_pencil *pencil, const arm_many_poses *of,
 static void arm_chase(const arm_pencil *pencil, const arm_many_poses *of, arm_many_seed *seed, arm_answer *done, int count)
 {
     arm_flags lane;
-    arm_many x, u[16], v[16], Y[12], goal[12], recover[75], q[6] = {arm_all(0)}, defect = arm_all(0), residual, guess, weakness;
+    arm_many A[256], x, u[16], v[16], Y[12], goal[12], recover[75], q[6], defect, residual, guess, weakness;
     int i, k, t, known = 1;
     for (t = 0; t < ARM_MANY; t++) {
         const arm_many_seed *one = &seed[t < count ? t : 0];
         lane[t] = one->lane;
-        x[t] = one->known ? 1 : one->x;
-        known &= one->known;
+        x[t] = one->x;
+        known &= one->v != 0;
     }
-    for (i = 0; i < 12; i++)
+    for (i = 0; i < 12; i++) {
         goal[i] = arm_take(of->goal[i], lane);
+        Y[i] = arm_take(of->Y[i], lane);
+    }
+    for (i = 0; i < 75; i++)
+        recover[i] = arm_take(of->recover[i], lane);
     if (!known) {
-        for (i = 0; i < 12; i++)
-            Y[i] = arm_take(of->Y[i], lane);
-        for (i = 0; i < 75; i++)
-            recover[i] = arm_take(of->recover[i], lane);
-        arm_null_lanes(pencil, of->E, lane, x, u);
+        arm_system_lanes(pencil, of->E, lane, x, A);
+        arm_null_lanes(A, pencil->wide ? 16 : 12, u);
         arm_vector_lanes(pencil, u, x, v);
-        arm_joints_lanes(pencil, v, Y, recover, x, q, &defect);
     }
     for (t = 0; t < ARM_MANY; t++) {
-        arm_many_seed *one = &seed[t < count ? t : 0];
+        const double *own = seed[t < count ? t : 0].v;
+        for (i = 0; own && i < (pencil->wide ? 16 : 12); i++)
+            v[i][t] = own[i];
+    }
+    arm_joints_lanes(pencil, v, Y, recover, x, q, &defect);
+    for (t = 0; t < count; t++) {
         for (k = 0; k < 6; k++)
-            if (one->known)
-                q[k][t] = one->seed.q[k];
-            else if (t < count)
-                one->seed.q[k] = q[k][t];
-        if (!one->known && t < count)
-            one->seed.defect = defect[t];
+            seed[t].seed.q[k] = q[k][t];
+        seed[t].seed.defect = defect[t];
     }
     arm_refine_lanes(goal, 4, q, &residual, &guess, &weakness);
     for (t = 0; t < count; t++) {
@@ -129,6 +110,37 @@ static void arm_chase(const arm_pencil *pencil, const arm_many_poses *of, arm_ma
     }
 }
 
+/* What lanes' roots stand for, and where each lane's candidates begin; v: room for the products of roots that are taken
+   apart, which their groups hold. */
+static void arm_seeds_of_lanes(const arm_pencil *pencil, const arm_many_poses *of, const arm_solved *solved, int count,
+    double *v, arm_many_seed *seed, int *begin)
+{
+    arm_lane_groups every[ARM_MANY];
+    arm_many_group apart[ARM_MANY * ARM_MOST / 2];
+    const arm_many_group *next = apart;
+    int i, t, shared = 0, seeds = 0;
+    for (t = 0; t < count; t++) {
+        arm_lane_groups *own = &every[t];
+        own->groups = of->lost[t] ? 0 : arm_groups(pencil, solved[t].re, solved[t].im, ARM_MAIN_TILT, pencil->wide,
+            own->order, own->tilt, own->group);
+        for (i = 0; i < own->groups; i++)
+            if (own->group[i].d) {
+                arm_many_group *one = &apart[shared++];
+                one->lane = t;
+                one->d = own->group[i].d;
+                one->x = own->group[i].mean;
+                one->v = v;
+                v += 16 * one->d;
+            }
+    }
+    arm_take_apart(pencil, of->E, apart, shared);
+    for (t = 0; t < count; t++) {
+        begin[t] = seeds;
+        seeds += arm_seeds_of_lane(&solved[t], &every[t], t, &next, seed + seeds);
+    }
+    begin[count] = seeds;
+}
+
 /* The first pass over up to ARM_MANY poses of one kind. */
 static void arm_pass_lanes(const arm_pencil *pencil, arm_state **pose, int count)
 {
@@ -136,7 +148,8 @@ static void arm_pass_lanes(const arm_pencil *pencil, arm_state **pose, int count
     arm_solved solved[ARM_MANY];
     arm_many_seed seed[ARM_MANY * ARM_MOST];
     arm_answer done[ARM_MANY * ARM_MOST];
-    int i, j, t, seeds = 0, begin[ARM_MANY + 1];
+    double products[16 * ARM_MANY * ARM_MOST];
+    int i, j, t, begin[ARM_MANY + 1];
     for (t = 0; t < ARM_MANY; t++) {
         const double *goal = pose[t < count ? t : 0]->goal;
         double back[12];
@@ -154,16 +167,12 @@ static void arm_pass_lanes(const arm_pencil *pencil, arm_state **pose, int count
             if (!of.lost[t])
                 arm_write_lane(pencil, &solved[t], t, &of);
         }
-    for (t = 0; t < count; t++) {
-        begin[t] = seeds;
-        if (of.lost[t])
-            continue;
-        arm_read_lane(pencil, &of, t, &solved[t]);
-        seeds += arm_seeds_of_lane(pencil, &of, t, &solved[t], seed + seeds);
-    }
-    begin[count] = seeds;
-    for (i = 0; i < seeds; i += ARM_MANY)
-        arm_chase(pencil, &of, seed + i, done + i, seeds - i < ARM_MANY ? seeds - i : ARM_MANY);
+    for (t = 0; t < count; t++)
+        if (!of.lost[t])
+            arm_read_lane(pencil, &of, t, &solved[t]);
+    arm_seeds_of_lanes(pencil, &of, solved, count, products, seed, begin);
+    for (i = 0; i < begin[count]; i += ARM_MANY)
+        arm_chase(pencil, &of, seed + i, done + i, begin[count] - i < ARM_MANY ? begin[count] - i : ARM_MANY);
     for (t = 0; t < count; t++) {
         arm_state *one = pose[t];
         arm_seed kept[ARM_MOST];

@@ -1,12 +1,10 @@
-/* What the equations E at x take to zero, n numbers: as `arm_null_vector` of `arm_system_at`, by inverse iteration on R^T R of
-   A = Q R. */
-static void arm_null_lanes(const arm_pencil *pencil, const arm_many *E, arm_flags lane, arm_many x, arm_many *v)
+/* As `arm_system_at`. */
+static void arm_system_lanes(const arm_pencil *pencil, const arm_many *E, arm_flags lane, arm_many x, arm_many *A)
 {
     const int r = pencil->r, w = pencil->w, n = pencil->wide ? 16 : 12, c = n + pencil->size;
     const arm_flags far = (arm_flags)(arm_size(x) > 1);
     const arm_many y = arm_pick(far, 1 / x, x);
-    arm_many A[256], size = arm_all(0);
-    int i, j, k;
+    int i, j;
     for (i = 0; i < n; i++) {
         const arm_many *e = E + i * c;
         for (j = 0; j < 2 * r; j++) {
@@ -19,6 +17,13 @@ static void arm_null_lanes(const arm_pencil *pencil, const arm_many *E, arm_flag
             A[n * i + 2 * r + j] = (arm_pick(far, none, two) * y + one) * y + arm_pick(far, two, none);
         }
     }
+}
+
+/* What n x n matrices take to zero, n numbers: as `arm_null_vector`, by inverse iteration on R^T R of A = Q R. */
+static void arm_null_lanes(arm_many *A, int n, arm_many *v)
+{
+    arm_many size = arm_all(0);
+    int i, k;
     arm_triangle_lanes(A, n, n, n);
     for (i = 0; i < n; i++) {
         const arm_many d = A[n * i + i];
