@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from armkin.errors import PathFileError
@@ -26,12 +26,15 @@ class Placing:
 
     def point(self, p: Sequence[float]) -> list[float]:
         """A point of the drawing in the arm's frame."""
-        x, y, z = p[0] * self.scale, p[1] * self.scale, p[2] * self.scale
-        (ox, oy, oz), (a, b, c) = self.origin, self.axes
+        return self.points([p])[0]
+
+    def points(self, points: Iterable[Sequence[float]]) -> list[list[float]]:
+        """Points of the drawing in the arm's frame."""
+        k, (ox, oy, oz), ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = self.scale, self.origin, self.axes
+        scaled = ((x * k, y * k, z * k) for x, y, z in points)
         return [
-            ox + a[0] * x + a[1] * y + a[2] * z,
-            oy + b[0] * x + b[1] * y + b[2] * z,
-            oz + c[0] * x + c[1] * y + c[2] * z,
+            [ox + ax * x + ay * y + az * z, oy + bx * x + by * y + bz * z, oz + cx * x + cy * y + cz * z]
+            for x, y, z in scaled
         ]
 
     def direction(self, d: Sequence[float]) -> list[float]:
@@ -55,7 +58,8 @@ class Pen:
         self.placing = placing
         self.moves: list[Move] = []
         self.lines: list[int] = []  # of the file, where each move begins
-        self._open: list[list[float]] | None = None
+        self._open: list[Sequence[float]] | None = None  # of the drawing: placed in the end
+        self._drawn: list[list[Sequence[float]]] = []
         self._speed: float | None = None
 
     def jump(self, p: Sequence[float], line: int) -> None:
@@ -65,12 +69,12 @@ class Pen:
     def line(self, p: Sequence[float], speed: float | None, line: int) -> None:
         """A straight line; speed: [mm/s], None: as fast as the joints go."""
         if self._open is None or speed != self._speed:
-            self._open, self._speed = [], speed
             own = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
-            opened = self._open
+            opened: list[Sequence[float]] = []
             self._add(Move.model_construct({"polyline"}, polyline=opened, **own), line)
-            self._open = opened
-        self._open.append(self.placing.point(p))
+            self._open, self._speed = opened, speed
+            self._drawn.append(opened)
+        self._open.append(p)
 
     def arc(
         self, a: Point, centre: Point, b: Point, normal: Point, angle: float, speed: float | None, line: int
@@ -128,6 +132,8 @@ class Pen:
         """The path. Raises PathFileError if nothing is drawn."""
         if not any(move.kind in ("polyline", "arc", "circle") for move in self.moves):
             raise PathFileError(f"{name}: draws nothing", file=name)
+        for drawn in self._drawn:
+            drawn[:] = self.placing.points(drawn)
         lines: dict[tuple[str | int, ...], int] = {("moves", k): line for k, line in enumerate(self.lines)}
         made = PathFile.model_construct(moves=self.moves, corners="tolerance")
         return made.read_from(Source(name, lines, notes=tuple(notes)))

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from armkin.errors import PathFileError
 from armkin.path_file import gcode_arcs
 from armkin.path_file.drawing import LARGEST, Pen, Placing, Point, Wishes
-from armkin.path_file.gcode_words import Block, blocks, wrong
+from armkin.path_file.gcode_words import PLAIN, Words, lines, words_of, wrong
 from armkin.path_file.model import PathFile
 
 AXES = "XYZ"
@@ -31,6 +31,8 @@ _GROUPS: dict[str, tuple[float, ...]] = {
 }
 _GROUP = {code: group for group, codes in _GROUPS.items() for code in codes}
 _PLACES = frozenset("XYZIJKR")
+_ZERO: Point = (0.0, 0.0, 0.0)
+_NO_AXES = [None] * 3
 _KNOWN_G = {*_GROUP, *_IGNORED_G, 53.0}
 
 
@@ -39,7 +41,7 @@ def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
     if b"\0" in raw:
         raise PathFileError(f"{name}: is no text; binary G-code must be written as text", file=name)
     program = _Program(name, Pen(placing), wishes)
-    program.run(blocks(raw.decode("utf-8-sig", "replace"), name))
+    program.run(lines(raw.decode("utf-8-sig", "replace"), name))
     notes = [
         f"{word} is ignored (line {program.first[word]}{f', and {n - 1} more' if n > 1 else ''})"
         for word, n in program.ignored.items()
@@ -52,7 +54,7 @@ class _Program:
 
     def __init__(self, name: str, pen: Pen, wishes: Wishes) -> None:
         self.name, self.pen, self.wishes = name, pen, wishes
-        self.at = [0.0, 0.0, 0.0]  # [mm] in the machine's coordinates
+        self.at = _ZERO  # [mm] in the machine's coordinates
         self.drawn = False  # whether the pen is at the file's point
         self.motion: float | None = None
         self.plane, self.unit, self.absolute = 17.0, 1.0, True
@@ -63,20 +65,40 @@ class _Program:
         self.held: bool | None = None
         self.ignored: Counter[str] = Counter()
         self.first: dict[str, int] = {}
-        self.block = Block(0, ())
+        self.line, self.words = 0, Words()
 
-    def run(self, program: Iterable[Block]) -> None:
+    def run(self, program: Iterable[tuple[int, str]]) -> None:
         """Read lines until the program's end."""
-        for self.block in program:
+        for self.line, text in program:
+            plain = PLAIN.fullmatch(text)
+            if plain is not None and self._plain(*plain.groups()):
+                continue
+            self.words = words_of(text, self.name, self.line)
             if self._line():
                 return
 
+    def _plain(self, g: str | None, early: str | None, *rest: str | None) -> bool:
+        """Do a line of G0 or G1, F, X, Y, Z, E alone as `_line` does, sooner; False: `_line` has to."""
+        *axes, e, late = rest
+        motion = self.motion if g is None else float(g)
+        if motion is None or motion > 1 or not (early is None or late is None):
+            return False
+        self.motion = motion
+        if (feed := early or late) is not None:
+            self.feed = float(feed) * self.unit
+        if e is not None:
+            self._ignore("E")
+        if axes != _NO_AXES:
+            goal = self._goal([number if number is None else float(number) for number in axes], machine=False)
+            self._straight(goal, _MOTION[motion])
+        return True
+
     def _wrong(self, text: str) -> PathFileError:
-        return wrong(self.name, self.block.line, text)
+        return wrong(self.name, self.line, text)
 
     def _ignore(self, word: str) -> None:
         self.ignored[word] += 1
-        self.first.setdefault(word, self.block.line)
+        self.first.setdefault(word, self.line)
 
     def _line(self) -> bool:
         """One line, in RS-274's order of execution; True: the program ends."""
@@ -109,7 +131,7 @@ class _Program:
             raise self._wrong(f"{letter} belongs to no word of this line")
         for code in m_codes:
             if code in (0.0, 1.0):
-                self.pen.pause(self.block.line)
+                self.pen.pause(self.line)
         return 2.0 in m_codes or 30.0 in m_codes
 
     def _sorted(self) -> tuple[list[float], list[float], dict[str, float]]:
@@ -118,7 +140,7 @@ class _Program:
         m_codes: list[float] = []
         values: dict[str, float] = {}
         groups: dict[str, str] = {}
-        for letter, number, word in self.block.words:
+        for letter, number, word in self.words:
             if letter == "G":
                 code = round(number, 2)
                 if code not in _KNOWN_G:
@@ -153,7 +175,7 @@ class _Program:
             self._ignore(f"M{code:g}")
         elif close != self.held:
             self.held = close
-            self.pen.grip("closed" if close else "open", self.block.line)
+            self.pen.grip("closed" if close else "open", self.line)
 
     def _dwell(self, values: dict[str, float], seconds: float | None) -> None:
         """G4 with P or S, both in seconds."""
@@ -163,7 +185,7 @@ class _Program:
         if not 0 <= time <= 86400:
             raise self._wrong(f"G4 waits 0 to 86400 seconds, not {time:g}")
         if time > 0:
-            self.pen.wait(time, self.block.line)
+            self.pen.wait(time, self.line)
 
     def _modes(self, codes: list[float]) -> None:
         for code in codes:
@@ -182,8 +204,8 @@ class _Program:
         if 28.0 in codes:
             for letter in AXES:
                 values.pop(letter, None)
-            self.pen.home(self.block.line)
-            self.at, self.drawn = [0.0, 0.0, 0.0], False
+            self.pen.home(self.line)
+            self.at, self.drawn = _ZERO, False
         elif 10.0 in codes:
             self._set_system(values)
         elif 52.0 in codes or 92.0 in codes:
@@ -215,7 +237,7 @@ class _Program:
         """G52 sets a local zero, G92 one so that the present point has these values."""
         word = "G52" if local else "G92"
         given = [(k, values.pop(letter) * self.unit) for k, letter in enumerate(AXES) if letter in values]
-        if not given and not any(letter == "E" for letter, *_ in self.block.words):
+        if not given and not any(letter == "E" for letter, *_ in self.words):
             raise self._wrong(f"{word} needs X, Y or Z")
         zero = self.systems[self.system]
         for k, value in given:
@@ -224,11 +246,12 @@ class _Program:
             else:
                 self.shift[k] = self.at[k] - zero[k] - self.local[k] - value
 
-    def _goal(self, values: dict[str, float], machine: bool) -> Point:
+    def _goal(self, axes: list[float | None], machine: bool) -> Point:
+        """Where the numbers of X, Y and Z lead to, in the machine's coordinates [mm]."""
         zero, goal = self.systems[self.system], list(self.at)
-        for k, letter in enumerate(AXES):
-            if letter in values:
-                value = values.pop(letter) * self.unit
+        for k, number in enumerate(axes):
+            if number is not None:
+                value = number * self.unit
                 if machine:
                     goal[k] = value
                 elif self.absolute:
@@ -236,7 +259,7 @@ class _Program:
                 else:
                     goal[k] += value
                 if not abs(goal[k]) <= LARGEST:
-                    raise self._wrong(f"{letter}{value:g} is farther away than {LARGEST:g} mm")
+                    raise self._wrong(f"{AXES[k]}{value:g} is farther away than {LARGEST:g} mm")
         return goal[0], goal[1], goal[2]
 
     def _move(self, values: dict[str, float], machine: bool) -> None:
@@ -245,25 +268,28 @@ class _Program:
         word = _MOTION[self.motion]
         if machine and self.motion > 1:
             raise self._wrong(f"G53 goes with G0 and G1, not with {word}")
-        start = self.at[0], self.at[1], self.at[2]
-        goal = self._goal(values, machine)
-        arc = None
-        if self.motion > 1:
-            try:
-                arc = gcode_arcs.arc(word, _PLANES[self.plane], values, self.unit, start, goal)
-            except gcode_arcs.ArcError as error:
-                raise self._wrong(str(error)) from None
-        line, speed = self.block.line, None if self.motion == 0 else self._speed(word)
-        if arc is not None:
-            if not self.drawn:
-                self.pen.jump(start, line)
-            centre, normal, angle = arc
-            self.pen.arc(start, centre, goal, normal, angle, speed, line)
-        elif not self.drawn:
-            self.pen.jump(goal, line)
-        elif goal != start:
-            self.pen.line(goal, speed, line)
-        self.at, self.drawn = list(goal), True
+        goal = self._goal([values.pop(letter, None) for letter in AXES], machine)
+        if self.motion <= 1:
+            self._straight(goal, word)
+            return
+        try:
+            centre, normal, angle = gcode_arcs.arc(word, _PLANES[self.plane], values, self.unit, self.at, goal)
+        except gcode_arcs.ArcError as error:
+            raise self._wrong(str(error)) from None
+        speed = self._speed(word)
+        if not self.drawn:
+            self.pen.jump(self.at, self.line)
+        self.pen.arc(self.at, centre, goal, normal, angle, speed, self.line)
+        self.at, self.drawn = goal, True
+
+    def _straight(self, goal: Point, word: str) -> None:
+        """A line by G0 or G1; to the first point, a joint move."""
+        speed = None if word == "G0" else self._speed(word)
+        if not self.drawn:
+            self.pen.jump(goal, self.line)
+        elif goal != self.at:
+            self.pen.line(goal, speed, self.line)
+        self.at, self.drawn = goal, True
 
     def _speed(self, word: str) -> float | None:
         """The tool's speed [mm/s]; None: as fast as the joints go."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from armkin.errors import PathFileError
 
@@ -16,14 +15,14 @@ _MACHINE_M = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 48, 49}  # of RS-274: the other 
 _HOME = re.compile(r"\s*(?:N\s*[0-9]+\s*)?G\s*0*28(?![0-9.])")
 _FLAG = re.compile(r"[A-Z](?!\s*[-+.0-9])")  # of G28: slicers name axes, and what is left out, without a number
 _LONGEST = 1000  # characters of a line that is not a comment alone
+_PLACE = r"([+-]?(?:[0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15}))"
+_FEED = r"(?:F([0-9]{1,15}(?:\.[0-9]{0,15})?) ?)?"
+# most lines of slicers and of CAM programs: G0 or G1 (or neither), F, X, Y, Z, E, F
+PLAIN = re.compile(
+    rf"(?:G0?([01]) ?)?{_FEED}(?:X{_PLACE} ?)?(?:Y{_PLACE} ?)?(?:Z{_PLACE} ?)?(?:E{_PLACE} ?)?{_FEED}"
+)
 
-
-@dataclass(frozen=True)
-class Block:
-    """A line of a program: its number in the file, and its words."""
-
-    line: int
-    words: tuple[tuple[str, float, str], ...]  # letter, number, as written
+Words = tuple[tuple[str, float, str], ...]  # letter, number, as written
 
 
 def wrong(name: str, line: int, text: str) -> PathFileError:
@@ -31,8 +30,8 @@ def wrong(name: str, line: int, text: str) -> PathFileError:
     return PathFileError(f"{name}:{line}: {text}", file=name, line=line)
 
 
-def blocks(text: str, name: str) -> Iterator[Block]:
-    """The lines that have words, up to a second `%`. Raises PathFileError with line and word."""
+def lines(text: str, name: str) -> Iterator[tuple[int, str]]:
+    """The lines that have words, each with its number, up to a second `%`. Raises PathFileError with line and word."""
     percents = 0
     for number, raw in enumerate(text.splitlines(), 1):
         if "%" in raw and raw.strip() == "%":
@@ -49,7 +48,7 @@ def blocks(text: str, name: str) -> Iterator[Block]:
             continue
         if "*" in line:
             line = _checked(line, name, number)
-        yield Block(number, _words(line.upper(), name, number))
+        yield number, line
 
 
 def _checked(line: str, name: str, number: int) -> str:
@@ -66,7 +65,9 @@ def _checked(line: str, name: str, number: int) -> str:
     return body
 
 
-def _words(line: str, name: str, number: int) -> tuple[tuple[str, float, str], ...]:
+def words_of(line: str, name: str, number: int) -> Words:
+    """The words of a line. Raises PathFileError with line and word."""
+    line = line.upper()
     own = _OWN_WORDS.match(line) if "M" in line else None
     if own is not None and own[1] is not None and int(own[1]) not in _MACHINE_M:
         # M201 X500: what follows is the M word's own; of a fan the S counts
