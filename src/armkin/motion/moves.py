@@ -38,19 +38,27 @@ def _line(walk: Walk, move: Move, value: list[float], inner: bool = False) -> No
     if corner is not None and walk.dense is None:
         walk.add(move, geometry.line(walk.task, walk.spot, walk.target(value)))
         return
-    if walk.dense is None:
-        walk.dense = Polyline(walk.task, walk.spot)
-        walk.group = (walk.group if walk.goal is not None or walk.pieces else walk.at)[0], walk.at[1]
-    speed = None if move.speed is None else move.speed / 100 * walk.pace.speed
-    walk.dense.add(value, speed, move.tool_speed)
-    walk.group = walk.group[0], walk.at[1]
+    _gather(walk, move, [value])
     if corner is not None:
         walk.lay_dense(corner)
 
 
 def _polyline(walk: Walk, move: Move, value: list[list[float]]) -> None:
+    if walk.corner(move, inner=True) is None:  # all its inner points gather, the last one as its own corner says
+        _gather(walk, move, value[:-1])
+        value = value[-1:]
     for k, target in enumerate(value):
         _line(walk, move, target, inner=k < len(value) - 1)
+
+
+def _gather(walk: Walk, move: Move, targets: list[list[float]]) -> None:
+    """Put targets to the points that become one smooth curve."""
+    if walk.dense is None:
+        walk.dense = Polyline(walk.task, walk.spot)
+        walk.group = (walk.group if walk.goal is not None or walk.pieces else walk.at)[0], walk.at[1]
+    speed = None if move.speed is None else move.speed / 100 * walk.pace.speed
+    walk.dense.add(targets, speed, move.tool_speed)
+    walk.group = walk.group[0], walk.at[1]
 
 
 def _arc(walk: Walk, move: Move, value: Any) -> None:

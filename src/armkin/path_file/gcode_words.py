@@ -18,9 +18,7 @@ _LONGEST = 1000  # characters of a line that is not a comment alone
 _PLACE = r"([+-]?(?:[0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15}))"
 _FEED = r"(?:F([0-9]{1,15}(?:\.[0-9]{0,15})?) ?)?"
 # most lines of slicers and of CAM programs: G0 or G1 (or neither), F, X, Y, Z, E, F
-PLAIN = re.compile(
-    rf"(?:G0?([01]) ?)?{_FEED}(?:X{_PLACE} ?)?(?:Y{_PLACE} ?)?(?:Z{_PLACE} ?)?(?:E{_PLACE} ?)?{_FEED}"
-)
+PLAIN = re.compile(rf"(?:G0?([01]) ?)?{_FEED}(?:X{_PLACE} ?)?(?:Y{_PLACE} ?)?(?:Z{_PLACE} ?)?(?:E{_PLACE} ?)?{_FEED}")
 
 Words = tuple[tuple[str, float, str], ...]  # letter, number, as written
 

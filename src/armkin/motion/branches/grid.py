@@ -164,7 +164,7 @@ def _solved(
     windows: tuple[Window, ...],
 ) -> Array:
     """Joint values at the points, exact to the inverse kinematics; known: a grid whose points are among them."""
-    values, new = np.empty((len(where), arm.n)), np.ones(len(where), bool)
+    values, new = np.empty((len(where), arm.n), order="F"), np.ones(len(where), bool)  # long runs of numbers
     if known is not None:
         old = np.searchsorted(where, known.s)
         values[old], new[old] = known.q, False
@@ -245,20 +245,19 @@ def missed(arm: Arm, route: Route, path: Knots) -> Missed:
 
 
 def _deviations(arm: Arm, route: Route, path: Knots, some: Int, lever: Array) -> Array:
-    h, seen = path.h[some, None], np.zeros(len(some))
-    start, d0, d1 = path.q[some], path.d[some] * h, path.d[some + 1] * h
-    chord = path.q[some + 1] - start
+    (start, end), (d0, d1), h = path.ends(path.q, some), path.ends(path.d, some), path.h[some]
+    d0, d1, chord, seen = d0 * h, d1 * h, end - start, np.zeros(len(some))
     for f in (0.25, 0.75):
         q = start + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
-        wanted = route.targets(path.s[some] + f * h[:, 0])
+        wanted = route.targets(path.s[some] + f * h)
         wanted = wanted[:, :3, 3] if route.task.orientation == "full" else wanted[:, : route.task.position]
-        off = position(arm, q)[:, : wanted.shape[1]] - wanted
-        seen = np.maximum(seen, np.sqrt((off**2).sum(axis=1)))
+        off = (position(arm, q.T)[:, : wanted.shape[1]] - wanted).T
+        seen = np.maximum(seen, np.sqrt((off**2).sum(axis=0)))
     # h, h^2 and h^3 times the greatest q', q'' and q''' of each joint
     first = np.maximum(np.maximum(np.abs(d0), np.abs(d1)), np.abs(3 * chord - d0 - d1))
     second = np.maximum(np.abs(6 * chord - 4 * d0 - 2 * d1), np.abs(6 * chord - 2 * d0 - 4 * d1))
     third = np.abs(6 * (d0 + d1 - 2 * chord))
-    turned = first @ np.where(arm.prismatic, 0.0, np.abs(arm.ratio)) * (2.0 if arm.prismatic.any() else 1.0)
-    levered = first @ lever
-    tip = turned * (levered * first).sum(axis=1) + 3 * (levered * second).sum(axis=1)
-    return np.asarray(4 / 3 * seen + (tip + third @ np.where(arm.prismatic, 1.0, np.diag(lever))) / 96)
+    turned = np.where(arm.prismatic, 0.0, np.abs(arm.ratio)) @ first * (2.0 if arm.prismatic.any() else 1.0)
+    levered = lever.T @ first
+    tip = turned * (levered * first).sum(axis=0) + 3 * (levered * second).sum(axis=0)
+    return np.asarray(4 / 3 * seen + (tip + np.where(arm.prismatic, 1.0, np.diag(lever)) @ third) / 96)

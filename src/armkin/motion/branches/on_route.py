@@ -109,7 +109,7 @@ def exact_cubics(arm: Arm, route: Route, where: Array, q: Array, rests: Int, kno
     None: beside a singularity the joints need not follow all that the targets do.
     """
     twice = np.sort(np.concatenate([np.arange(len(where)), rests]))
-    s, values = where[twice], q[twice]
+    s, values = where[twice], np.asfortranarray(q[twice])
     d, new = np.empty_like(values), np.ones(len(s), bool)
     if known is not None:
         old = np.searchsorted(s, known.s)

@@ -44,6 +44,20 @@ class Knots:
 
     def second(self, some: slice | Int = slice(None)) -> tuple[Array, Array]:
         """q'' at the left and the right end of intervals, by default of all: (M, n) twice."""
-        h, d0, d1 = self.h[some, None], self.d[:-1][some], self.d[1:][some]
-        chord = (self.q[1:][some] - self.q[:-1][some]) / h
-        return (6 * chord - 4 * d0 - 2 * d1) / h, (-6 * chord + 2 * d0 + 4 * d1) / h
+        _, left, right = self.slopes(some)
+        return left.T, right.T
+
+    def slopes(self, some: slice | Int = slice(None)) -> tuple[Array, Array, Array]:
+        """q' at the left end of intervals, q'' there and at the right end: (n, M) thrice, long runs of numbers."""
+        (q0, q1), (d0, d1) = (self.ends(each, some) for each in (self.q, self.d))
+        h = self.h[some]
+        chord = (q1 - q0) / h
+        return d0, (6 * chord - 4 * d0 - 2 * d1) / h, (-6 * chord + 2 * d0 + 4 * d1) / h
+
+    @staticmethod
+    def ends(values: Array, some: slice | Int) -> tuple[Array, Array]:
+        """Of values at the points, (N, n), those at both ends of intervals: (n, M) twice."""
+        columns = values.T
+        if isinstance(some, slice):
+            return columns[:, :-1][:, some], columns[:, 1:][:, some]
+        return columns.take(some, axis=1), columns.take(some + 1, axis=1)

@@ -96,24 +96,24 @@ def scan(y: Array, least: Least) -> Array:
     not are followed side by side, as long as there are many.
     """
     out = y.copy()
+    first = np.append(0, np.cumsum(np.bincount(least.at, minlength=len(y) - 1)))  # of each interval's other functions
     for _ in range(_TIMES):
         k = (~(least.values(out[:-1]) >= out[1:])).nonzero()[0]
         heads = k[np.diff(k, prepend=-2) > 1]  # the run of a first one passes those next to it
         if len(heads) <= _TOGETHER:
             break
-        _side_by_side(out, least, heads)
-    done, more = 0, _lists(least) if len(k) else {}
+        _side_by_side(out, least, first, heads)
+    done = 0
     for begin in k.tolist():
         if begin >= done:
-            done = _follow(out, least, more, begin)
+            done = _follow(out, least, first, begin)
     return out
 
 
-def _side_by_side(y: Array, least: Least, heads: Int) -> None:
+def _side_by_side(y: Array, least: Least, first: Int, heads: Int) -> None:
     """Follow runs from places (r,), each up to where y is reached again, and write those that no other one passes."""
     k, now, run, top, end = heads, y[heads], np.arange(len(heads)), y, len(y) - 1
     ends = np.full(len(heads), end)
-    first = np.searchsorted(least.at, np.arange(end + 1))  # of each interval's other functions
     found: list[tuple[Int, Int, Array]] = []
     while len(k):
         value = np.minimum(least.a0[k] * now + least.b0[k], least.a1[k] * now + least.b1[k])
@@ -143,21 +143,22 @@ def _side_by_side(y: Array, least: Least, heads: Int) -> None:
         y[k[some]] = now[some]
 
 
-def _lists(least: Least) -> dict[int, list[tuple[float, float]]]:
-    """The other functions of the intervals that have any."""
+def _lists(least: Least, some: slice) -> dict[int, list[tuple[float, float]]]:
+    """Some of the other functions, by the intervals that have them."""
     more: dict[int, list[tuple[float, float]]] = {}
-    for at, slope, level in zip(least.at.tolist(), least.slope.tolist(), least.level.tolist(), strict=True):
+    for at, slope, level in zip(*(each[some].tolist() for each in least[4:]), strict=True):
         more.setdefault(at, []).append((slope, level))
     return more
 
 
-def _follow(y: Array, least: Least, more: dict[int, list[tuple[float, float]]], k: int) -> int:
+def _follow(y: Array, least: Least, first: Int, k: int) -> int:
     """Lower y[k+1], ... up to some place where what comes there is no lower, and return that."""
     now, size = float(y[k]), _FEWEST
     while True:
         end = min(k + size, len(y) - 1)
         most, found = y[k + 1 : end + 1].tolist(), []
-        rows = (each[k:end].tolist() for each in (least.a0, least.b0, least.a1, least.b1))
+        rows = (each[k:end].tolist() for each in least[:4])
+        more = _lists(least, slice(first[k], first[end]))
         for i, top, a0, b0, a1, b1 in zip(range(k, end), most, *rows, strict=True):
             value, other = a0 * now + b0, a1 * now + b1
             if other < value:

@@ -74,15 +74,13 @@ class Bound:
 
     def of(self, some: Some) -> Motion:
         """What is bounded along some of the intervals."""
-        path = self.path
-        first, (left, right) = path.d[:-1][some], path.second(some)
-        low = np.minimum(self.accel[:-1][some], self.accel[1:][some])  # between two limits the lower one counts
+        first, left, right = self.path.slopes(some)
+        low = np.minimum(self.accel[:-1][some], self.accel[1:][some]).T  # between two limits the lower one counts
         if self.weights is not None:
             weights, most = self.weights
-            first, left, right = (np.concatenate([x, x @ weights.T], axis=1) for x in (first, left, right))
-            low = np.concatenate([low, np.broadcast_to(most, (len(low), len(most)))], axis=1)
-        first, left, right, low = (np.ascontiguousarray(each.T) for each in (first, left, right, low))
-        return Motion(first, left, right - left, path.h[some], low)
+            first, left, right = (np.concatenate([x, weights @ x]) for x in (first, left, right))
+            low = np.concatenate([low, np.broadcast_to(most[:, None], (len(most), low.shape[1]))])
+        return Motion(first, left, right - left, self.path.h[some], low)
 
 
 class Fastest:

@@ -31,6 +31,7 @@ _NEIGHBOURS = 5  # samples that give a slope
 _SECTIONS = 16  # of samples, between breaks: more are worked on together
 _MOST = 1e18  # of x, where nothing bounds it
 _EXCESS = 1.001  # of an acceleration, or of a speed squared, between grid points
+_LITTLE = 1.0002  # less of it is left as it is: most of the others are above 1 by rounding
 _ROUNDS = 8
 _SHARED = 2  # rounds in which an interval is given less acceleration; then it is passed slower
 _FEW = 400  # samples of a way: the law needs more grid points
@@ -152,10 +153,10 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
             if worst.max() <= _EXCESS:
                 return law.x
             if round_ < _ROUNDS - 1:
-                bad, x = np.flatnonzero(worst > 1.0), law.x
+                bad, x = np.flatnonzero(worst > _LITTLE), law.x
                 law.again(_beside(bad, len(worst)))
                 gone = law.x != x
-                moved = np.flatnonzero(gone[1:] | gone[:-1] | (worst > 1.0))
+                moved = np.flatnonzero(gone[1:] | gone[:-1] | (worst > _LITTLE))
         begins = np.concatenate([[0], path.rests + 1])  # each part between two rests slows down for itself
         slower = np.maximum(np.maximum.reduceat(worst, begins), 1.0)
         return np.asarray(law.x / np.append(np.repeat(slower, np.diff(np.append(begins, len(worst)))), slower[-1]))
@@ -168,9 +169,9 @@ def _lowered(law: Fastest, limits: Bound, speed: Array, some: Int, *, share: boo
     rush = motion.rush(x0, x1, np.minimum(speed[some], speed[some + 1]).T)
     worst = np.maximum(over.max(axis=0), rush)
     if share:
-        law.share[:, some] /= np.where(over > 1.0, over, 1.0)
+        law.share[:, some] /= np.where(over > _LITTLE, over, 1.0)
     less = rush if share else worst
-    low = np.flatnonzero(less > 1.0)
+    low = np.flatnonzero(less > _LITTLE)
     for at, x in ((some[low], x0[low]), (some[low] + 1, x1[low])):
         np.fmin.at(law.cap, at, x / less[low])
     return np.asarray(worst)

@@ -8,6 +8,7 @@ the main one, so that all curves together are one banded system.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ class Layout:
     interval: Int  # (N,) interval that each point lies in
     begin: Array  # (M,) where intervals begin
     end: Array  # (M,)
-    knots: Array  # (M, 6) the six knots about each interval
+    knots: Array  # (6, M) the six knots about each interval
     control: Int  # (M,) first of the four control points of each interval
     curve: Int  # (M,) curve of each interval
     count: int  # control points
@@ -44,38 +45,47 @@ class Layout:
         interval = before - (before == np.searchsorted(inner, number, side="right"))  # a curve's last knot: the last
         first = np.searchsorted(which, which[inner])
         last = np.searchsorted(which, which[inner], side="right") - 1
-        around = np.clip(inner[:, None] + np.arange(-2, 4), first[:, None], last[:, None])
+        around = np.clip(inner + np.arange(-2, 4)[:, None], first, last)
         control = np.arange(len(inner)) + 3 * which[inner]
         count = len(inner) + 3 * (int(which[-1]) + 1)
         return Layout(u, interval, at[inner], at[inner + 1], at[around], control, which[inner], count)
 
     def values(self, control: Array) -> Array:
         """Points of the curves at the layout's parameters: control points (C, d) -> (N, d)."""
-        N = _basis(self.knots[self.interval], self.u)
-        first = self.control[self.interval]
-        return np.asarray(sum(N[:, [k]] * control[first + k] for k in range(4)))
+        first, columns = self.first, np.ascontiguousarray(control.T)
+        return np.asarray(sum(N * columns.take(first + k, axis=1) for k, N in enumerate(self.basis))).T
+
+    @cached_property
+    def basis(self) -> Array:
+        """The four basis functions at every point: (4, N)."""
+        return _basis(self.knots.take(self.interval, axis=1), self.u)
+
+    @cached_property
+    def first(self) -> Int:
+        """First of the four control points of every point: (N,)."""
+        return self.control[self.interval]
 
     def powers(self, control: Array) -> Array:
         """Coefficients of the cubics over the fraction of each interval: (M, 4, d)."""
         size = self.end - self.begin
         at = [_basis(self.knots, self.begin + f * size) for f in _THIRDS]
-        values = np.stack([sum(N[:, [k]] * control[self.control + k] for k in range(4)) for N in at], axis=1)
+        values = np.stack([sum(N[k, :, None] * control[self.control + k] for k in range(4)) for N in at], axis=1)
         return np.asarray(_TO_POWERS @ values)
 
 
 def least_squares(layout: Layout, y: Array, weight: Array, ends: Bool) -> Array:
     """Control points (C, d) of the curves nearest to points y (N, d), weighted (N,); ends (N,): points to pass."""
-    N = _basis(layout.knots[layout.interval], layout.u)
-    first = layout.control[layout.interval]
+    N, first = layout.basis, layout.first
     w = np.where(ends, _ENDS, weight)
+    columns = np.ascontiguousarray(y.T)
     bands = np.zeros((4, layout.count))
     right = np.zeros((layout.count, y.shape[1]))
     for j in range(4):
-        wj = w * N[:, j]
+        wj, at = w * N[j], first + j
         for k in range(j, 4):
-            bands[k - j] += np.bincount(first + j, wj * N[:, k], layout.count)
-        for d in range(y.shape[1]):
-            right[:, d] += np.bincount(first + j, wj * y[:, d], layout.count)
+            bands[k - j] += np.bincount(at, wj * N[k], layout.count)
+        for d, column in enumerate(columns):
+            right[:, d] += np.bincount(at, wj * column, layout.count)
     _add_ridge(layout, bands)
     return banded(bands, right)
 
@@ -84,10 +94,10 @@ def _add_ridge(layout: Layout, bands: Array) -> None:
     """Add a small share of the squared bends of the control polygons, three control points after another."""
     t = layout.knots
     # Greville's places of an interval's four control points: means of three knots each
-    place = np.stack([t[:, k : k + 3].mean(axis=1) for k in range(4)], axis=1)
+    place = np.stack([t[k : k + 3].mean(axis=0) for k in range(4)], axis=1)
     starts = np.append(True, layout.curve[1:] != layout.curve[:-1])
     for k in (0, 1):
-        some = starts if k == 0 else np.ones(len(t), bool)
+        some = starts if k == 0 else np.ones(len(starts), bool)
         a, b = place[some, k + 1] - place[some, k], place[some, k + 2] - place[some, k + 1]
         size = np.minimum(a, b)
         row = np.stack([size / a, -size / a - size / b, size / b], axis=1)
@@ -98,12 +108,12 @@ def _add_ridge(layout: Layout, bands: Array) -> None:
 
 
 def _basis(t: Array, u: Array) -> Array:
-    """The four cubic basis functions at u (N,) within the middle of six knots t (N, 6): (N, 4).
+    """The four cubic basis functions at u (N,) within the middle of six knots t (6, N): (4, N).
 
     Source: Piegl and Tiller, The NURBS Book, 1997, algorithm A2.2.
     """
-    left = [u - t[:, 3 - k] for k in range(4)]  # left[k] = u - t_{j+1-k}
-    right = [t[:, 2 + k] - u for k in range(4)]
+    left = [u - t[3 - k] for k in range(4)]  # left[k] = u - t_{j+1-k}
+    right = [t[2 + k] - u for k in range(4)]
     N = [np.ones(len(u))]
     for p in range(1, 4):
         saved = np.zeros(len(u))
@@ -112,7 +122,7 @@ def _basis(t: Array, u: Array) -> Array:
             N[r] = saved + right[r + 1] * part
             saved = left[p - r] * part
         N.append(saved)
-    return np.stack(N, axis=1)
+    return np.stack(N)
 
 
 def banded(bands: Array, right: Array) -> Array:

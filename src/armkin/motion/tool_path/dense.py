@@ -37,13 +37,14 @@ class Polyline:
         self.speeds: list[tuple[float, float]] = []  # fraction of the joints' max_speed, tool speed; nan: the path's
         self._last: tuple[int, Spot] = (0, first)
 
-    def add(self, value: Sequence[float], speed: float | None, tool_speed: float | None) -> None:
-        """One more target. Raises UsageError for one that is none of the task."""
-        if len(value) != self.task.position:
-            last = path_numbers.target(self.task, self.last, value)
-            self._last = len(self.rows) + 1, last
-        self.rows.append(value)
-        self.speeds.append((_NAN if speed is None else speed, _NAN if tool_speed is None else tool_speed))
+    def add(self, values: Sequence[Sequence[float]], speed: float | None, tool_speed: float | None) -> None:
+        """More targets, with the speeds of the lines to them. Raises UsageError for one that is none of the task."""
+        for number, value in enumerate(values, len(self.rows) + 1):
+            if len(value) != self.task.position:
+                self._last = number, path_numbers.target(self.task, self.first, value)
+        self.rows += values
+        pace = _NAN if speed is None else speed, _NAN if tool_speed is None else tool_speed
+        self.speeds += [pace] * len(values)
 
     @property
     def last(self) -> Spot:
@@ -94,9 +95,9 @@ class _Spots:
     @staticmethod
     def of(task: Task, first: Spot, rows: list[Sequence[float]]) -> _Spots:
         """The first spot, and rows of numbers as the file has them; of the position alone the rest stays."""
-        p = np.array([first.p, *(row[: task.position] for row in rows)], dtype=float)
         labels, N = task.labels, len(rows) + 1
         full = np.flatnonzero([False, *(len(row) > task.position for row in rows)])
+        p = np.array([first.p, *((row[: task.position] for row in rows) if len(full) else rows)], dtype=float)
         since = np.searchsorted(full, np.arange(N), side="right")  # 0: as at first
         given = units.targets_in(labels, [list(rows[k - 1]) for k in full]) if len(full) else None
         k = len(task.sums)

@@ -9,6 +9,7 @@ its middle. Between points the curve is held, too: to the chord, and its sagitta
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -35,10 +36,15 @@ class Fitted:
     def values(self, v: Array) -> tuple[Array, Array]:
         """Points and derivatives by the parameter: (K,) -> (K, d) twice."""
         i = np.clip(np.searchsorted(self.begin, v, side="right") - 1, 0, len(self.begin) - 2)
-        h = (self.begin[i + 1] - self.begin[i])[:, None]
-        f = (v - self.begin[i])[:, None] / h
-        c0, c1, c2, c3 = self.powers[i].transpose(1, 0, 2)
-        return c0 + f * (c1 + f * (c2 + f * c3)), (c1 + f * (2 * c2 + 3 * f * c3)) / h
+        h = np.diff(self.begin).take(i)
+        f = (v - self.begin.take(i)) / h
+        c0, c1, c2, c3 = self._columns.take(i, axis=2)
+        return (c0 + f * (c1 + f * (c2 + f * c3))).T, ((c1 + f * (2 * c2 + 3 * f * c3)) / h).T
+
+    @cached_property
+    def _columns(self) -> Array:
+        """The coefficients as (4, d, M): numpy works on long runs of numbers."""
+        return np.ascontiguousarray(self.powers.transpose(1, 2, 0))
 
 
 def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:

@@ -314,17 +314,18 @@ def unit_speed(
     right = at(grid[1:] - 1e-9 * step)[1]  # where the way rests in a corner it comes and goes in two directions
     left, right = (d / np.maximum(np.linalg.norm(d * scale, axis=1), 1e-12)[:, None] for d in (left[:-1], right))
     moving = np.flatnonzero((y != y[0]).any(axis=0))
-    still, y, left, right = y[0], y[:, moving], left[:, moving], right[:, moving]  # left, right: dy/ds
+    h, still = np.diff(s), y[0]
+    y0, d0, d1 = y[:-1, moving], left[:, moving] * h[:, None], right[:, moving] * h[:, None]  # left, right: dy/ds
+    chord = y[1:, moving] - y0
+    powers = np.stack([y0.T, d0.T, (3 * chord - 2 * d0 - d1).T, (d0 + d1 - 2 * chord).T])  # (4, d, intervals)
 
     def along(x: Array) -> Array:
-        i = np.clip(np.searchsorted(s, x, side="right") - 1, 0, len(step) - 1)
-        h = (s[i + 1] - s[i])[:, None]
-        f = (x - s[i])[:, None] / h
-        y0, d0, d1 = y[i], left[i] * h, right[i] * h
-        chord = y[i + 1] - y0
-        out = np.repeat(still[None], len(x), axis=0)
-        out[:, moving] = y0 + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
-        return out
+        i = np.clip(np.searchsorted(s, x, side="right") - 1, 0, len(h) - 1)
+        f = (x - s.take(i)) / h.take(i)
+        c0, c1, c2, c3 = powers.take(i, axis=2)
+        out = np.repeat(still[:, None], len(x), axis=1)
+        out[moving] = c0 + f * (c1 + f * (c2 + f * c3))
+        return out.T
 
     return Piece(task, first, along, float(s[-1])), lambda v: np.interp(v, grid, s)
 
