@@ -9,6 +9,9 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from browsing import chromium, opened
+from playwright.sync_api import Browser
+from playwright.sync_api import Page as Tab
 from served import Page, served
 
 sys.path.append(str(Path(__file__).parents[1] / "firmware"))
@@ -25,6 +28,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @cache
 def _needs_browser(module: ModuleType) -> bool:
     return any(getattr(one, "__module__", None) == "browsing" for one in vars(module).values())
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Browser]:
+    """One for all tests of this folder that come one after another; each page has a profile of its own."""
+    with chromium() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def tab(browser: Browser) -> Iterator[Tab]:
+    """A page of three_dof without a board, for the tests of a file that begin at a target or a program of their own."""
+    with served() as server, opened(browser, server.address) as one:
+        yield one
 
 
 @pytest.fixture

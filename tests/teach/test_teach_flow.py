@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 
-import pytest
-from browsing import COUNTS, aim, chromium, idle, opened, settled, until, values
+from browsing import COUNTS, aim, idle, opened, settled, until, values
 from emulator import EmulatedBoard
 from pins import net
 from playwright.sync_api import Browser, Page
 from served import teaching
 
 from command_line import run
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as one:
-        yield one
 
 
 def carried_out(page: Page, button: str, what: str) -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import chromium, opened, settled, until
+from browsing import opened, settled, until
 from playwright.sync_api import Browser
 from served import Page, served
 
@@ -123,12 +122,6 @@ def test_a_lost_position_is_not_followed_from(sim: Page, monkeypatch: pytest.Mon
     status, answer = sim.act("follow", on=True)
     assert (status, "position" in answer["error"]) == (502, True)
     assert not sim.state()["follows"]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as one:
-        yield one
 
 
 def test_the_page_s_follow(browser: Browser) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from browsing import chromium, opened, until
+from browsing import opened, until
+from playwright.sync_api import Browser
 from served import served
 
 # A gamepad that the test holds: Chromium has none without a hand.
@@ -25,8 +26,8 @@ window.fetch = async (what, how) => {
 _AT = "document.querySelector('#position').textContent"
 
 
-def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_charted() -> None:
-    with served(board="sim") as server, chromium() as browser, opened(browser, server.address, script=_PAD) as page:
+def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_charted(browser: Browser) -> None:
+    with served(board="sim") as server, opened(browser, server.address, script=_PAD) as page:
         until(page, f"{_AT}.startsWith('It stands')")
 
         def joints() -> list[float]:
@@ -86,8 +87,8 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         assert page.text_content("#position") == stood
 
 
-def test_a_jog_that_ended_before_the_page_could_end_it_stays_told() -> None:
-    with served(board="sim") as server, chromium() as browser, opened(browser, server.address, script=_LATE) as page:
+def test_a_jog_that_ended_before_the_page_could_end_it_stays_told(browser: Browser) -> None:
+    with served(board="sim") as server, opened(browser, server.address, script=_LATE) as page:
         until(page, f"{_AT}.startsWith('It stands')")
         page.locator("#jog-up").focus()
         with page.expect_response("**/api/jog_end") as ending:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from browsing import aim, chromium, opened, settled, until
+from browsing import aim, opened, settled, until
+from playwright.sync_api import Browser
 from served import serving
 
 import armkin
@@ -18,8 +19,8 @@ def arm() -> armkin.Arm:
     return armkin.load("three_dof", scene=ROOT / "examples/scenes/three_dof.yaml")
 
 
-def test_a_hit_is_red_and_send_says_why_not(arm: armkin.Arm) -> None:
-    with serving(Actions(arm, "sim")) as server, chromium() as browser, opened(browser, server.address) as page:
+def test_a_hit_is_red_and_send_says_why_not(arm: armkin.Arm, browser: Browser) -> None:
+    with serving(Actions(arm, "sim")) as server, opened(browser, server.address) as page:
         red = "document.getElementById('canvas').dataset.red"
         assert page.evaluate(red) == ""
         for joint, value in enumerate(HIT):

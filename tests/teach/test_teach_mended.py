@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
-from browsing import aim, chromium, opened, settled, until
-from playwright.sync_api import Browser, Route
+from browsing import aim, opened, repainted, settled, until
+from playwright.sync_api import Browser, Page, Route
 from served import served, teaching
 
 import armkin
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as one:
-        yield one
 
 
 def test_keys_and_what_was_refused(browser: Browser, tmp_path: Path) -> None:
@@ -66,41 +59,39 @@ def test_keys_and_what_was_refused(browser: Browser, tmp_path: Path) -> None:
         until(page, f"document.querySelector('#planned').textContent.startsWith('{said}')")
 
 
-def test_hostile_words_of_a_path_file_are_shown_and_run_nothing(browser: Browser, tmp_path: Path) -> None:
+def test_hostile_words_of_a_path_file_are_shown_and_run_nothing(tab: Page, tmp_path: Path) -> None:
     words = ("<img src=x onerror=bad=1>", "</li><script>bad=2</script>", '"><svg/onload=bad=3>', "${bad=4}`'+(bad=5)+'")
     file = tmp_path / "path.yaml"
     file.write_text("moves:\n" + "".join(f"  - joint: [{k}, 60, -60]  # {word}\n" for k, word in enumerate(words)))
     bad = tmp_path / f"{words[0].replace('/', '')}.yaml"
     bad.write_text(f"{words[3]}: {words[0]}\nmoves: {words[2]}\n")
-    with served() as server, opened(browser, server.address) as page:
-        page.set_input_files("#load", str(file))
-        until(page, "document.querySelectorAll('#moves li').length === 4")
-        assert [page.input_value(f"#name-{k}") for k in range(4)] == list(words)
-        page.set_input_files("#load", str(bad))
-        until(page, "document.querySelector('#trouble').textContent !== ''")
-        assert page.evaluate("window.bad") is None
-        assert page.locator("img:not(#printed), svg[onload], li script").count() == 0
+    tab.set_input_files("#load", str(file))
+    until(tab, "document.querySelectorAll('#moves li').length === 4")
+    assert [tab.input_value(f"#name-{k}") for k in range(4)] == list(words)
+    tab.set_input_files("#load", str(bad))
+    until(tab, "document.querySelector('#trouble').textContent !== ''")
+    assert tab.evaluate("window.bad") is None
+    assert tab.locator("img:not(#printed), svg[onload], li script").count() == 0
 
 
-def test_a_long_list_keeps_the_rows_that_stay(browser: Browser, tmp_path: Path) -> None:
-    with served() as server, opened(browser, server.address) as page:
-        file = tmp_path / "long.yaml"
-        file.write_text("moves:\n" + "".join(f"  - joint: [{k % 100}, 60, -60]\n" for k in range(300)))
-        page.set_input_files("#load", str(file))
-        until(page, "document.querySelectorAll('#moves li').length === 300")
-        page.evaluate("document.querySelectorAll('#moves li').forEach((row, k) => (row.mark = k))")
-        marks = "[...document.querySelectorAll('#moves li')].map((row) => row.mark)"
-        page.click("#delete-5")
-        until(page, "document.querySelectorAll('#moves li').length === 299")
-        assert page.evaluate(marks) == [k for k in range(300) if k != 5]
-        assert page.inner_text("#show-5") == "6 joint"
-        assert page.get_attribute("#show-5", "aria-label") == "show move 6, joint"
-        page.click("#undo")
-        until(page, "document.querySelectorAll('#moves li').length === 300")
-        assert [mark for mark in page.evaluate(marks) if mark is not None] == [k for k in range(300) if k != 5]
-        page.click("#move-down-0")
-        until(page, "document.querySelector('#moves li').title.includes('1.0')")
-        assert page.evaluate("document.activeElement.id") == "move-down-0"
+def test_a_long_list_keeps_the_rows_that_stay(tab: Page, tmp_path: Path) -> None:
+    file = tmp_path / "long.yaml"
+    file.write_text("moves:\n" + "".join(f"  - joint: [{k % 100}, 60, -60]\n" for k in range(300)))
+    tab.set_input_files("#load", str(file))
+    until(tab, "document.querySelectorAll('#moves li').length === 300")
+    tab.evaluate("document.querySelectorAll('#moves li').forEach((row, k) => (row.mark = k))")
+    marks = "[...document.querySelectorAll('#moves li')].map((row) => row.mark)"
+    tab.click("#delete-5")
+    until(tab, "document.querySelectorAll('#moves li').length === 299")
+    assert tab.evaluate(marks) == [k for k in range(300) if k != 5]
+    assert tab.inner_text("#show-5") == "6 joint"
+    assert tab.get_attribute("#show-5", "aria-label") == "show move 6, joint"
+    tab.click("#undo")
+    until(tab, "document.querySelectorAll('#moves li').length === 300")
+    assert [mark for mark in tab.evaluate(marks) if mark is not None] == [k for k in range(300) if k != 5]
+    tab.click("#move-down-0")
+    until(tab, "document.querySelector('#moves li').title.includes('1.0')")
+    assert tab.evaluate("document.activeElement.id") == "move-down-0"
 
 
 def test_a_server_that_is_gone_is_not_said_to_know_the_arm(browser: Browser) -> None:
@@ -117,9 +108,11 @@ def test_a_server_that_is_gone_is_not_said_to_know_the_arm(browser: Browser) -> 
 
 
 def test_what_one_needs_is_in_sight_and_stays_there(browser: Browser) -> None:
-    for size in ((1280, 800), (390, 800)):
-        shape = {"width": size[0], "height": size[1]}
-        with served(board="sim") as server, opened(browser, server.address, viewport=shape) as page:
+    wide = {"width": 1280, "height": 800}
+    with served(board="sim") as server, opened(browser, server.address, viewport=wide) as page:
+        for size in ((1280, 800), (390, 800)):
+            page.set_viewport_size({"width": size[0], "height": size[1]})
+            repainted(page)
             send = page.locator("#send").bounding_box()
             assert send is not None
             assert send["y"] + send["height"] <= size[1]
@@ -130,14 +123,17 @@ def test_what_one_needs_is_in_sight_and_stays_there(browser: Browser) -> None:
             slider = page.locator("#sliders input[type=range]").first
             assert slider.evaluate("slider => getComputedStyle(slider).touchAction") == "pan-y"
             assert float(slider.get_attribute("step") or "") == pytest.approx(360 / 12800)  # a pulse
-            if size[0] > 800:
-                continue
-            assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
-            low = "[...document.querySelectorAll('button')].filter((one) => one.offsetHeight && one.offsetHeight < 44)"
-            assert page.evaluate(f"{low}.map((one) => one.id || one.textContent)") == []
+            slider.dispatch_event("input")  # something else is begun: the error is over
+            until(page, "document.querySelector('#trouble').textContent === ''")
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+        low = "[...document.querySelectorAll('button')].filter((one) => one.offsetHeight && one.offsetHeight < 44)"
+        assert page.evaluate(f"{low}.map((one) => one.id || one.textContent)") == []
 
 
-def test_the_first_picture_has_the_whole_handle_and_sliders_their_values(browser: Browser) -> None:
+def test_the_first_picture_has_the_whole_handle_and_sliders_their_values(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "/nowhere/cc")  # machine code of an elimination has tests of its own
     for robot in ("ur5e", "jaco_j2n6s300"):  # stretched upwards; joints without limits at 275 and 241 degrees
         with served(robot) as server, opened(browser, server.address, viewport={"width": 390, "height": 844}) as page:
             handle = "+document.querySelector('#canvas').dataset.handle.split(' ')[1]"

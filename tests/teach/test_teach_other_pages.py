@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-from browsing import aim, chromium, idle, opened, until
+from browsing import aim, idle, opened, until
 from playwright.sync_api import Browser
 from served import served
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as one:
-        yield one
 
 
 def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: Path) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browsing import chromium, opened, until
+from browsing import opened, until
+from playwright.sync_api import Browser
 from served import serving
 
 import armkin
@@ -15,9 +16,9 @@ from armkin.teach.actions import Actions
 from armkin.teach.reach_slice import ACROSS, DIRECTIONS, VALUES, reach_slice
 
 
-def test_voxels_are_shown_and_hidden_again() -> None:
+def test_voxels_are_shown_and_hidden_again(browser: Browser) -> None:
     arm = armkin.load("three_dof")
-    with serving(Actions(arm)) as server, chromium() as browser, opened(browser, server.address) as page:
+    with serving(Actions(arm)) as server, opened(browser, server.address) as page:
         slice_button = page.get_by_role("button", name="Slice")
         slice_button.click()
         until(page, "document.getElementById('legend').innerText.includes('share of 1 orientations')")

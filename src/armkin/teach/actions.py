@@ -10,7 +10,7 @@ from armkin.model import units
 from armkin.teach import request_checks
 from armkin.teach.program_actions import ProgramActions
 from armkin.teach.request_checks import RefusedError
-from armkin.teach.scene import first_lock, scene
+from armkin.teach.scene import first_lock, jogs, scene
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
 
 if TYPE_CHECKING:
@@ -90,9 +90,10 @@ class Actions:
         tab = self.tabs.open()
         self.warm()
         board = None if self.board is None else self.board.thread.state()
+        moved = [] if self.board is None else jogs(self.arm)
         return {
             "tab": tab.id,
-            "scene": scene(self.arm) | {"meshes": self.meshes},
+            "scene": scene(self.arm) | {"meshes": self.meshes, "jogs": moved},
             "look": self._shown,
             "program": self.program_actions.program.state(),
             "board": board,

@@ -54,7 +54,6 @@ def scene(arm: Arm) -> dict[str, Any]:
             )
         ],
         "poses": units.poses_out(arm),
-        "jogs": _jogs(arm),
         "obstacles": _obstacles(arm),
         **_motors(arm),
         "gripper": _gripper(arm),
@@ -90,7 +89,7 @@ def _obstacles(arm: Arm) -> list[float]:
     return [x for _, one in guard(arm).obstacles for x in one.triangles(1.4 * arm.reach).round(2).ravel().tolist()]
 
 
-def _jogs(arm: Arm) -> list[str]:
+def jogs(arm: Arm) -> list[str]:
     """The axes that the tip may be jogged along: none where no task fits."""
     from armkin.motion.jog_line import axes
 
