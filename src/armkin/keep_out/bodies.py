@@ -16,10 +16,12 @@ import numpy as np
 from armkin.formula import pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.trace import LazyCode
-from armkin.forward import move
+from armkin.forward import Motion, move
 from armkin.view.skeleton import shape
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from armkin.model.arm import Arm
@@ -130,7 +132,7 @@ def _recorded(arm: Arm) -> LazyCode:
     return LazyCode(lambda q: ends_formula(arm, q), arm.n)
 
 
-def ends_formula(arm: Arm, q: list[Entry]) -> list[Entry]:
+def ends_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """Six numbers a segment: where it begins and where it ends."""
     form = bodies(arm)
     out: list[Entry] = []
