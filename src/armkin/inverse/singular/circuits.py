@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: Bool, target: Array) -> Bool:
     """Which of the postures others (M, K, n) lie on one circuit with q (M, n), of those asked (M, K); else True.
 
-    joints: (M, n) those that move. The curve is walked one way until it closes, then the other. Where another curve
-    crosses it, or it is too long, all count as on it.
+    joints: (M, n) those that move. The curve is walked both ways at once until it closes. Where another curve crosses
+    it, or it is too long, all count as on it.
     """
     on = np.ones(asked.shape, bool)
     if task.orientation == "full":
@@ -37,28 +37,31 @@ def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: B
         on[k, c] = side[0] == side[1]
         asked = asked & ~known[:, None]
     who, column = np.nonzero(asked)
-    (ahead, crossing), closed = curves.directions(arm, task, q, joints, target), np.zeros(len(q), bool)
-    posture, met = others[who, column], crossing[who]
-    for way in (ahead, -ahead):
-        left = np.bincount(who[~met], minlength=len(q)) > 0
-        rows = np.flatnonzero(~closed & left)
-        if len(rows):
-            some = np.flatnonzero(~met & ~closed[who])
-            walk = Curves(arm, task, q[rows], joints[rows], target[rows], way[rows])
-            met[some] = _met(arm, walk, np.searchsorted(rows, who[some]), posture[some])
-            closed[rows] = walk.closed
+    ahead, crossing = curves.directions(arm, task, q, joints, target)
+    met = crossing[who]
+    if len(some := np.flatnonzero(~met)):
+        rows, place = np.unique(who[some], return_inverse=True)
+        both = np.tile(rows, 2)
+        walk = Curves(arm, task, q[both], joints[both], target[both], np.concatenate([ahead[rows], -ahead[rows]]))
+        met[some] = _met(arm, walk, place, others[who, column][some])
     on[who, column] = met
     return on
 
 
 def _met(arm: Arm, walk: Curves, who: NDArray[np.intp], posture: Array) -> Bool:
-    """Which postures (P, n) the who-th of these curves meet, until each has met all of its own: (P,)."""
-    met = np.zeros(len(who), bool)
+    """Which postures (P, n) the who-th of these curves meet, until each has met all of its own: (P,).
+
+    The second half of `walk` are the same curves the other way: they tell nothing more once the first half has closed.
+    """
+    M, P = len(walk.at) // 2, len(who)
+    each, met = np.concatenate([who, who + M]), np.zeros(2 * P, bool)
     while walk.going.any():
         step = walk.step()
-        unsure = np.zeros(len(walk.at), bool)
+        unsure = np.zeros(2 * M, bool)
         unsure[step.rows] = step.unsure
-        some = np.flatnonzero(~met & np.isin(who, step.rows))
-        met[some] = step.passes(arm, posture[some], np.searchsorted(step.rows, who[some])) | unsure[who[some]]
-        walk.going &= np.bincount(who[~met], minlength=len(walk.at)) > 0
-    return met
+        some = np.flatnonzero(~met & np.isin(each, step.rows))
+        at = each[some]
+        met[some] = step.passes(arm, posture[some % P], np.searchsorted(step.rows, at)) | unsure[at]
+        left = np.bincount(who[~(met[:P] | met[P:])], minlength=M) > 0
+        walk.going &= np.concatenate([left, left & ~walk.closed[:M]])
+    return np.asarray(met[:P] | (met[P:] & ~walk.closed[who]))
