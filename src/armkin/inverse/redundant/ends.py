@@ -8,10 +8,10 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, NO_ROOM, SAME_END, TINY
-from armkin.inverse.redundant.pieces import Int, golden_section, margin, turning
+from armkin.inverse.redundant.pieces import Int, golden_section, margin
 
 if TYPE_CHECKING:
-    from armkin.inverse.redundant.follower import Follower, Postures
+    from armkin.inverse.redundant.follower import Follower, Samples
 
 HALVINGS = 60  # steps to where a branch ends, at most
 SECANTS = 24  # of which the later ones halve
@@ -119,11 +119,11 @@ class Changes(NamedTuple):
         return np.asarray(t[self.k] + (t[1] - t[0]) * np.where(self.set_before, offset, 1 - offset))
 
 
-def hidden_stretches(find: Follower, t: Array, found: Postures) -> tuple[Changes, Array]:
+def hidden_stretches(find: Follower, t: Array, found: Samples) -> tuple[Changes, Array]:
     """Stretches (S,) that lie between two samples: legal ones (set_before: no), and such as are not between legal ones
     (yes); where both begin and end (2, S)."""
-    room = margin(find.arm, found.q)
-    row, k, branch = np.nonzero(turning(room))
+    room = found.room
+    row, k, branch = np.nonzero(found.turns)
     sign = np.sign(room[row, k, branch])
     rows = _Ends(find, row, branch, True)
     every = np.arange(len(row))
@@ -159,7 +159,7 @@ class Places(NamedTuple):
     ends: tuple[Array, Array]  # of these: where the branch ends, and where its limit is crossed
 
 
-def places_of(find: Follower, t: Array, found: Postures) -> Places:
+def places_of(find: Follower, t: Array, found: Samples) -> Places:
     """All ends of some targets, of samples along t.
 
     Where two branches merge both are legal, or none: one that is not at the next sample is for a stretch.

@@ -9,8 +9,8 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric.tolerances import REACH, SOLUTION
 from armkin.inverse.redundant.ends import Changes, hidden_stretches, places_of
-from armkin.inverse.redundant.follower import Follower, Postures, over_a_turn
-from armkin.inverse.redundant.pieces import Pieces, best_samples, motion, runs
+from armkin.inverse.redundant.follower import Follower, Samples, over_a_turn
+from armkin.inverse.redundant.pieces import Pieces, best_samples, holding_none, runs
 from armkin.inverse.tasks.task import distance
 
 SAMPLES = 360  # of a turn of the redundant joint,
@@ -32,12 +32,12 @@ class Followed(NamedTuple):
         """Of some targets; one of which something may be hidden between samples, or without an answer, is asked again:
         all of a nearly stretched arm lie within a degree."""
         t = over_a_turn(SAMPLES * finer)
-        found, hidden = find.along(t)
+        found = find.along(t)
         pieces, short = _pieces(find, t, found), _all_short(find, found)
         if finer == 1:
             near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
             lost = ~found.valid.any(axis=(1, 2)) & near_enough
-            for more, which in ((CLOSER, hidden & ~lost), (FINER, lost)):
+            for more, which in ((CLOSER, found.hidden & ~lost), (FINER, lost)):
                 again = np.flatnonzero(which)
                 each = max(SAMPLES // more, 1)
                 for some in (again[k : k + each] for k in range(0, len(again), each)):
@@ -64,23 +64,24 @@ class Followed(NamedTuple):
         return there.q, there.legal
 
 
-def _pieces(find: Follower, t: Array, found: Postures) -> Pieces:
+def _pieces(find: Follower, t: Array, found: Samples) -> Pieces:
     """All pieces of the curves of some targets, from samples along t."""
     K, B = found.valid.shape[1:]
     h = float(t[1] - t[0])
-    cost = motion(find.arm, found.q, find.near[:, None, None]).transpose(0, 2, 1).reshape(-1, K)
+    cost = found.cost.transpose(0, 2, 1).reshape(-1, K)
     places = places_of(find, t, found)
     hidden, stretch = hidden_stretches(find, t, found)
     some = found.legal.copy()
     some[hidden.row, hidden.k, hidden.branch] = True
     some[places.short.row, places.short.sample(0, K), places.short.branch] = True
     parts = []
-    for legal, good, ends in (
-        (True, found.legal, places.legal),
-        (False, _families_without(found.valid, some), places.there),
-    ):
+    within = some.transpose(0, 2, 1).reshape(-1, K)
+    for legal, good, ends in ((True, found.legal, places.legal), (False, found.valid, places.there)):
         samples = good.transpose(0, 2, 1).reshape(-1, K)
         curve, first, length = runs(samples, np.zeros_like(samples))
+        if not legal:
+            without = holding_none(within, curve, first, length)
+            curve, first, length = curve[without], first[without], length[without]
         row, branch = curve // B, curve % B
         best = best_samples(cost, curve, first, length)
         at = t[first] + best * h
@@ -127,19 +128,7 @@ def _cut(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
     return pieces
 
 
-def _families_without(valid: Bool, some: Bool) -> Bool:
-    """Samples (N, K, B) of families that have no legal posture: pieces between places where a branch is not real."""
-    first = valid & ~np.roll(valid, 1, axis=1)
-    number = np.cumsum(first, axis=1)
-    number = np.where(number == 0, number[:, -1:], number)  # what begins before the turn ends at its end
-    N, K, B = valid.shape
-    legal = np.zeros((N, K + 1, B), bool)
-    row, branch = np.arange(N)[:, None, None], np.arange(B)
-    np.logical_or.at(legal, (row, number, branch), some)
-    return np.asarray(valid & ~legal[row, number, branch])
-
-
-def _all_short(find: Follower, found: Postures) -> Bool:
+def _all_short(find: Follower, found: Samples) -> Bool:
     """Whether no joint moves by REACH along any family of a target (N,), from its samples."""
     together = found.valid
     for shift in range(1, 2 + int(REACH / (2 * np.pi / found.valid.shape[1]))):

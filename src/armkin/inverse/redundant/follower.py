@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,7 +17,7 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric.tolerances import ACCEPTED
-from armkin.inverse.redundant.pieces import turning
+from armkin.inverse.redundant.pieces import margin, motion, turning
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved, moved_entries
 
@@ -34,6 +34,18 @@ class Postures(NamedTuple):
     q: Array
     valid: Bool
     legal: Bool
+
+
+class Samples(NamedTuple):
+    """Answers of targets N at K values of the redundant joint, in the columns of their branches."""
+
+    q: Array  # (N, K, B, n)
+    valid: Bool  # (N, K, B)
+    legal: Bool
+    room: Array  # (N, K, B) of `margin`
+    cost: Array  # (N, K, B) motion from near
+    turns: Bool  # (N, K, B) the limits seem to be crossed, and crossed again, before the next value
+    hidden: Bool  # (N,) branches seem to be there between two values at which they are not
 
 
 @lru_cache(maxsize=64)
@@ -54,6 +66,14 @@ def over_a_turn(count: int) -> Array:
     return np.asarray(-np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count))
 
 
+def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Parts (S, K, ...) one after the other, the samples of a branch side by side in memory, as in the parts."""
+    if len(parts) == 1 or parts[0].ndim == 1:
+        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+    out = np.concatenate([np.moveaxis(part, (0, 1), (-2, -1)) for part in parts], axis=-2)
+    return np.moveaxis(out, (-2, -1), (0, 1))
+
+
 class Follower(NamedTuple):
     """Answers of some targets (N, ...) at any value of the redundant joint; near: (N, n)."""
 
@@ -63,14 +83,13 @@ class Follower(NamedTuple):
     target: Array
     near: Array
 
-    def at(self, rows: NDArray[np.intp], t: Array) -> Postures:
-        """All branches of targets (M,) at values t (M,), each in the column of its index."""
-        return self._legal(rows, self.found(rows, t))
-
     def found(self, rows: NDArray[np.intp], t: Array) -> Array:
-        """Branches (M, B, n), nan where there is none."""
+        """Branches (M, B, n) of targets (M,) at values t (M,), each in the column of its index, nan where there is
+        none."""
         if self.by_formula:
-            return self._by_formula(rows, t)[0]
+            q, missed = self._by_formula(rows, t)
+            np.copyto(q, np.nan, where=~(missed <= ACCEPTED**2)[..., None])
+            return q
         goal = moved(self.arm, self.free, self.target[rows], t)
         s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
         M, B, r = len(t), s.q.shape[1], self.free.joint
@@ -86,7 +105,8 @@ class Follower(NamedTuple):
         return self.free.labelled and self.free.geometry.doubts is None
 
     def _by_formula(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
-        """The same of a closed form, one joint after another in memory; what its candidates miss, squared (M, B)."""
+        """The candidates of a closed form (M, B, n), real or not, one joint after another in memory; what they miss,
+        squared (M, B)."""
         code, axes = _recorded(self.arm, self.free)
         M = len(t)
         joints = [j for j in range(self.arm.n) if j != self.free.joint]
@@ -105,31 +125,36 @@ class Follower(NamedTuple):
             for j, q in zip(joints, values, strict=True):
                 out[j, :, some] = np.broadcast_to(q, shape).reshape(-1, shape[-1])
             missed[:, some] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
-            out[:, :, some][:, missed[:, some] > ACCEPTED**2] = np.nan
         return out.transpose(2, 1, 0), missed.T
 
     def _legal(self, rows: NDArray[np.intp], q: Array) -> Postures:
         """Postures (M, B, n) at their nearest legal copies."""
         valid = ~np.isnan(q[:, :, 0])
         q, legal = nearest_row(self.arm, np.where(valid[:, :, None], q, 0.0), self.near[rows][:, None])
-        q[~valid] = np.nan
+        np.copyto(q, np.nan, where=~valid[:, :, None])
         return Postures(q, valid, legal & valid)
 
-    def along(self, t: Array) -> tuple[Postures, Bool]:
-        """Of every target at all of t (K,): q (N, K, B, n); and whether branches seem to be there between two values of
-        t at which they are not (N,)."""
+    def along(self, t: Array) -> Samples:
+        """Every target at all of t (K,)."""
         N, K = len(self.target), len(t)
-        rows, values = np.repeat(np.arange(N), K), np.tile(t, N)
+        each = max(AT_A_TIME // K, 1) if self.by_formula else N  # targets whose samples stay in the cache
+        parts = [self._sampled(np.arange(k, min(k + each, N)), t) for k in range(0, N, each)]
+        return Samples(*(_joined(column) for column in zip(*parts, strict=True)))
+
+    def _sampled(self, some: NDArray[np.intp], t: Array) -> Samples:
+        """As `along`, some of the targets (S,)."""
+        rows, values = np.repeat(some, len(t)), np.tile(t, len(some))
         if self.by_formula:
             q, missed = self._by_formula(rows, values)
+            np.copyto(q, np.nan, where=~(missed <= ACCEPTED**2)[..., None])
         else:
             q = self.found(rows, values)
             missed = np.full(q.shape[:2], np.nan)
-        found = self._legal(rows, q)
-        B = found.valid.shape[1]
-        q, valid, legal = found.q.reshape(N, K, B, -1), found.valid.reshape(N, K, B), found.legal.reshape(N, K, B)
-        off = np.where(valid, np.nan, -np.sqrt(missed.reshape(N, K, B)))
-        return Postures(q, valid, legal), np.asarray(turning(off).any(axis=(1, 2)))
+        q, valid, legal = self._legal(rows, q)
+        every = q, valid, legal, margin(self.arm, q), motion(self.arm, q, self.near[rows][:, None]), missed
+        q, valid, legal, room, cost, missed = (x.reshape(len(some), len(t), *x.shape[1:]) for x in every)
+        off = np.where(valid, np.nan, -np.sqrt(missed))
+        return Samples(q, valid, legal, room, cost, turning(room), turning(off).any(axis=(1, 2)))
 
     def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Postures:
         """One branch each (M,)."""

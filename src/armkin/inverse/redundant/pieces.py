@@ -77,7 +77,10 @@ def none(n: int) -> Pieces:
 
 def motion(arm: Arm, q: Array, near: Array) -> Array:
     """Sum of |change| from near [deg | mm]: (..., n) -> (...); inf where there is no posture."""
-    total = np.abs(q - near) @ np.where(arm.prismatic, 1.0, 180 / np.pi)
+    total = np.zeros(np.broadcast_shapes(q.shape, near.shape)[:-1])
+    for j, slides in enumerate(arm.prismatic.tolist()):  # joint after joint, as they may stand in memory
+        way = np.abs(q[..., j] - near[..., j])
+        total += way if slides else way * (180 / np.pi)
     return np.where(np.isnan(total), np.inf, total)
 
 
@@ -86,22 +89,27 @@ def runs(good: Bool, new: Bool) -> tuple[Int, Int, Int]:
 
     Returns of each its row, first sample and length. A run of all samples begins at the first one.
     """
-    K = good.shape[1]
-    stops = new | ~good
+    M, K = good.shape
     begins = good & (new | ~np.roll(good, 1, axis=1))
     begins[:, 0] |= (good & ~new).all(axis=1)
-    twice = np.where(np.concatenate([stops, stops], axis=1), np.arange(2 * K), 2 * K)
-    next_stop = np.minimum.accumulate(twice[:, ::-1], axis=1)[:, ::-1]
     row, first = np.nonzero(begins)
-    length = np.minimum(next_stop[row, first + 1] - first, K)
-    return row, first, length
+    stops = np.flatnonzero(new | ~good)
+    # the next stop behind the first sample, or round the end the first one of the row
+    begin, end = np.searchsorted(stops, K * np.arange(M)), np.append(stops, M * K)
+    behind = end[np.searchsorted(stops, K * row + first + 1)]
+    around = end[begin[row]]
+    length = np.where(behind < K * (row + 1), behind, np.where(around < K * (row + 1), around + K, M * K + K))
+    return row, first, np.minimum(length - K * row - first, K)
 
 
 def holding_none(good: Bool, row: Int, first: Int, length: Int) -> Bool:
     """Which runs hold none of the good samples (M, K): (R,); they may go round the end of the last axis."""
-    so_far = np.cumsum(np.tile(good, 2), axis=1)
-    so_far = np.concatenate([np.zeros((len(good), 1), int), so_far], axis=1)
-    return np.asarray(so_far[row, first + length] == so_far[row, first])
+    K = good.shape[1]
+    so_far = np.append(0, np.cumsum(good))
+    begin, end = K * row, K * row + K
+    last = begin + first + length
+    before_end, behind = np.minimum(last, end), begin + np.maximum(last - end, 0)
+    return np.asarray(so_far[before_end] - so_far[begin + first] + so_far[behind] - so_far[begin] == 0)
 
 
 def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
