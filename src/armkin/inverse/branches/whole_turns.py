@@ -138,14 +138,17 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
     if not q.size:
         return out, inside
     for i in range(arm.n):
-        lower, upper = float(arm.lower[i]), float(arm.upper[i])
-        if arm.prismatic[i]:
-            ok: Truth = (q[..., i] >= lower - SLACK) & (q[..., i] <= upper + SLACK)
-        else:
-            principal = wrapped(q[..., i])
-            out[..., i], ok = nearest_copy(principal, near[..., i], lower, upper)
+        out[..., i], ok = nearest_of_joint(arm, i, q[..., i], near[..., i])
         inside &= ok
     return out, inside
+
+
+def nearest_of_joint(arm: Arm, i: int, value: Array, near: Array) -> tuple[Array, Truth]:
+    """`nearest_copy` of values of joint i, of an arm that turns as it is told; a joint that slides has no copies."""
+    lower, upper = float(arm.lower[i]), float(arm.upper[i])
+    if arm.prismatic[i]:
+        return value, (value >= lower - SLACK) & (value <= upper + SLACK)
+    return nearest_copy(wrapped(value), near, lower, upper)
 
 
 def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:

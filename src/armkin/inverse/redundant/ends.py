@@ -6,17 +6,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, NO_ROOM, SAME_END, TINY
 from armkin.inverse.redundant.pieces import Int, golden_section, margin
+from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside
 
 if TYPE_CHECKING:
-    from armkin.inverse.redundant.follower import Follower, Samples
+    from armkin.inverse.redundant.follower import Follower
 
 HALVINGS = 60  # steps to where a branch ends, at most
 SECANTS = 24  # of which the later ones halve
 BACK = 0.1  # of what is left, from past an end to where the branch is there
 MERGING = 0.01  # [rad^2] branches that merge are less than so far apart
+JOINED = 1e-3  # as a part of that at the last sample: just before they do
 PEAK = 12  # steps to where a branch is nearest to its limits, or farthest beyond them
 
 
@@ -39,7 +41,7 @@ class _Ends:
         own = q[index, self.branch[some]]
         if self.of_limits:
             return margin(self.find.arm, own)
-        _, apart = _beside(q, self.branch[some])
+        *_, apart = beside(q, self.branch[some])
         return np.asarray(np.where(np.isnan(own[:, 0]), np.nan, apart))
 
     def between(self, good: Array, bad: Array, before: Array, rooms: tuple[Array, Array, Array]) -> Array:
@@ -83,48 +85,11 @@ class _Ends:
         return out
 
 
-def _beside(q: Array, branch: Int) -> tuple[Array, Array]:
-    """Of branches (M,) among postures (M, B, n) the nearest other one: how far its joints are (M, n), squared (M,)."""
-    index = np.arange(len(q))
-    away = wrapped(q - q[index, branch][:, None])
-    apart = (away**2).sum(axis=2)
-    apart[index, branch] = np.inf
-    apart = np.where(np.isnan(apart), np.inf, apart)
-    nearest = apart.argmin(axis=1)
-    return away[index, nearest], apart[index, nearest]
-
-
-class Changes(NamedTuple):
-    """Between which samples (M,) flags (N, K, B) change, and on which side they are set."""
-
-    row: Int
-    k: Int  # the sample before the change
-    branch: Int
-    set_before: Bool
-
-    @classmethod
-    def of(cls, flags: Bool) -> Changes:
-        row, k, branch = np.nonzero(flags != np.roll(flags, -1, axis=1))
-        return cls(row, k, branch, flags[row, k, branch])
-
-    def some(self, which: Bool) -> Changes:
-        return Changes(self.row[which], self.k[which], self.branch[which], self.set_before[which])
-
-    def sample(self, offset: int, K: int) -> Int:
-        """The sample 0, 1, ... steps from the side where they are set towards the other one; -1: away from it."""
-        return np.asarray(np.where(self.set_before, self.k + offset, self.k + 1 - offset) % K)
-
-    def value(self, offset: int, t: Array) -> Array:
-        """As `sample`, the value of the joint, not less than the first one's if it goes over the end."""
-        return np.asarray(t[self.k] + (t[1] - t[0]) * np.where(self.set_before, offset, 1 - offset))
-
-
-def hidden_stretches(find: Follower, t: Array, found: Samples) -> tuple[Changes, Array]:
+def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, Array]:
     """Stretches (S,) that lie between two samples: legal ones (set_before: no), and such as are not between legal ones
     (yes); where both begin and end (2, S)."""
-    room = found.room
-    row, k, branch = np.nonzero(found.turns)
-    sign = np.sign(room[row, k, branch])
+    row, k, branch, room = turns
+    sign = np.sign(room[:, 0])
     rows = _Ends(find, row, branch, True)
     every = np.arange(len(row))
 
@@ -138,8 +103,7 @@ def hidden_stretches(find: Follower, t: Array, found: Samples) -> tuple[Changes,
     row, k, branch = row[some], k[some], branch[some]
     sign, peak, top = sign[some], peak[some], top[some]
     near = _Ends(find, np.tile(row, 2), np.tile(branch, 2), True)
-    sample = np.concatenate([k, (k + 1) % len(t)])
-    at_sample = room[near.row, sample, near.branch]
+    at_sample = room[some].T.ravel()
     outer, inner = np.concatenate([t[k], t[k] + (t[1] - t[0])]), np.tile(peak, 2)
     inside = np.tile(sign < 0, 2)  # the stretch is the legal one
     good, bad = np.where(inside, inner, outer), np.where(inside, outer, inner)
@@ -149,68 +113,87 @@ def hidden_stretches(find: Follower, t: Array, found: Samples) -> tuple[Changes,
     return Changes(row, k, branch, sign > 0), ends.reshape(2, -1)
 
 
+class Merged(NamedTuple):
+    """Where branches end to be there (G,), in the order of `Gone`, and how far within limits they are then."""
+
+    value: Array
+    room: Array
+
+
+def _merged(find: Follower, t: Array, gone: Gone) -> Merged:
+    """Of two branches that are nearest to each other before both vanish one is asked, if it has joined the other one
+    there."""
+    at, every = gone.at, np.arange(len(gone.twin))
+    good = at.value(0, t)
+    number = {key: i for i, key in enumerate(zip(*(column.tolist() for column in at), strict=True))}
+    whose = zip(at.row.tolist(), at.k.tolist(), gone.twin.tolist(), at.set_before.tolist(), strict=True)
+    twin = np.array([number.get(key, i) for i, key in enumerate(whose)], np.intp)
+    first = np.where((twin < every) & (twin[twin] == every), twin, every)  # which end is asked for each
+    value, room, joined = np.empty(len(every)), np.empty(len(every)), np.zeros(len(every), bool)
+    own = np.flatnonzero(first == every)
+    while len(own):
+        ends = _Ends(find, at.row[own], at.branch[own], False)
+        rooms = gone.apart[own, 0], np.full(len(own), np.nan), gone.apart[own, 1]
+        value[own] = ends.between(good[own], at.value(1, t)[own], at.value(-1, t)[own], rooms)
+        some = np.flatnonzero(~joined & np.isin(first, own))
+        value[some] = value[first[some]]
+        q = find.found(at.row[some], value[some] + np.clip(good[some] - value[some], -BEFORE_MERGING, BEFORE_MERGING))
+        away, _, apart = beside(q, at.branch[some])
+        mine = q[np.arange(len(some)), at.branch[some]]
+        there = ~np.isnan(mine[:, 0])
+        middle = margin(find.arm, mine + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away))
+        room[some] = np.where(there, middle, gone.room[some])
+        joined[some] = (first[some] == some) | (there & (apart <= JOINED * gone.apart[some, 0]))
+        own = some[~joined[some]]
+        first[own] = own
+    return Merged(value, room)
+
+
 class Places(NamedTuple):
-    """Where curves end: the values at which branches of samples (N, K, B) end to be there, and to be legal, before the
-    sample k + 1, or begin to; nan where nothing changes. And legal stretches that hold no sample."""
+    """Where curves end: the values at which branches end to be there, and to be legal, or begin to, of all changes."""
 
     there: Array
     legal: Array
-    short: Changes  # the ends of branches that they lie at
+    short: Changes  # the ends of branches that legal stretches lie at that hold no sample
     ends: tuple[Array, Array]  # of these: where the branch ends, and where its limit is crossed
 
 
-def places_of(find: Follower, t: Array, found: Samples) -> Places:
+def places_of(find: Follower, t: Array, found: Seen) -> Places:
     """All ends of some targets, of samples along t.
 
     Where two branches merge both are legal, or none: one that is not at the next sample is for a stretch.
     """
-    K, arm = len(t), find.arm
-    gone = Changes.of(found.valid)
-
-    def at(of: Changes, offset: int) -> Array:
-        return np.asarray(found.q[of.row, of.sample(offset, K)])
-
-    ends = _Ends(find, gone.row, gone.branch, False)
-    every = np.arange(len(gone.row))
-    good, bad = gone.value(0, t), gone.value(1, t)
-    rooms = ends.rooms(every, at(gone, 0)), np.full(len(every), np.nan), ends.rooms(every, at(gone, -1))
-    merged = ends.between(good, bad, gone.value(-1, t), rooms)
-    q = find.found(gone.row, merged + np.clip(good - merged, -BEFORE_MERGING, BEFORE_MERGING))
-    away, apart = _beside(q, gone.branch)
-    own = q[every, gone.branch] + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away)
-    room = margin(arm, np.where(np.isnan(own), at(gone, 0)[every, gone.branch], own))
-    there = np.full(found.valid.shape, np.nan)
-    number = np.zeros(found.valid.shape, np.intp)
-    place = gone.row, gone.k, gone.branch
-    there[place], number[place] = merged, every
-
-    illegal = Changes.of(found.legal)
-    which = number[illegal.row, illegal.k, illegal.branch]
-    beside = ~found.valid[illegal.row, illegal.sample(1, K), illegal.branch]  # the branch ends there, too
-    to_end = beside & (room[which] >= 0.0) if len(every) else beside
-    legal = np.full(found.valid.shape, np.nan)
-    done = illegal.some(to_end)
-    legal[done.row, done.k, done.branch] = merged[which[to_end]]
-    crossing, which, beside = illegal.some(~to_end), which[~to_end], beside[~to_end]
-    short = (room >= 0.0) & ~found.legal[gone.row, gone.sample(0, K), gone.branch]
-    lone = gone.some(short)
-    row, branch = np.concatenate([crossing.row, lone.row]), np.concatenate([crossing.branch, lone.branch])
-    ends = _Ends(find, row, branch, True)
-
-    def margins(of: Changes, offset: int) -> Array:
-        return margin(arm, at(of, offset)[np.arange(len(of.row)), of.branch])
-
-    far, outside = crossing.value(1, t), margins(crossing, 1)
-    if len(every):
-        far, outside = np.where(beside, merged[which], far), np.where(beside, room[which], outside)
-    good = np.concatenate([crossing.value(0, t), merged[short]])
-    bad = np.concatenate([far, lone.value(0, t)])
+    gone, illegal = found.gone.at, found.crossed.at
+    merged, room = _merged(find, t, found.gone)
+    inside, outside = found.crossed.rooms.T
+    # which of the branches that are not legal at the next sample end there, too, and where
+    ending = np.isnan(outside)
+    which = np.zeros(len(ending), np.intp)
+    which[ending] = number_of(gone, illegal.row[ending], illegal.k[ending], illegal.branch[ending], len(t))
+    if len(gone.row):
+        outside = np.where(ending, room[which], outside)
+    to_end = ending & (outside >= 0.0)
+    legal = np.empty(len(ending))
+    legal[to_end] = merged[which[to_end]]
+    crossing, which = illegal.some(~to_end), which[~to_end]
+    lone = (room >= 0.0) & ~found.gone.legal
+    short = gone.some(lone)
+    row, branch = np.concatenate([crossing.row, short.row]), np.concatenate([crossing.branch, short.branch])
+    far = crossing.value(1, t)
+    if len(gone.row):
+        far = np.where(ending[~to_end], merged[which], far)
+    good, bad = np.concatenate([crossing.value(0, t), merged[lone]]), np.concatenate([far, short.value(0, t)])
     rooms = (
-        np.concatenate([margins(crossing, 0), room[short]]),
-        np.concatenate([outside, margins(lone, 0)]),
+        np.concatenate([inside[~to_end], room[lone]]),
+        np.concatenate([outside[~to_end], found.gone.room[lone]]),
         np.full(len(row), np.nan),
     )
-    crossed = ends.between(good, bad, good, rooms)
-    count = len(crossing.row)
-    legal[crossing.row, crossing.k, crossing.branch] = crossed[:count]
-    return Places(there, legal, lone, (merged[short], crossed[count:]))
+    crossed = _Ends(find, row, branch, True).between(good, bad, good, rooms)
+    legal[~to_end] = crossed[: len(crossing.row)]
+    return Places(merged, legal, short, (merged[lone], crossed[len(crossing.row) :]))
+
+
+def number_of(changes: Changes, row: Int, k: Int, branch: Int, K: int) -> Int:
+    """Which of changes, in their order, are those behind samples k (M,) of K; of some that are among them."""
+    B = 1 + int(max(changes.branch.max(initial=0), branch.max(initial=0)))
+    return np.searchsorted((changes.row * K + changes.k) * B + changes.branch, (row * K + k) * B + branch)

@@ -39,7 +39,7 @@ from armkin.model.limits import outside
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-AT_ONCE = 48_000  # targets of the other joints solved together
+AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 64  # targets whose arm angles are worked on together
 TRACED = 24  # and whose curves are traced together
 FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free

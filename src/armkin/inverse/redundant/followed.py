@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.numeric.tolerances import REACH, SOLUTION
-from armkin.inverse.redundant.ends import Changes, hidden_stretches, places_of
-from armkin.inverse.redundant.follower import Follower, Samples, over_a_turn
-from armkin.inverse.redundant.pieces import Pieces, best_samples, holding_none, runs
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric.tolerances import SOLUTION
+from armkin.inverse.redundant.ends import hidden_stretches, number_of, places_of
+from armkin.inverse.redundant.follower import Follower, over_a_turn
+from armkin.inverse.redundant.pieces import Int, Pieces
+from armkin.inverse.redundant.samples import Changes, Runs, Seen, seen
 from armkin.inverse.tasks.task import distance
 
 SAMPLES = 360  # of a turn of the redundant joint,
@@ -32,11 +33,11 @@ class Followed(NamedTuple):
         """Of some targets; one of which something may be hidden between samples, or without an answer, is asked again:
         all of a nearly stretched arm lie within a degree."""
         t = over_a_turn(SAMPLES * finer)
-        found = find.along(t)
-        pieces, short = _pieces(find, t, found), _all_short(find, found)
+        found = seen(find, t)
+        pieces, short = _pieces(find, t, found), found.short
         if finer == 1:
             near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
-            lost = ~found.valid.any(axis=(1, 2)) & near_enough
+            lost = found.lost & near_enough
             for more, which in ((CLOSER, found.hidden & ~lost), (FINER, lost)):
                 again = np.flatnonzero(which)
                 each = max(SAMPLES // more, 1)
@@ -64,45 +65,48 @@ class Followed(NamedTuple):
         return there.q, there.legal
 
 
-def _pieces(find: Follower, t: Array, found: Samples) -> Pieces:
+def _pieces(find: Follower, t: Array, found: Seen) -> Pieces:
     """All pieces of the curves of some targets, from samples along t."""
-    K, B = found.valid.shape[1:]
-    h = float(t[1] - t[0])
-    cost = found.cost.transpose(0, 2, 1).reshape(-1, K)
+    K = len(t)
     places = places_of(find, t, found)
-    hidden, stretch = hidden_stretches(find, t, found)
-    some = found.legal.copy()
-    some[hidden.row, hidden.k, hidden.branch] = True
-    some[places.short.row, places.short.sample(0, K), places.short.branch] = True
-    parts = []
-    within = some.transpose(0, 2, 1).reshape(-1, K)
-    for legal, good, ends in ((True, found.legal, places.legal), (False, found.valid, places.there)):
-        samples = good.transpose(0, 2, 1).reshape(-1, K)
-        curve, first, length = runs(samples, np.zeros_like(samples))
-        if not legal:
-            without = holding_none(within, curve, first, length)
-            curve, first, length = curve[without], first[without], length[without]
-        row, branch = curve // B, curve % B
-        best = best_samples(cost, curve, first, length)
-        at = t[first] + best * h
-        a, b = ends[row, first - 1, branch], ends[row, (first + length - 1) % K, branch]
-        a, b = at - (at - a) % (2 * np.pi), at + (b - at) % (2 * np.pi)
-        all_round = length == K
-        a, b = np.where(all_round, -np.pi, a), np.where(all_round, np.pi, b)
-        low, high = (np.where(all_round, beside, np.clip(beside, a, b)) for beside in (at - h, at + h))
-        start = found.q[row, (first + best) % K, branch]
-        parts.append(Pieces(row, branch, np.full(len(row), legal), a, b, a, b, low, at, high, start))
+    hidden, stretch = hidden_stretches(find, t, found.turns)
     gaps = hidden.set_before
+    more, short = hidden.some(~gaps), places.short
+    parts = [_of_runs(t, found.legal, True, found.crossed.at, places.legal)]
+    sample = np.append(hidden.k, short.sample(0, K))
+    held = _holding(found.there, np.append(hidden.row, short.row), sample, np.append(hidden.branch, short.branch), K)
+    parts.append(_of_runs(t, found.there, False, found.gone.at, places.there).of(~(found.there.within | held)))
     parts[0] = _cut(find, parts[0], hidden.some(gaps), stretch[:, gaps])
-    more = hidden.some(~gaps)
-    row, branch = np.append(places.short.row, more.row), np.append(places.short.branch, more.branch)
+    row, branch = np.append(short.row, more.row), np.append(short.branch, more.branch)
     if len(row):
         a, b = np.concatenate([np.sort(places.ends, axis=0), stretch[:, ~gaps]], axis=1)
         middle = 0.5 * (a + b)
-        there = find.one(row, branch, middle)
-        short = Pieces(row, branch, there.legal, a, b, a, b, a, middle, b, there.q)
-        parts.append(short.of(there.legal))
+        one = find.one(row, branch, middle)
+        tiny = Pieces(row, branch, one.legal, a, b, a, b, a, middle, b, one.q)
+        parts.append(tiny.of(one.legal))
     return Pieces(*(np.concatenate(pair) for pair in zip(*parts, strict=True)))
+
+
+def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -> Pieces:
+    """The pieces that hold runs of samples along t (K,); ends: where changes are."""
+    K, h = len(t), float(t[1] - t[0])
+    at = t[runs.first] + runs.best * h
+    a, b, low, high = np.full(len(at), -np.pi), np.full(len(at), np.pi), at - h, at + h
+    some = np.flatnonzero(runs.length < K)
+    row, first, branch, middle = runs.row[some], runs.first[some], runs.branch[some], at[some]
+    begin = ends[number_of(changes, row, (first - 1) % K, branch, K)]
+    end = ends[number_of(changes, row, (first + runs.length[some] - 1) % K, branch, K)]
+    a[some], b[some] = middle - (middle - begin) % (2 * np.pi), middle + (end - middle) % (2 * np.pi)
+    low[some], high[some] = np.clip(low[some], a[some], b[some]), np.clip(high[some], a[some], b[some])
+    return Pieces(runs.row, runs.branch, np.full(len(at), legal), a, b, a, b, low, at, high, runs.start)
+
+
+def _holding(runs: Runs, row: Int, k: Int, branch: Int, K: int) -> Bool:
+    """Which runs hold one of the samples k (M,), of K, of branches (M,) of targets (M,)."""
+    out = np.zeros(len(runs.row), bool)
+    for one, sample, own in zip(row.tolist(), k.tolist(), branch.tolist(), strict=True):
+        out |= (runs.row == one) & (runs.branch == own) & ((sample - runs.first) % K < runs.length)
+    return out
 
 
 def _cut(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
@@ -126,17 +130,3 @@ def _cut(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
             pieces = Pieces(*(np.concatenate(column) for column in zip(*parts, strict=True)))
             break
     return pieces
-
-
-def _all_short(find: Follower, found: Samples) -> Bool:
-    """Whether no joint moves by REACH along any family of a target (N,), from its samples."""
-    together = found.valid
-    for shift in range(1, 2 + int(REACH / (2 * np.pi / found.valid.shape[1]))):
-        together = together & np.roll(found.valid, -shift, axis=1)
-    short = np.asarray(found.valid.any(axis=(1, 2)) & ~together.any(axis=(1, 2)))
-    for k in np.flatnonzero(short).tolist():
-        q, valid = found.q[k], found.valid[k]
-        step = np.abs(wrapped(np.roll(q, -1, axis=0) - q))
-        way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
-        short[k] = 2.0 * way.max(initial=0.0) < REACH
-    return short

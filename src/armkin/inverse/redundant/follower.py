@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.formula.trace import StraightLineCode
 from armkin.inverse.answers.solutions import Solutions
-from armkin.inverse.branches.whole_turns import nearest_row
+from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric.tolerances import ACCEPTED
-from armkin.inverse.redundant.pieces import margin, motion, turning
+from armkin.inverse.redundant.pieces import motion_of_joint, within_limits
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved, moved_entries
 
@@ -36,16 +36,25 @@ class Postures(NamedTuple):
     legal: Bool
 
 
-class Samples(NamedTuple):
-    """Answers of targets N at K values of the redundant joint, in the columns of their branches."""
+class Sampled(NamedTuple):
+    """Answers of targets S at K values of the redundant joint, in the columns of their branches."""
 
-    q: Array  # (N, K, B, n)
-    valid: Bool  # (N, K, B)
+    values: list[Array]  # of each joint, its branch axes, perhaps of length 1, before all samples (S K,)
+    axes: tuple[int, ...]  # lengths of the branch axes
+    valid: Bool  # (S, K, B)
     legal: Bool
-    room: Array  # (N, K, B) of `margin`
-    cost: Array  # (N, K, B) motion from near
-    turns: Bool  # (N, K, B) the limits seem to be crossed, and crossed again, before the next value
-    hidden: Bool  # (N,) branches seem to be there between two values at which they are not
+    room: Array  # (S, K, B) of `margin`
+    cost: Array  # (S, K, B) motion from near
+    missed: Array  # (S, K, B) squared, by candidates of a closed form; else nan
+
+    def postures(self, row: NDArray[np.intp], k: NDArray[np.intp]) -> Array:
+        """All branches (M, B, n) at samples k (M,) of targets (M,), nan where there is none."""
+        some = row * self.valid.shape[1] + k
+        shape = math.prod(self.axes), len(some)
+        columns = [np.broadcast_to(v[..., some], (*self.axes, len(some))).reshape(shape) for v in self.values]
+        q = np.stack(columns).transpose(2, 1, 0)
+        np.copyto(q, np.nan, where=~self.valid[row, k][:, :, None])
+        return q
 
 
 @lru_cache(maxsize=64)
@@ -64,14 +73,6 @@ def _recorded(arm: Arm, free: Redundancy) -> tuple[StraightLineCode, tuple[int, 
 def over_a_turn(count: int) -> Array:
     """Values of a joint (count,) [rad], evenly over a turn, half a step from its ends."""
     return np.asarray(-np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count))
-
-
-def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Parts (S, K, ...) one after the other, the samples of a branch side by side in memory, as in the parts."""
-    if len(parts) == 1 or parts[0].ndim == 1:
-        return np.concatenate(parts) if len(parts) > 1 else parts[0]
-    out = np.concatenate([np.moveaxis(part, (0, 1), (-2, -1)) for part in parts], axis=-2)
-    return np.moveaxis(out, (-2, -1), (0, 1))
 
 
 class Follower(NamedTuple):
@@ -107,25 +108,29 @@ class Follower(NamedTuple):
     def _by_formula(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
         """The candidates of a closed form (M, B, n), real or not, one joint after another in memory; what they miss,
         squared (M, B)."""
-        code, axes = _recorded(self.arm, self.free)
-        M = len(t)
-        joints = [j for j in range(self.arm.n) if j != self.free.joint]
-        goal = [np.asarray(x) for x in entries(self.free.task, self.target)]
-        out = np.empty((self.arm.n, math.prod(axes), M))
-        out[self.free.joint] = t
+        axes = _recorded(self.arm, self.free)[1]
+        out = np.empty((self.arm.n, math.prod(axes), len(t)))
         missed = np.empty(out.shape[1:])
         room: list[NDArray[Any]] = []
-        for start in range(0, M, AT_A_TIME):
-            some = slice(start, min(start + AT_A_TIME, M))
+        for start in range(0, len(t), AT_A_TIME):
+            some = slice(start, min(start + AT_A_TIME, len(t)))
             shape = (*axes, some.stop - start)
-            if not room or some.stop - start != AT_A_TIME:
-                room = code.workspace(some.stop - start)
-            row, value = rows[some], t[some]
-            *values, miss, _, _ = code.run([*(x[row] for x in goal), np.cos(value), np.sin(value)], room)
-            for j, q in zip(joints, values, strict=True):
+            *values, miss, room = self._candidates(rows[some], t[some], room)
+            for j, q in enumerate(values):
                 out[j, :, some] = np.broadcast_to(q, shape).reshape(-1, shape[-1])
             missed[:, some] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
         return out.transpose(2, 1, 0), missed.T
+
+    def _candidates(self, rows: NDArray[np.intp], t: Array, room: list[NDArray[Any]]) -> list[Any]:
+        """The values of all joints and what they miss, squared, on their own branch axes before targets (M,); the
+        workspace that they stand in, room if that is one for as many."""
+        code, _ = _recorded(self.arm, self.free)
+        if not room or room[0].shape[-1] != len(t):
+            room = code.workspace(len(t))
+        goal = [np.asarray(x)[rows] for x in entries(self.free.task, self.target)]
+        *values, miss, _, _ = code.run([*goal, np.cos(t), np.sin(t)], room)
+        values.insert(self.free.joint, t)
+        return [*values, miss, room]
 
     def _legal(self, rows: NDArray[np.intp], q: Array) -> Postures:
         """Postures (M, B, n) at their nearest legal copies."""
@@ -134,27 +139,26 @@ class Follower(NamedTuple):
         np.copyto(q, np.nan, where=~valid[:, :, None])
         return Postures(q, valid, legal & valid)
 
-    def along(self, t: Array) -> Samples:
-        """Every target at all of t (K,)."""
-        N, K = len(self.target), len(t)
-        each = max(AT_A_TIME // K, 1) if self.by_formula else N  # targets whose samples stay in the cache
-        parts = [self._sampled(np.arange(k, min(k + each, N)), t) for k in range(0, N, each)]
-        return Samples(*(_joined(column) for column in zip(*parts, strict=True)))
-
-    def _sampled(self, some: NDArray[np.intp], t: Array) -> Samples:
-        """As `along`, some of the targets (S,)."""
+    def sampled(self, some: NDArray[np.intp], t: Array) -> Sampled:
+        """Some of the targets (S,) at all of t (K,)."""
         rows, values = np.repeat(some, len(t)), np.tile(t, len(some))
         if self.by_formula:
-            q, missed = self._by_formula(rows, values)
-            np.copyto(q, np.nan, where=~(missed <= ACCEPTED**2)[..., None])
+            *columns, miss, _ = self._candidates(rows, values, [])
+            axes, there = _recorded(self.arm, self.free)[1], miss <= ACCEPTED**2
         else:
             q = self.found(rows, values)
-            missed = np.full(q.shape[:2], np.nan)
-        q, valid, legal = self._legal(rows, q)
-        every = q, valid, legal, margin(self.arm, q), motion(self.arm, q, self.near[rows][:, None]), missed
-        q, valid, legal, room, cost, missed = (x.reshape(len(some), len(t), *x.shape[1:]) for x in every)
-        off = np.where(valid, np.nan, -np.sqrt(missed))
-        return Samples(q, valid, legal, room, cost, turning(room), turning(off).any(axis=(1, 2)))
+            columns, axes = list(q.T), q.shape[1:2]
+            there, miss = ~np.isnan(columns[0]), np.full(columns[0].shape, np.nan)
+        shape, near = (*axes, len(rows)), self.near[rows].T
+        legal, cost, room = there, np.zeros(()), np.full(shape, 2 * np.pi)
+        for j in sorted(range(len(columns)), key=lambda j: columns[j].size):  # those on few branch axes first
+            columns[j], ok = nearest_of_joint(self.arm, j, columns[j], near[j])
+            legal, cost = legal & ok, cost + motion_of_joint(self.arm, j, columns[j], near[j])
+            within_limits(self.arm, j, columns[j], room)
+        room = np.where(there, room, np.nan)
+        every = (there, legal, room, np.where(there, cost, np.inf), miss)
+        dense = (np.broadcast_to(x, shape).reshape(-1, len(some), len(t)).transpose(1, 2, 0) for x in every)
+        return Sampled(columns, axes, *dense)
 
     def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Postures:
         """One branch each (M,)."""

@@ -78,10 +78,15 @@ def none(n: int) -> Pieces:
 def motion(arm: Arm, q: Array, near: Array) -> Array:
     """Sum of |change| from near [deg | mm]: (..., n) -> (...); inf where there is no posture."""
     total = np.zeros(np.broadcast_shapes(q.shape, near.shape)[:-1])
-    for j, slides in enumerate(arm.prismatic.tolist()):  # joint after joint, as they may stand in memory
-        way = np.abs(q[..., j] - near[..., j])
-        total += way if slides else way * (180 / np.pi)
+    for j in range(arm.n):  # joint after joint, as they may stand in memory
+        total += motion_of_joint(arm, j, q[..., j], near[..., j])
     return np.where(np.isnan(total), np.inf, total)
+
+
+def motion_of_joint(arm: Arm, j: int, value: Array, near: Array) -> Array:
+    """|change| of joint j from near [deg | mm]."""
+    way = np.abs(value - near)
+    return way if arm.prismatic[j] else way * (180 / np.pi)
 
 
 def runs(good: Bool, new: Bool) -> tuple[Int, Int, Int]:
@@ -128,13 +133,18 @@ def margin(arm: Arm, q: Array) -> Array:
     """How far postures (..., n) are within the limits, negative beyond them (...) [rad | mm]; at most a turn."""
     room = np.where(np.isnan(q[..., 0]), np.nan, 2 * np.pi)
     for j in range(arm.n):
-        lower, upper = float(arm.lower[j]), float(arm.upper[j])
-        if not np.isfinite(lower) or not np.isfinite(upper) or (not arm.prismatic[j] and upper - lower >= 2 * np.pi):
-            continue
-        off = q[..., j] - 0.5 * (lower + upper)
-        off = np.abs(off if arm.prismatic[j] else wrapped(off))
-        np.minimum(room, 0.5 * (upper - lower) - off, out=room)
+        within_limits(arm, j, q[..., j], room)
     return room
+
+
+def within_limits(arm: Arm, j: int, value: Array, room: Array) -> None:
+    """How far values of joint j are within its limits, into room where that is less."""
+    lower, upper = float(arm.lower[j]), float(arm.upper[j])
+    if not np.isfinite(lower) or not np.isfinite(upper) or (not arm.prismatic[j] and upper - lower >= 2 * np.pi):
+        return
+    off = value - 0.5 * (lower + upper)
+    off = np.abs(off if arm.prismatic[j] else wrapped(off))
+    np.minimum(room, 0.5 * (upper - lower) - off, out=room)
 
 
 def turning(values: Array) -> Bool:

@@ -1,0 +1,177 @@
+"""What samples along the redundant joint show of some targets: runs of answers, and between which samples they change.
+
+All that stands of every sample is asked for a few targets at a time, while it is in the cache; what is kept is little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.inverse.numeric.tolerances import REACH
+from armkin.inverse.redundant.pieces import Int, best_samples, holding_none, runs, turning
+
+if TYPE_CHECKING:
+    from armkin.inverse.redundant.follower import Follower, Sampled
+
+AT_A_TIME = 8_000  # samples: they stay in the cache
+
+
+class Changes(NamedTuple):
+    """Between which samples of branches flags change, and on which side they are set."""
+
+    row: Int
+    k: Int  # the sample before the change
+    branch: Int
+    set_before: Bool
+
+    @classmethod
+    def of(cls, flags: Bool) -> Changes:
+        """All of flags (N, K, B)."""
+        row, k, branch = np.nonzero(flags != np.roll(flags, -1, axis=1))
+        return cls(row, k, branch, flags[row, k, branch])
+
+    def some(self, which: Bool | Int) -> Changes:
+        return Changes(self.row[which], self.k[which], self.branch[which], self.set_before[which])
+
+    def sample(self, offset: int, K: int) -> Int:
+        """The sample 0, 1, ... steps from the side where they are set towards the other one; -1: away from it."""
+        return np.asarray(np.where(self.set_before, self.k + offset, self.k + 1 - offset) % K)
+
+    def value(self, offset: int, t: Array) -> Array:
+        """As `sample`, the value of the joint, not less than the first one's if it goes over the end."""
+        return np.asarray(t[self.k] + (t[1] - t[0]) * np.where(self.set_before, offset, 1 - offset))
+
+
+class Gone(NamedTuple):
+    """Where branches end to be there (G,)."""
+
+    at: Changes
+    twin: Int  # the branch that is nearest at the last sample
+    apart: Array  # (G, 2) its squared distance there, and a sample before
+    room: Array  # to the limits there
+    legal: Bool
+
+
+class Crossed(NamedTuple):
+    """Where branches end to be legal (C,)."""
+
+    at: Changes
+    rooms: Array  # (C, 2) to the limits at the samples before and behind; nan where the branch is not there
+
+
+class Turns(NamedTuple):
+    """Between which samples limits may be crossed and crossed back (T,)."""
+
+    row: Int
+    k: Int
+    branch: Int
+    rooms: Array  # (T, 2) to the limits at both
+
+
+class Runs(NamedTuple):
+    """Samples one after the other at which a branch is there, or legal (R,)."""
+
+    row: Int
+    branch: Int
+    first: Int
+    length: Int
+    best: Int  # the least costly sample, from the first one
+    start: Array  # (R, n) its posture
+    within: Bool  # whether one of them is legal
+
+
+class Seen(NamedTuple):
+    """All that samples of N targets show."""
+
+    gone: Gone
+    crossed: Crossed
+    turns: Turns
+    legal: Runs
+    there: Runs
+    hidden: Bool  # (N,) branches seem to be there between two values at which they are not
+    lost: Bool  # (N,) none is there at any of them
+    short: Bool  # (N,) no joint moves by REACH along any
+
+
+def seen(find: Follower, t: Array) -> Seen:
+    """What samples of all targets along t (K,) show."""
+    N = len(find.target)
+    each = max(AT_A_TIME // len(t), 1) if find.by_formula else max(N, 1)
+    some = (np.arange(k, min(k + each, N)) for k in range(0, max(N, 1), each))
+    found: Seen = _together([_seen(find.sampled(rows, t), rows) for rows in some])
+    return found
+
+
+def _together(parts: Sequence[Any]) -> Any:
+    """Parts one after the other."""
+    if isinstance(parts[0], tuple):
+        return type(parts[0])(*(_together(column) for column in zip(*parts, strict=True)))
+    return np.concatenate(parts)
+
+
+def _seen(found: Sampled, rows: Int) -> Seen:
+    """What samples of some targets, rows (S,) of all, show."""
+    valid, legal, room = found.valid, found.legal, found.room
+    gone, crossed = Changes.of(valid), Changes.of(legal)
+    K, every = valid.shape[1], np.arange(len(gone.row))
+    now, before = gone.sample(0, K), gone.sample(-1, K)
+    twin, apart = beside(found.postures(gone.row, now), gone.branch)[1:]
+    other = found.postures(gone.row, before)
+    earlier = np.where(np.isnan(other[every, gone.branch, 0]), np.nan, beside(other, gone.branch)[2])
+    own = gone.row, now, gone.branch
+    rooms = [room[crossed.row, crossed.sample(k, K), crossed.branch] for k in (0, 1)]
+    row, k, branch = turns = np.nonzero(turning(room))
+    off = np.where(valid, np.nan, -np.sqrt(found.missed))
+    return Seen(
+        Gone(gone._replace(row=rows[gone.row]), twin, np.stack([apart, earlier], axis=1), room[own], legal[own]),
+        Crossed(crossed._replace(row=rows[crossed.row]), np.stack(rooms, axis=1)),
+        Turns(rows[row], k, branch, np.stack([room[turns], room[row, (k + 1) % K, branch]], axis=1)),
+        _runs(found, legal, rows),
+        _runs(found, valid, rows),
+        np.asarray(turning(off).any(axis=(1, 2))),
+        np.asarray(~valid.any(axis=(1, 2))),
+        _all_short(found),
+    )
+
+
+def beside(q: Array, branch: Int) -> tuple[Array, Int, Array]:
+    """Of branches (M,) among postures (M, B, n) the nearest other one: how far its joints are (M, n), which one (M,),
+    squared (M,)."""
+    index = np.arange(len(q))
+    away = wrapped(q - q[index, branch][:, None])
+    apart = (away**2).sum(axis=2)
+    apart[index, branch] = np.inf
+    apart = np.where(np.isnan(apart), np.inf, apart)
+    nearest = apart.argmin(axis=1)
+    return away[index, nearest], nearest, apart[index, nearest]
+
+
+def _runs(found: Sampled, good: Bool, rows: Int) -> Runs:
+    """Those of good samples (S, K, B)."""
+    K, B = good.shape[1:]
+    samples, legal = (flags.transpose(0, 2, 1).reshape(-1, K) for flags in (good, found.legal))
+    cost = found.cost.transpose(0, 2, 1).reshape(-1, K)
+    curve, first, length = runs(samples, np.zeros_like(samples))
+    best = best_samples(cost, curve, first, length) if len(curve) else first
+    row, branch = curve // B, curve % B
+    start = found.postures(row, (first + best) % K)[np.arange(len(row)), branch]
+    return Runs(rows[row], branch, first, length, best, start, ~holding_none(legal, curve, first, length))
+
+
+def _all_short(found: Sampled) -> Bool:
+    """Whether no joint moves by REACH along any family of a target (S,)."""
+    together = found.valid
+    for shift in range(1, 2 + int(REACH / (2 * np.pi / found.valid.shape[1]))):
+        together = together & np.roll(found.valid, -shift, axis=1)
+    short = np.asarray(found.valid.any(axis=(1, 2)) & ~together.any(axis=(1, 2)))
+    for k in np.flatnonzero(short).tolist():
+        K, valid = found.valid.shape[1], found.valid[k]
+        q = found.postures(np.full(K, k), np.arange(K))
+        step = np.abs(wrapped(np.roll(q, -1, axis=0) - q))
+        way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
+        short[k] = 2.0 * way.max(initial=0.0) < REACH
+    return short
