@@ -31,18 +31,18 @@ class _Ends:
     def __init__(self, find: Follower, row: Int, branch: Int, of_limits: bool) -> None:
         self.find, self.row, self.branch, self.of_limits = find, row, branch, of_limits
 
-    def rooms(self, some: Int, q: Array) -> Array:
-        """How good ends (M,) are at postures q (M, B, n) of all branches: positive where they are, linear about
-        the end, nan where the branch is not there.
+    def rooms(self, some: Int, value: Array) -> Array:
+        """How good ends (M,) are at values (M,): positive where they are, linear about the end, nan where the branch is
+        not there.
 
         The way to the limits [rad], or the squared distance of the nearest other branch.
         """
-        index = np.arange(len(some))
-        own = q[index, self.branch[some]]
+        row, branch = self.row[some], self.branch[some]
         if self.of_limits:
-            return margin(self.find.arm, own)
-        *_, apart = beside(q, self.branch[some])
-        return np.asarray(np.where(np.isnan(own[:, 0]), np.nan, apart))
+            return margin(self.find.arm, self.find.own(row, branch, value))
+        q = self.find.found(row, value)
+        *_, apart = beside(q, branch)
+        return np.asarray(np.where(np.isnan(q[np.arange(len(some)), branch, 0]), np.nan, apart))
 
     def between(self, good: Array, bad: Array, before: Array, rooms: tuple[Array, Array, Array]) -> Array:
         """Where each ends (M,): good and bad are the values on its sides, before lies beyond good.
@@ -68,7 +68,7 @@ class _Ends:
             going, guess, inside = going[left], guess[left], inside[left]
             if not len(going):
                 break
-            room = self.rooms(going, self.find.found(self.row[going], guess))
+            room = self.rooms(going, guess)
             left = ~(np.abs(room) < NO_ROOM)
             going, guess, inside, room = going[left], guess[left], inside[left], room[left]
             better = room > 0
@@ -95,7 +95,7 @@ def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, A
 
     def depth(value: Array) -> Array:
         """Below zero: such a stretch."""
-        return sign * rows.rooms(every, find.found(row, value))
+        return sign * rows.rooms(every, value)
 
     _, _, peak, least = golden_section(depth, t[k], t[k] + (t[1] - t[0]), PEAK)
     top = -least

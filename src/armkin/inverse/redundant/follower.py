@@ -160,7 +160,23 @@ class Follower(NamedTuple):
         dense = (np.broadcast_to(x, shape).reshape(-1, len(some), len(t)).transpose(1, 2, 0) for x in every)
         return Sampled(columns, axes, *dense)
 
+    def own(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Array:
+        """One branch each (M, n), as `found`."""
+        if not self.by_formula:
+            return np.asarray(self.found(rows, t)[np.arange(len(rows)), branch])
+        *columns, miss, _ = self._candidates(rows, t, [])
+        place = np.unravel_index(branch, _recorded(self.arm, self.free)[1])
+
+        def picked(values: Array) -> Array:
+            axes = values.shape[:-1]
+            at = (k if size > 1 else 0 for k, size in zip(place[len(place) - len(axes) :], axes, strict=True))
+            return np.asarray(values[*at, np.arange(len(t))])
+
+        q = np.stack([picked(values) for values in columns]).T
+        q[~(picked(miss) <= ACCEPTED**2)] = np.nan
+        return q
+
     def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Postures:
-        """One branch each (M,)."""
-        one = self._legal(rows, self.found(rows, t)[np.arange(len(rows)), branch][:, None])
+        """One branch each (M,), at its nearest legal copy."""
+        one = self._legal(rows, self.own(rows, branch, t)[:, None])
         return Postures(one.q[:, 0], one.valid[:, 0], one.legal[:, 0])
