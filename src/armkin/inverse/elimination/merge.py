@@ -91,7 +91,7 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
         if near.size == 0:
             continue
         first, second, step, distance = first[near], second[near], step[near], distance[near]
-        target = np.ascontiguousarray(np.moveaxis(goal[pose[first], :3], 0, -1))
+        target = np.ascontiguousarray(goal[pose[first], :3].transpose(1, 2, 0))
         _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
         blur = np.maximum(HALFWAY, 4 * np.maximum(residual[first], residual[second]))
         # How far off an answer may be itself: its next Newton step, along a curve of answers that all but solve it.

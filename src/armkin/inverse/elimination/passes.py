@@ -69,7 +69,8 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
     own = (np.abs(away) < OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
     # unless several solutions share the middle joints: these are one root
     some = np.flatnonzero(strayed & own)
-    own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
+    if some.size:
+        own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
     strayed &= ~own
     unsettled[seed.pose[missed | unsure | strayed]] = True
     touching[seed.pose[touch | (done.residual > ELIMINATED) & (done.residual < 10 * GRAZING)]] = True
@@ -105,7 +106,9 @@ def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array) -> roots.Seeds:
     product, and such a root has no other vector. Of a multiple root that was taken apart all products are known.
     """
     some = np.flatnonzero((seed.defect > NO_PRODUCT) & (seed.gap > ALONE))
-    target = np.ascontiguousarray(np.moveaxis(goal[seed.pose[some], :3], 0, -1))
+    if not some.size:
+        return seed
+    target = np.ascontiguousarray(goal[seed.pose[some], :3].transpose(1, 2, 0))
     frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[some].T))
     kept = np.ones(len(seed.pose), np.bool_)
     kept[some[pose_error(frame, target)[1] > STRAY]] = False

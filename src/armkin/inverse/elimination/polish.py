@@ -36,7 +36,10 @@ def turn(frame: Array, q: Array, prismatic: bool) -> Array:
 
 def _signed(sine: Array) -> Array:
     """Sines (..., M) as `_moved` takes them: with both signs, (..., 2, M)."""
-    return np.stack([sine, -sine], axis=-2)
+    out = np.empty((*sine.shape[:-1], 2, sine.shape[-1]))
+    out[..., 0, :] = sine
+    np.negative(sine, out=out[..., 1, :])
+    return out
 
 
 def _moved(frame: Array, q: Array, cosine: Array, sine: Array, prismatic: bool) -> Array:
@@ -106,7 +109,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
     """
     count = q.shape[0]
     value = np.ascontiguousarray(q.T)
-    target = np.ascontiguousarray(np.moveaxis(goal[:, :3], 0, -1))
+    target = np.ascontiguousarray(goal[:, :3].transpose(1, 2, 0))
     best, residual = value.copy(), np.full(count, np.inf)
     weakness, inverse = np.full(count, np.inf), np.empty((count, 6, 6))
     active, last = np.arange(count), np.zeros(count)

@@ -253,7 +253,7 @@ def _ratio(powers: Array) -> Array:
 def _other_joints(pencil: Pencil, middle: Array, Y: Array, pose: Int, recover: Array) -> tuple[Array, Array, Array]:
     """Values of a, b and e once the middle joints (3, M) are known."""
     links: list[Array] = list(pencil.links)
-    links[pencil.role.slot] = np.ascontiguousarray(np.moveaxis(Y[pose], 0, -1))
+    links[pencil.role.slot] = np.ascontiguousarray(Y[pose].transpose(1, 2, 0))
     is_a, is_b = bool(pencil.prismatic[0]), bool(pencil.prismatic[1])
     start = np.repeat(np.eye(3, 4)[:, :, None], pose.size, axis=2)
     A = advance(start, links[1])
