@@ -229,6 +229,17 @@ def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
         assert not differences(rest, [answer], s)
 
 
+def test_a_surface_of_postures_is_not_listed_once_for_each_that_was_found(tmp_path: Path) -> None:
+    """A folded iiwa7, its wrist in its shoulder: 48 rows of one surface."""
+    arm = armkin.load("iiwa7")
+    q = np.deg2rad([[0, -45, 135, 180, -180, 135, 0]])
+    [answer] = ask(arm, tmp_path, q, near=arm.home[None], targets=armkin.fk(arm, q))["ik"]
+    assert answer["status"] == "singular"
+    assert 1 <= len(answer["branches"]) <= 4
+    reached = armkin.fk(arm, np.array([row["joints"] for row in answer["branches"]]))
+    assert np.abs(reached - armkin.fk(arm, q)).max() < 2e-9 * arm.reach
+
+
 def test_a_held_joint_outside_its_limits_leaves_no_best_branch(tmp_path: Path) -> None:
     arm = armkin.load("panda", scene=str(ROOT / "examples" / "scenes" / "ur5e.yaml"))
     q = np.array([[0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 0.5], [0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 3.0]])

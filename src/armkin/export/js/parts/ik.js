@@ -180,6 +180,7 @@ function components(seeds, goal) {
   for (const { seed } of ranked) {
     const known = (/** @type {Row} */ row) => {
       if (row.path) return onPath(seed.q, row.path, goal);
+      if (row.wide) return walked(seed.q, row.q, goal);
       return row.at ? apart(row.q, seed.q) < 1e-7 || onComponent(row.at, row.q, seed.q) : joined(row.q, seed.q, goal);
     };
     const crosses = met.includes(seed);
@@ -239,6 +240,19 @@ function straight(a, b, goal) {
       return there.missed <= SOLUTION && apart(there.q, start) < 1e-3;
     }),
   );
+}
+
+/** Whether a walk over a surface of solutions leads from one posture to another: each step towards it, and back onto the target.
+ * @param {number[]} a @param {number[]} b @param {Float64Array} goal */
+function walked(a, b, goal) {
+  let here = a;
+  for (let away = apart(a, b); away > STRIDE; ) {
+    const next = newton(stepped(here, between(b, here), STRIDE / away), goal, 4, SPLIT / 10);
+    const left = apart(next.q, b);
+    if (!(next.missed <= SOLUTION && apart(next.q, here) < 2 * STRIDE && left < away - STRIDE / 10)) return false;
+    [here, away] = [next.q, left];
+  }
+  return straight(here, b, goal);
 }
 
 let copyInside = true;
