@@ -177,17 +177,27 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """
 
 
-def second(job: float, chunk: bytes) -> bytes:
+def busy(job: float, chunk: bytes) -> bytes:
     """A chunk that takes `job` seconds of CPU time."""
-    end = time.process_time() + job
-    while time.process_time() < end:
+    end = time.thread_time() + job
+    while time.thread_time() < end:
         pass
     return chunk
 
 
+def waiting(job: float, chunk: bytes) -> bytes:
+    """A chunk that takes `job` seconds and no CPU time: all of what its worker takes is Dask's."""
+    time.sleep(job)
+    return chunk
+
+
 def cluster(folder: Path, count: int) -> bool:
-    """CPU time of client, scheduler and worker beside that of twelve chunks of a second, a megabyte each way."""
-    from armkin.engines.run import Engine, in_order
+    """What a Dask worker of one thread takes beside chunks of a second, a megabyte each way; scheduler and client.
+
+    Chunks that wait are a second long however busy the machine is, so that heartbeats and the worker's profiler weigh
+    what they weigh beside a core of its own. Chunks that work show, on two cores at rest, the same by the clock.
+    """
+    import distributed
 
     environment = {**os.environ, "PYTHONPATH": os.fspath(Path(__file__).parent)}
     file = folder / "scheduler.json"
@@ -199,22 +209,45 @@ def cluster(folder: Path, count: int) -> bool:
                           "--no-dashboard"], env=environment, stderr=subprocess.DEVNULL) as worker,
     ):  # fmt: skip
         try:
-            address = _address(file)
             sys.modules.setdefault("bench_columns", sys.modules["__main__"])
-            second.__module__ = "bench_columns"
-            data = [bytes(1 << 20)] * 12
-            list(in_order(Engine(cluster=address), second, 0.01, data[:3]))  # imports
-            began, at = _used(scheduler.pid) + _used(worker.pid) + time.process_time(), time.perf_counter()
-            list(in_order(Engine(cluster=address), second, 1.0, data))
-            more = _used(scheduler.pid) + _used(worker.pid) + time.process_time() - began - len(data)
-            wall = time.perf_counter() - at  # heartbeats go with it
+            busy.__module__ = waiting.__module__ = "bench_columns"
+            address, pids = _address(file), (worker.pid, scheduler.pid)
+            with distributed.Client(address) as client:
+                client.wait_for_workers(1, timeout=120)
+            _beside(address, pids, waiting, 0.01, 3)  # imports
+            share = _beside(address, pids, waiting, 1.0, 24)
+            work = _beside(address, pids, busy, 1.0, 12)
         finally:
-            worker.terminate()
-            scheduler.terminate()
-    share = more / len(data)
-    print(f"cluster      {share:.1%} of chunks of a second besides the work (bar {OVERHEAD:.0%})")
-    print(f"{'':13}{more / wall:.1%} of the time that passed: a worker that waits for its core has heartbeats, too")
-    return share <= OVERHEAD
+            worker.kill()
+            scheduler.kill()
+    print(f"cluster      worker {share.worker:.2%} of chunks of a second (bar {OVERHEAD:.0%}), scheduler", end=" ")
+    print(f"{share.scheduler:.2%}, client {share.client:.2%} on the other core; {share.wall - 1:.2%} more by the clock")
+    print(
+        f"{'':13}chunks that work: {work.worker - 1:.2%} more CPU time in the worker; a chunk and what is beside it",
+        end=" ",
+    )
+    print(f"{work.wall:.2f} s by the clock, which tells on a machine at rest alone")
+    return share.worker <= OVERHEAD
+
+
+class Beside(NamedTuple):
+    """CPU time and wall time of chunks, each of a second [s]."""
+
+    worker: float
+    scheduler: float
+    client: float
+    wall: float
+
+
+def _beside(address: str, pids: tuple[int, int], work: Any, job: float, count: int) -> Beside:
+    """What `count` chunks take of worker, scheduler and this process, a chunk."""
+    from armkin.engines.run import Engine, in_order
+
+    before = [*map(_used, pids), time.process_time(), time.perf_counter()]
+    for _ in in_order(Engine(cluster=address), work, job, [bytes(1 << 20)] * count):
+        pass
+    after = [*map(_used, pids), time.process_time(), time.perf_counter()]
+    return Beside(*((new - old) / count for old, new in zip(before, after, strict=True)))
 
 
 def _address(file: Path) -> str:
