@@ -212,7 +212,7 @@ def cluster(folder: Path, count: int) -> bool:
             sys.modules.setdefault("bench_columns", sys.modules["__main__"])
             busy.__module__ = waiting.__module__ = "bench_columns"
             address, pids = _address(file), (worker.pid, scheduler.pid)
-            with distributed.Client(address) as client:
+            with distributed.Client(address) as client:  # type: ignore[no-untyped-call]
                 client.wait_for_workers(1, timeout=120)
             _beside(address, pids, waiting, 0.01, 3)  # imports
             share = _beside(address, pids, waiting, 1.0, 24)

@@ -111,6 +111,10 @@ def test_the_command_tells_the_best_and_exits_3_where_none_reaches_all(tmp_path:
     assert none.code == 3
     assert none.json["robots"][0]["best"]["reached"] == 1
     assert "no place reaches all 2 targets; three_dof reaches 1 at best" in none.err
+    other = run("place", "three_dof", path, *more, "--out", tmp_path / "places.txt")
+    assert other.code == 2
+    assert "places are written as .npz, .parquet, .jsonl or .csv" in other.err
+    assert not (tmp_path / "places.txt").exists()
 
 
 def test_a_scene_stands_with_the_targets(tmp_path: Path) -> None:

@@ -38,7 +38,8 @@ def plot_reach(found: Reach, out: str) -> None:
             bar = figure.colorbar(drawn, cax=place)
             bar.outline.set_visible(False)
             figure.text(left, 0.9, label, fontsize=10, color=INK)
-        where = f"{found.reached:,} of {found.cells:,} cells, {found.orientations:,} orientations each ({found.method})"
+        each = f"{found.orientations:,} orientation{'s' * (found.orientations != 1)} each"
+        where = f"{found.reached:,} of {found.cells:,} cells, {each} ({found.method})"
         figure.text(0.03, 0.985, grid.arm.name, fontsize=13, va="top", color=INK)
         figure.text(
             0.03,

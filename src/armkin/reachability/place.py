@@ -235,6 +235,8 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
     """What is answered, kept beside the file until it stands."""
     if out is None:
         return None
+    if not os.fspath(out).lower().endswith((".npz", ".parquet", ".jsonl", ".csv")):
+        raise UsageError(f"{out}: places are written as .npz, .parquet, .jsonl or .csv; end the name with one of them")
     files.check(os.fspath(out))
     robots = [
         [one.arm.sha256, one.around.sha256, digest(one.targets.tobytes()), *one.ways, *one.values] for one in questions

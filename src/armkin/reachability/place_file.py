@@ -1,4 +1,4 @@
-"""Places as a file of columns: .npz, .parquet, .jsonl, else .csv."""
+"""Places as a file of columns: .npz, .parquet, .jsonl or .csv."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def write(found: Sequence[Place], out: str | os.PathLike[str]) -> None:
-    """All places as a file of columns: .npz, .parquet, .jsonl, else .csv; parts of an unfinished run go."""
+    """All places as a file of columns: .npz, .parquet, .jsonl or .csv; parts of an unfinished run go."""
     path = os.fspath(out)
     format = format_of(path)
     table = columns(found)

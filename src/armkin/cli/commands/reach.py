@@ -92,6 +92,10 @@ def _text(answer: Answer) -> str:
     return (
         f"{answer['robot']}: {answer['reached']:,} of {answer['cells']:,} cells reached ({share:.1f} %), "
         f"{answer['volume_mm3'] / 1e9:.4g} m3\n\n"
-        f"{answer['answers']:,} poses (task {answer['task']}, {answer['orientations']:,} orientations a cell) "
+        f"{answer['answers']:,} poses (task {answer['task']}, {_orientations(answer['orientations'])} a cell) "
         f"from {answer['solves']:,} solves {how}, in {answer['seconds']:.2f} s\n"
     )
+
+
+def _orientations(count: int) -> str:
+    return f"{count:,} orientation{'s' * (count != 1)}"
