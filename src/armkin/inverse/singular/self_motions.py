@@ -228,13 +228,16 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     return moving, joints
 
 
-def on_surface(arm: Arm, task: Task, q: Array, V: Array, target: Array) -> Bool:
-    """Which postures (M, n) that lose two directions still do a long step off, by both ways at once: (M,).
+def oblique(V: Array) -> Array:
+    """Pushes (M, n) by two lost directions at once; V: (M, n, n) right singular vectors."""
+    return np.asarray(V[:, -1] + 0.7 * V[:, -2])
 
-    Those lie on a self-motion of two dimensions, or on one of double roots. V: (M, n, n) right singular vectors.
+
+def on_surface(arm: Arm, task: Task, q: Array, there: Array, size: Array, target: Array) -> Bool:
+    """Which postures (M, n) that lose two directions still do a long `oblique` step off: (M,).
+
+    Those lie on a self-motion of two dimensions, or on one of double roots. there (M, n), size (M,): of `pushed`.
     """
-    push = (V[:, arm.n - 1] + 0.7 * V[:, arm.n - 2]) * 10 * STEP
-    there, size = follow(arm, task, q + push * radian_or_reach(arm), target)
     nullity = newton.null_space(arm, task, there, target)[2]
     away = np.abs(newton.difference(arm, there, q)).max(axis=1)
     return np.asarray((size <= SOLUTION) & (nullity > 1) & (away > 3 * STEP))
