@@ -341,9 +341,7 @@ class _Groups:
         status[self.singular] = Status.SINGULAR
         surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity == 2) & self.curve.any(axis=2))
         if len(k):
-            push, far = self_motions.oblique(self.lost.V[k, b]), np.full(len(k), 10 * self_motions.STEP)
-            beside, size, _ = self_motions.pushed(arm, task, q[k, b], far, push, target[k])
-            surface[k[self_motions.on_surface(arm, task, q[k, b], beside, size, target[k])]] = True
+            surface[k[self_motions.on_surface(arm, task, q[k, b], self.lost.V[k, b], target[k])]] = True
         return _Settled(
             np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan),
             there,
