@@ -165,8 +165,8 @@ def follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
 def pushed(
     arm: Arm, task: Task, q: Array, step: Array | float, push: Array, target: Array
 ) -> tuple[Array, Array, Array]:
-    """Postures (M, n), a step, () or (M,), away along push (M, n), pulled back: they, what they miss, and how much more than
-    q that is a step's length; infinite for those that fell back.
+    """Postures (M, n), a step, () or (M,), away along push (M, n), pulled back: they, what they miss, and how much more
+    than q that is a step's length; infinite for those that fell back.
     """
     unit = radian_or_reach(arm)
     there, size = follow(arm, task, q + np.reshape(step, (-1, 1)) * push * unit, target)
