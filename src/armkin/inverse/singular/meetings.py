@@ -16,7 +16,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, GROWTH, HIGH, SOLUTION
-from armkin.inverse.singular.self_motions import FAR, STEP, follow, null_directions, oblique, pushed, still_lose_two
+from armkin.inverse.singular.self_motions import FAR, OBLIQUE, STEP, follow, null_directions, on_surface, pushed
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -71,9 +71,9 @@ def _steps_out(
     who, push = null_directions(arm.n, V, nullity)
     # a surface is asked by one push more, in the same call
     M, whose = len(q), np.concatenate([np.arange(len(q)), who])
-    every = np.concatenate([oblique(V), push])
+    every = np.concatenate([V[:, -1] + OBLIQUE * V[:, -2], push])
     there, size, grown = pushed(arm, task, q[whose], FAR, every, target[whose])
-    rests = ~still_lose_two(arm, task, q, there[:M], size[:M], target)
+    rests = ~on_surface(arm, task, q, V, target, (there[:M], size[:M]))
     left = rests[who]
     who, there, size, grown = who[left], there[M:][left], size[M:][left], grown[M:][left]
     rests[who[grown <= GROWTH]] = False

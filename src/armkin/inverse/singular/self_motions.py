@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 FAR = 10 * STEP
+OBLIQUE = 0.7  # of the second lost direction, where two are gone along at once
 STEPS = np.array([[STEP], [FAR]])  # a short one and a long one
 
 Int = NDArray[np.int64]
@@ -231,22 +232,16 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     return moving, joints
 
 
-def oblique(V: Array) -> Array:
-    """Pushes (M, n) by two lost directions at once; V: (M, n, n) right singular vectors."""
-    return np.asarray(V[:, -1] + 0.7 * V[:, -2])
+def on_surface(
+    arm: Arm, task: Task, q: Array, V: Array, target: Array, pushed: tuple[Array, Array] | None = None
+) -> Bool:
+    """Which postures (M, n) that lose two directions still do a long step off, by both ways at once: (M,).
 
-
-def on_surface(arm: Arm, task: Task, q: Array, V: Array, target: Array) -> Bool:
-    """Which postures (M, n) that lose two directions lie on a self-motion of two dimensions: (M,).
-
-    Or on one of double roots. V: (M, n, n) right singular vectors.
+    Those lie on a self-motion of two dimensions, or on one of double roots. V: (M, n, n) right singular vectors.
+    pushed: where the step leads, (M, n), and what is missed there (M,), if that is known.
     """
-    there, size, _ = pushed(arm, task, q, FAR, oblique(V), target)
-    return still_lose_two(arm, task, q, there, size, target)
-
-
-def still_lose_two(arm: Arm, task: Task, q: Array, there: Array, size: Array, target: Array) -> Bool:
-    """The same of where an `oblique` push of length `FAR` has led them: there (M, n), size (M,) of `pushed`."""
+    push = FAR * (V[:, -1] + OBLIQUE * V[:, -2])
+    there, size = pushed or follow(arm, task, q + push * radian_or_reach(arm), target)
     nullity = newton.null_space(arm, task, there, target)[2]
     away = np.abs(newton.difference(arm, there, q)).max(axis=1)
     return np.asarray((size <= SOLUTION) & (nullity > 1) & (away > 3 * STEP))
