@@ -26,7 +26,7 @@ def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     """
     T, slopes = tip_and_jacobian(arm, q)
     r = residual(task, T, q, target, arm.reach)
-    J = task_jacobian(task, slopes, T)
+    J = slopes if task.orientation == "full" else task_jacobian(task, slopes, T)
     J = J * radian_or_reach(arm)
     J[:, : task.position] /= arm.reach
     return r, J
