@@ -8,6 +8,7 @@ from checks import random_joints
 from oracle import forward, forward_and_jacobian, screws
 
 import armkin
+from armkin.forward import position
 
 ROBOTS = sorted((Path(__file__).parents[2] / "robots").glob("*.yaml"))
 POSES = 10_000
@@ -46,6 +47,18 @@ def test_the_jacobian_is_the_derivative() -> None:
         step = np.eye(arm.n)[i] * h
         slope = (armkin.fk(arm, q + step)[:, :3, 3] - armkin.fk(arm, q - step)[:, :3, 3]) / (2 * h)
         assert np.abs(slope - J[:, :3, i]).max() < 1e-5
+
+
+@pytest.mark.parametrize("name", ["ur5e", "stanford", "ratio_arm"])
+def test_few_poses_have_the_bits_of_many(name: str) -> None:
+    """Few are computed in plain Python, some with all cosines at once, many joint by joint."""
+    arm = armkin.load(Path(__file__).parents[1] / "robots/ratio_arm.yaml" if name == "ratio_arm" else name)
+    q = np.random.default_rng(3).uniform(-3.0, 3.0, (300, arm.n))
+    for compute in (armkin.fk, armkin.jacobian, armkin.frames, position):
+        whole = compute(arm, q)
+        for _ in range(6):  # from the fifth call on it is recorded
+            for count in (2, 3, 16, 17, 100):
+                assert np.array_equal(compute(arm, q[:count]), whole[:count])
 
 
 def test_manipulability_and_condition_tell_a_singularity() -> None:
