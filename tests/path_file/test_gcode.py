@@ -197,3 +197,45 @@ def test_the_tool_points_against_the_drawing(robot: str) -> None:
 def test_a_tilt_that_a_pitch_cannot_hold_is_refused() -> None:
     with pytest.raises(UsageError, match="without a tilt"):
         placing(armkin.load("labvolt_5150"), [300, 0, 50, 20, 0, 0], task="xyz_pitch_roll")
+
+
+def test_lines_that_are_read_in_one_step_are_read_as_word_by_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Most lines of a slicer match one pattern; all modes, units and offsets hold for them, too."""
+    rng = np.random.default_rng(4)
+    words = ["G0 ", "G1 ", "g1", "G01 ", "", "N5 G1 ", "G2 I1 J1 ", "G21\n", "G20\nG1 ", "G91\n", "G90\n", "(a) G1 "]
+    words += ["G92 X1 Y2\nG1 ", "G55\nG0 ", "G10 L2 P2 X3\n", "G52 Z1\n", "G28\nG0 ", "G53 G0 ", "M3 S5\nG1 "]
+    programs = ["G21 G90 F600\nG0 X0 Y0"]
+    for _ in range(100):
+        lines = ["G0 X1 Y1 F900"]
+        for _ in range(8):
+            line = str(rng.choice(words))
+            for letter in "XYZEF":
+                if rng.random() < 0.5:
+                    sign = "" if letter == "F" else str(rng.choice(["", "-", "+"]))
+                    line += f"{letter}{sign}{rng.choice(['3', '.5', '2.', '1.25', '00.1'])}{rng.choice(['', ' '])}"
+            lines.append(line)
+        programs.append("\n".join(lines))
+
+    def read(text: str) -> object:
+        try:
+            file = gcode.parse(text.encode(), "t.gcode", AS_IT_IS, Wishes())
+        except PathFileError as error:
+            return str(error)
+        return [move.model_dump() for move in file.moves], file.notes
+
+    quick = [read(text) for text in programs]
+    assert sum(not isinstance(one, str) for one in quick) > 20
+    monkeypatch.setattr(gcode._Program, "_plain", lambda *_: False)
+    assert [read(text) for text in programs] == quick
+
+
+def test_an_arc_without_radius_draws_nothing() -> None:
+    """`G2 X0 Y0 I0 J0` where the tool stands: an internal error."""
+    arm = armkin.load("three_dof")
+
+    def planned(text: str) -> float:
+        return armkin.path(arm, gcode.parse(text.encode(), "t.gcode", placing(arm, [330, -10, 250]), Wishes())).length
+
+    with pytest.raises(UsageError, match=r"t\.gcode:1: .*its points are all the same"):
+        planned("G0 X0 Y0\nG2 X0 Y0 I0 J0")
+    assert planned("G0 X0 Y0\nG2 X0 Y0 I0 J0\nG1 X5\nG2 X5 Y0 I0 J0\nG1 X9") == pytest.approx(9)

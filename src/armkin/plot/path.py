@@ -9,7 +9,6 @@ import numpy as np
 from armkin.forward import position
 from armkin.model import units
 from armkin.motion.branch_report import closeness
-from armkin.motion.plan.playback import times
 from armkin.plot.canvas import flat, picture, space, true_proportions
 from armkin.view.skeleton import skeleton
 
@@ -18,10 +17,12 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
 
 _SAMPLES = 600  # of what is drawn over time
-_MOST = 20_000  # points of the tool's way
-_FINE = 1 / 3000  # of what is seen: nearer the tool's way is drawn
+_MOST = 160_000  # times at which speeds and accelerations are looked at
+_MANY = 20_000  # points of the tool's way: more are thinned out
+_FINE = 1 / 1500  # of what is seen: a smaller box is one point
 _SMALL = 1 / 3  # of what is seen: a smaller way is drawn once more, large
 _WIDE = 84  # characters of a line above the arm
+_INKED, _WIDTHS = 150.0, (0.1, 0.6)  # [pt] of a line as long as what is seen is wide, to ink about half of it; lines
 _COLOURS = ("#1f77b4", "#d95f02", "#2ca02c", "#9467bd", "#c03d6b", "#8c6d31", "#17a2b8", "#7f7f7f")
 _SINGULAR = "#c0392b"
 _INK = "#333333"
@@ -107,18 +108,18 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     points = np.concatenate([position(arm, q), arm.base[None, :3, 3], *(bone.path for _, bone, *_ in bones)])
     reach = np.abs(points[:, :2] - arm.base[:2, 3]).max(axis=0)
     size = float((points.max(axis=0) - points.min(axis=0)).max())
-    way, when = _way(plan, _FINE * size)
-    small = float((np.nanmax(way, axis=0) - np.nanmin(way, axis=0)).max()) if len(when) else size
+    way = _way(plan)
+    small = float((np.nanmax(way, axis=0) - np.nanmin(way, axis=0)).max()) if len(way) else size
     large = small >= _SMALL * size
+    way = _thinned(way, _FINE * (size if large else small))
     low, high = (0.03, 0.76) if large else (0.37, 0.44)
     axes = space(figure, (0.0, low, 0.53, high), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
     for name, bone, colour, width, dashes in bones:
         axes.plot(*bone.path.T, color=colour, linewidth=width, linestyle=dashes, label=name, solid_capstyle="round")
         axes.plot(*bone.joints.T, color=colour, marker="o", markersize=4, linestyle="none")
     if not large:
-        way, when = _way(plan, _FINE * small)
-        _from_near(plan, figure, way, when)
-    axes.plot(*(way if len(when) else position(arm, q)).T, color=_INK, linewidth=1.2, label="tool")
+        _from_near(plan, figure, way)
+    axes.plot(*(way if len(way) else position(arm, q)).T, color=_INK, linewidth=1.2, label="tool")
     for one in plan.reconfigurations:
         at = position(arm, plan.q(_time_of(plan, one.s))[None])
         axes.plot(*at.T, color=_SINGULAR, marker="x", markersize=8, linestyle="none")
@@ -128,17 +129,23 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     true_proportions(axes, points, float(arm.base[2, 3]))
 
 
-def _way(plan: PathPlan, close: float) -> tuple[Array, Array]:
-    """The tool's way, its parts behind each other with a gap (nan) between: (N, 3) [mm]; and when: (N,) [s]."""
-    begins = plan.motion.begins
-    t, _ = times(plan.arm, plan, begins.tolist(), close, _MOST)
-    which = np.clip(np.searchsorted(begins, t, side="right") - 1, 0, len(begins) - 2)
-    ends = np.isin(t, begins) & np.isin(which - 1, list(plan.on_path))  # a part's last time is the next one's first
-    on = np.isin(which, list(plan.on_path))
-    p = position(plan.arm, plan.q(t))
-    p[~(on | ends)] = np.nan
-    keep = ~np.isnan(p[:, 0]) | np.append(False, ~np.isnan(p[:-1, 0]))
-    return p[keep], t[keep]
+def _way(plan: PathPlan) -> Array:
+    """The tool's way on the plan's own grid, its parts behind each other with a gap (nan) between: (N, 3) [mm]."""
+    parts: list[Array] = []
+    for k in sorted(plan.on_path):
+        if parts and k - 1 not in plan.on_path:
+            parts.append(np.full((1, 3), np.nan))
+        parts.append(position(plan.arm, plan.grid(k)))
+    return np.concatenate(parts) if parts else np.zeros((0, 3))
+
+
+def _thinned(way: Array, close: float) -> Array:
+    """A way (N, 3) of very many points without those that lie in the same small box as the one before."""
+    if len(way) <= _MANY:
+        return way
+    with np.errstate(invalid="ignore"):
+        box = np.rint(way / close)
+    return np.asarray(way[np.append(True, (box[1:] != box[:-1]).any(axis=1))])
 
 
 def _time_of(plan: PathPlan, s: float) -> float:
@@ -150,12 +157,14 @@ def _time_of(plan: PathPlan, s: float) -> float:
     return high
 
 
-def _from_near(plan: PathPlan, figure: Any, way: Array, when: Array) -> None:
+def _from_near(plan: PathPlan, figure: Any, way: Array) -> None:
     """A way that is small beside the arm, seen along the axis in which it is thinnest."""
     size = np.nanmax(way, axis=0) - np.nanmin(way, axis=0)
     i, j = sorted(np.argsort(size)[1:].tolist())
     axes = flat(figure, (0.06, 0.055, 0.46, 0.27), (f"{'xyz'[i]} / mm", f"{'xyz'[j]} / mm"), shrink=True)
-    axes.plot(way[:, i], way[:, j], color=_INK, linewidth=0.6, label="the tool's way")
+    length = np.nansum(np.linalg.norm(np.diff(way, axis=0), axis=1))
+    thin = float(np.clip(_INKED * size[i] * size[j] / max(length, 1e-9) / size.max(), *_WIDTHS))
+    axes.plot(way[:, i], way[:, j], color=_INK, linewidth=thin, label="the tool's way")
     if plan.rounded_most is not None:
         worst = position(plan.arm, plan.q(_time_of(plan, plan.rounded_most)))
         axes.plot(worst[i], worst[j], color=_SINGULAR, marker="+", markersize=9, linestyle="none",

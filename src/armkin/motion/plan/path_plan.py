@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula.arrays import Array
 from armkin.forward import condition, jacobian
-from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.curve import Curve, Smoothed, way_of
 from armkin.motion.timing.trajectory import Stretch, Trajectory, grouped
 from armkin.motion.tool_path.route import Reduced
 
@@ -159,8 +159,14 @@ class PathPlan:
         """Where a stretch on the tool's way begins and ends [mm]."""
         stretch, base = self.on_path[number]
         assert isinstance(stretch, Curve | Smoothed)
-        s = (stretch if isinstance(stretch, Curve) else stretch.curve).path.s
+        s = way_of(stretch).s
         return base + float(s[0]), base + float(s[-1])
+
+    def grid(self, number: int) -> Array:
+        """Joint values at the grid points of a stretch on the tool's way: (N, n) [rad | mm]."""
+        stretch, _ = self.on_path[number]
+        assert isinstance(stretch, Curve | Smoothed)
+        return way_of(stretch).q
 
     @cached_property
     def limits(self) -> dict[str, Array]:

@@ -20,26 +20,31 @@ _INSIDE = (0.21, 0.5, 0.79)  # where between two samples it is looked at
 def times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int) -> tuple[Array, float]:
     """Times [s] between which the tip drawn is off by `close` [mm] at most, or by what `most` of them leave; how much.
 
-    Where they are too few, those intervals are divided first that leave the most.
+    Where they may be too few, those intervals are divided first that leave the most.
     Drawn: joints that go evenly between two times, and the tip's way as its chord. begins: times that are among them.
     """
     count = int(min(most / 4, plan.duration / _FIRST)) + 2
     t = np.unique(np.concatenate([np.linspace(0.0, plan.duration, count), begins]))
-    a, b = t[:-1], t[1:]  # intervals that are still to be looked at
+    a, b = t[:-1], t[1:]  # intervals that may be divided
+    off = _off(arm, plan, a, b)
     done = [t]
-    worst = 0.0
-    total = len(t)
-    while len(a):
-        off = _off(arm, plan, a, b)
+    worst, room = 0.0, most - len(t)
+    while True:
         bad = (off > close) & (b - a > 1e-3)
-        if bad.sum() > (room := max(most - total, 0)):
-            bad[np.argsort(np.where(bad, -off, 0.0), kind="stable")[room:]] = False
         worst = max(worst, float(off[~bad].max(initial=0.0)))
-        middle = (a[bad] + b[bad]) / 2
+        a, b, off = a[bad], b[bad], off[bad]
+        if not len(a) or room <= 0:
+            break
+        order = np.argsort(-off, kind="stable")[:room]
+        if 4 * len(order) > room:  # the others wait: they may be the least of what is left
+            order = order[off[order] > 0.5 * off[order[0]]]
+        middle = (a[order] + b[order]) / 2
         done.append(middle)
-        total += len(middle)
-        a, b = np.concatenate([a[bad], middle]), np.concatenate([middle, b[bad]])
-    return np.unique(np.concatenate(done)), worst
+        room -= len(middle)
+        first, last = np.concatenate([a[order], middle]), np.concatenate([middle, b[order]])
+        a, b = (np.concatenate([np.delete(old, order), new]) for old, new in ((a, first), (b, last)))
+        off = np.concatenate([np.delete(off, order), _off(arm, plan, first, last)])
+    return np.unique(np.concatenate(done)), max(worst, float(off.max(initial=0.0)))
 
 
 def _off(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:

@@ -63,6 +63,8 @@ class Polyline:
             return self._lines(spots, speeds)
         y = y * weights(self.task)
         kept = distinct(y)
+        if len(kept) == 1:  # no way at all, which is refused of the whole route
+            return self._lines(spots, speeds)
         back = 1 + np.flatnonzero(turns(y[kept]) > REVERSAL) if len(kept) > 2 else np.zeros(0, int)
         ends = np.concatenate([[0], back, [len(kept) - 1]])
         turning = bool(y[:, len(spots.p[0]) + spots.sums.shape[1] :].any())
