@@ -199,3 +199,23 @@ def test_no_target_at_all(name: str) -> None:
     one = examine(arm, screw, case.task, random_joints(screw, 1, 1))
     s = armkin.ik(arm, one.goals.array()[:0], case.task)
     assert (s.q.shape, s.method) == ((0, *s.q.shape[1:]), one.solutions.method)
+
+
+@pytest.mark.parametrize("off", [1e-5, 1e-4, 1e-3])
+def test_both_branches_of_a_stretched_scara(off: float) -> None:
+    """Where the elbow is nearly straight, corrections of one seed each leave it open; the pair keeps its names."""
+    arm, screw = moved(armkin.load("cobra600"), off, 5)
+    q = random_joints(screw, 400, 6)
+    rng = np.random.default_rng(7)
+    q[:, 1] = np.pi * rng.integers(0, 2, 400) + rng.choice([-1, 1], 400) * 10 ** rng.uniform(-2.9, -1, 400)
+    report = examine(arm, screw, "xyz_yaw", q)
+    found = report.solutions
+    assert not report.lost.any()
+    assert report.duplicates == 0
+    two = (found.valid.sum(axis=1) == 2) & (found.branch[:, :2] == [0, 1]).all(axis=1)  # none of a number of its own
+    assert two.mean() > 0.99
+    bent = newton.wrapped_distance(arm, found.q[two, 0], found.q[two, 1]) > 0.0
+    side = np.sin(found.q[two, 0, 1] - found.q[two, 1, 1]) * np.cos(found.q[two, 0, 1])
+    assert bent.all()
+    assert (side > 0.0).all()  # one elbow is on one side of the fold, wherever that is
+    assert not found.complete.any()

@@ -47,7 +47,8 @@ class NewtonSteps:
         follow = -np.linalg.solve(rest, own) if len(task.sums) else np.zeros((0, self.size))
         self.follow: list[list[float]] = follow.tolist()  # how the last joints turn with the first ones
         error = min(SLOPE * off, 0.5)  # its square after a step, and so on
-        self.steps = min(max(math.ceil(math.log2(math.log(LAST_ERROR) / math.log(error))), 1), MOST)
+        least = max(math.ceil(math.log2(math.log(LAST_ERROR) / math.log(error))), 1)
+        self.steps = min(least + 1, MOST)  # one more, and two thirds of those near a singularity need no other way
         self.absent = math.inf if arm.prismatic.any() else ABSENT * off  # the error grows with the slide's extension
         self.counted = task.name == "xyz" and not arm.prismatic.any()
 

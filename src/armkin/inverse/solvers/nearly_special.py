@@ -5,8 +5,9 @@ method moves onto the true arm. Branches continue each other as long as no singu
 between the two arms: where those of the similar arm move too much, appear or vanish as the
 target is moved by a few times the distance between the arms, the pose is in doubt. Six joints
 then go to the elimination, which needs no special class; of three turning joints all roots are
-eigenvalues (`position_pencil`). For others, the similar arm's branches at the targets around give
-more seeds: there is no proof that nothing is lost in between, hence `complete` is False. Where the
+eigenvalues (`position_pencil`). Of others both branches of a fold are found at once (`pairs`), and where
+that fails, the similar arm's branches at the targets around give more seeds: there is no proof that nothing is lost in
+between, hence `complete` is False. Where the
 elimination is healthy on the arm, as the share of poses that its first two passes settle shows,
 six joints go straight to it, and the similar arm only names the branches.
 """
@@ -14,7 +15,7 @@ six joints go straight to it, and the similar arm only names the branches.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -41,10 +42,10 @@ from armkin.inverse.numeric.tolerances import (
     SOLUTION,
     STEADY,
 )
-from armkin.inverse.solvers import general, position_pencil
+from armkin.inverse.solvers import general, pairs, position_pencil
+from armkin.inverse.solvers.pairs import AROUND, around
 from armkin.inverse.tasks.fitting import NEARLY_PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
-from armkin.model.rotation import rotation_about
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -52,7 +53,6 @@ if TYPE_CHECKING:
 
 CHUNK = 1024  # poses corrected at once
 NAMED_AT_ONCE = 256  # branches are named: buffers of so many are kept
-AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
 SICK = 0.08  # share of poses that a healthy elimination leaves open in its first two passes
 APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
 RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
@@ -88,13 +88,16 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     def rows(target: Array) -> Rows:
         starts = range(0, max(len(target), 1), CHUNK)
         parts = [_solve(arm, task, alike, off, elimination, target[k : k + CHUNK]) for k in starts]
-        width = max(q.shape[1] for q, _ in parts)
-        q = np.full((len(target), width, arm.n), np.nan)
-        for k, (part, _) in zip(starts, parts, strict=True):
+        width = max(part[0].shape[1] for part in parts)
+        q, guesses = (np.full((len(target), width, arm.n), np.nan) for _ in range(2))
+        for k, (part, _, about) in zip(starts, parts, strict=True):
             q[k : k + len(part), : part.shape[1]] = part
-        doubt = np.concatenate([doubt for _, doubt in parts])
+            guesses[k : k + len(about), : about.shape[1]] = about
+        doubt = np.concatenate([part[1] for part in parts])
         complete = _four(arm, q) if counted else np.zeros(len(target), bool)
-        return Rows(q, doubt & ~complete, complete)  # four roots apart are simple ones
+        return Rows(
+            q, doubt & ~complete, complete, None, guesses if elimination is None else None
+        )  # four roots apart are simple ones
 
     steps = newton_steps.steps(arm, task, off, alike.pairs) if alike.pairs is not None else None
     corrected, counted = steps or (None, False)
@@ -171,30 +174,35 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
     return float(np.quantile(rough.min(axis=1), 0.8)) + ROUNDED_ANSWER
 
 
-def _around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
-    """The targets (N, m) or (N, 4, 4) moved by size (N,) [reaches, rad] both ways along each of their coordinates."""
-    for way in (size, -size):
-        if task.orientation == "full":
-            for axis in range(3):
-                there = target.copy()
-                there[:, axis, 3] += way * arm.reach
-                yield there
-                turned = target.copy()
-                turned[:, :3, :3] = rotation_about(axis, way) @ target[:, :3, :3]
-                yield turned
-        else:
-            for k in range(target.shape[1]):
-                there = target.copy()
-                there[:, k] += way * (arm.reach if k < task.position else 1.0)
-                yield there
-
-
 def _solve(
     arm: Arm, task: Task, alike: Geometry, off: float, elimination: Callable[[], Geometry | None] | None, target: Array
-) -> tuple[Array, Bool]:
-    """Branches (N, B, n) and doubts (N,) of some targets; the similar arm's branches keep their places."""
+) -> tuple[Array, Bool, Array]:
+    """Branches (N, B, n), doubts (N,) and guesses of some targets; the similar arm's branches keep their places."""
     source = recorded(arm, task, alike)
     off_here = off * np.maximum(1.0, distance(arm, task, target))  # the error grows with the slide's extension
+    if elimination is None:
+        known = pairs.settled(arm, task, source, off_here, target)
+        q, doubt = known.q, known.doubt
+        if len(rest := np.flatnonzero(known.open)):
+            more, doubt[rest] = _by_neighbours(arm, task, source, off, off_here[rest], None, target[rest])
+            q = np.full((len(target), more.shape[1], arm.n), np.nan)
+            q[:, : known.q.shape[1]] = known.q
+            q[rest] = more
+        return q, doubt, known.guesses
+    q, doubt = _by_neighbours(arm, task, source, off, off_here, elimination, target)
+    return q, doubt, np.full_like(q, np.nan)
+
+
+def _by_neighbours(
+    arm: Arm,
+    task: Task,
+    source: Recorded,
+    off: float,
+    off_here: Array,
+    elimination: Callable[[], Geometry | None] | None,
+    target: Array,
+) -> tuple[Array, Bool]:
+    """Branches and doubts by the elimination, or by the similar arm's branches at targets around."""
     found = _correct(arm, task, source, off, off_here, target)
     q = np.where(found.good[:, :, None], found.q, np.nan)
     few = np.flatnonzero(found.doubt)
@@ -207,7 +215,7 @@ def _solve(
         assert solver.rows is not None
         others = [solver.rows(goals).q]
     else:
-        rings = (_around(arm, task, goals, size * off_here[few]) for size in RINGS)
+        rings = (around(arm, task, goals, size * off_here[few]) for size in RINGS)
         others = [source.rows(there)[0] for ring in rings for there in ring]
     more = _settled(arm, task, np.concatenate([found.q[few], *others], axis=1), goals, found.q.shape[1])
     out = np.full((len(target), more.shape[1], arm.n), np.nan)
@@ -259,7 +267,7 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     weak = min(STEADY, 1.5 * np.sqrt(off)) + AT_LEAST
     limit = 9.0 * off_here[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
-    for there in _around(arm, task, target, AROUND * off_here):
+    for there in around(arm, task, target, AROUND * off_here):
         q, miss, doubt_there = source.rows(there)
         with np.errstate(invalid="ignore"):
             steady = newton.wrapped_distance(arm, q, seed) < AROUND * off_here[:, None] / weak

@@ -1,0 +1,136 @@
+"""Where corrections of single seeds leave a branch open: both branches of a fold at once.
+
+The roots of a class stand in pairs, along an axis of its branches. On an arm close to the class a pair continues
+another, wherever both are: real and apart, one, or complex. Seeds that lead to one root each need nothing more; the
+others, whose partners lie close to them, are found as pairs (`numeric.root_pairs`), which a fold does not disturb. Thus
+every root of the class is accounted for, or the target remains open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.closed.candidates import Recorded
+from armkin.inverse.closed.newton_steps import ABSENT
+from armkin.inverse.numeric import newton, root_pairs
+from armkin.inverse.numeric.tolerances import ANSWERED, APART_ROOTS
+from armkin.inverse.tasks.task import Task
+from armkin.model.rotation import rotation_about
+from armkin.model.units import radian_or_reach
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
+TOUCHING = APART_ROOTS**2  # square of half of what lies between complex roots, up to which they may be one real root
+MOVED = 0.3  # [rad, reaches] a pair may stand from the class's
+
+
+class Settled(NamedTuple):
+    """q (N, B, n) branches, nan where there is none; open (N,): not all roots are accounted for; doubt (N,): two roots
+    are one, or nearly; guesses (N, B, n): where these are."""
+
+    q: Array
+    open: Bool
+    doubt: Bool
+    guesses: Array
+
+
+def around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
+    """The targets (N, m) or (N, 4, 4) moved by size (N,) [reaches, rad] both ways along each of their coordinates."""
+    for way in (size, -size):
+        if task.orientation == "full":
+            for axis in range(3):
+                there = target.copy()
+                there[:, axis, 3] += way * arm.reach
+                yield there
+                turned = target.copy()
+                turned[:, :3, :3] = rotation_about(axis, way) @ target[:, :3, :3]
+                yield turned
+        else:
+            for k in range(target.shape[1]):
+                there = target.copy()
+                there[:, k] += way * (arm.reach if k < task.position else 1.0)
+                yield there
+
+
+def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -> Settled:
+    """The branches of an arm that is close to a class; off (N,): how close, at each target [reaches].
+
+    source: the class. Its own doubts stay open.
+    """
+    seed, miss, open_ = source.rows(target)
+    tried = ~(miss >= ABSENT * off[:, None]) | arm.prismatic.any()  # the error grows with the slide's extension
+    row, place = np.nonzero(tried)
+    q, guesses = np.full_like(seed, np.nan), np.full_like(seed, np.nan)
+    better, size = newton.correct(arm, task, seed[row, place], target[row])
+    q[row, place] = np.where((size <= ANSWERED)[:, None], better, np.nan)
+    with np.errstate(invalid="ignore"):  # what moves farther than half the way to its neighbour may not continue it
+        beside = (newton.distances(arm, seed, seed) + np.diag(np.full(seed.shape[1], np.inf))).min(axis=2)
+        jumped = newton.wrapped_distance(arm, q, seed) > 0.5 * beside
+    bad = (np.isnan(q[:, :, 0]) & tried) | jumped | _merged(arm, q)
+    doubt: Bool = np.zeros(len(target), bool)
+    left = np.flatnonzero(bad.any(axis=1) & ~open_)
+    others = _others(source)
+    if not len(left):
+        return Settled(q, open_, doubt, guesses)
+    if task.constraints != arm.n or not len(others):
+        open_[left] = True
+        return Settled(q, open_, doubt, guesses)
+    away = newton.wrapped_distance(arm, seed[left][:, others], seed[left][:, None])
+    partner = others[np.where(bad[left][:, None], away, np.inf).min(axis=2).argmin(axis=1)]
+    k, one = np.nonzero(
+        (bad[left] | np.take_along_axis(bad[left], partner, axis=1)) & (np.arange(q.shape[1]) < partner)
+    )
+    two, row = partner[k, one], left[k]
+    apart = newton.difference(arm, seed[row, one], seed[row, two]) * radian_or_reach(arm)
+    middle = seed[row, one] - 0.5 * apart
+    pair = root_pairs.meet(arm, task, middle, target[row])
+    found = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < MOVED)
+    open_[row[~found]] = True
+    sense = np.where(_along(arm, task, source, (row, one, two), off, target, pair.way), 1.0, -1.0)[:, None]
+    for place, side in ((one, sense), (two, -sense)):
+        guess = pair.middle + side * pair.way
+        guesses[row, place] = np.where((pair.square < -TOUCHING)[:, None], np.nan, guess)
+        better, size = newton.correct(arm, task, guess, target[row])
+        q[row, place] = np.where((found & (pair.square > 0.0) & (size <= ANSWERED))[:, None], better, np.nan)
+        doubt[row] |= np.isnan(q[row, place, 0]) & (pair.square > -TOUCHING)
+    doubt |= _merged(arm, q).any(axis=1)
+    return Settled(q, open_, doubt & ~open_, guesses)
+
+
+def _merged(arm: Arm, q: Array) -> Bool:
+    """Which branches (N, B, n) all but meet another one: (N, B)."""
+    with np.errstate(invalid="ignore"):
+        near = newton.distances(arm, q, q) < APART_ROOTS
+    return np.asarray(near.sum(axis=2) > 1)
+
+
+def _others(source: Recorded) -> NDArray[np.intp]:
+    """The branches' partners along each axis of two: (A, B)."""
+    number = np.arange(np.prod(source.axes)).reshape(source.axes)
+    flipped = [np.flip(number, axis).ravel() for axis, size in enumerate(source.axes) if size == 2]
+    return np.array(flipped, np.intp).reshape(len(flipped), number.size)
+
+
+def _along(
+    arm: Arm, task: Task, source: Recorded, where: tuple[NDArray[np.intp], ...], off: Array, target: Array, way: Array
+) -> Bool:
+    """Whether ways (M, n) lead from branch `two` to branch `one` of targets row: as they do where the class's lie
+    farthest apart, among the targets around; where: row, one, two, (M,) each."""
+    row, one, two = where
+    M = np.arange(len(row))
+    way = way / radian_or_reach(arm)
+    widest, apart = np.zeros(len(row)), way.copy()
+    for there in around(arm, task, target[row], AROUND * off[row]):
+        q = source.rows(there)[0]
+        between = newton.difference(arm, q[M, one], q[M, two])
+        size = np.nan_to_num(np.abs(between).max(axis=1))
+        apart[size > widest] = between[size > widest]
+        widest = np.maximum(widest, size)
+    return np.asarray((apart * way).sum(axis=1) >= 0.0)
