@@ -126,15 +126,23 @@ def kills_cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[kills.Cl
     cluster.close()
 
 
-@pytest.mark.parametrize("who", ["worker", "client", "scheduler"])
-def test_a_kill_costs_at_most_the_chunks_in_hand(who: str, kills_cluster: kills.Cluster, tmp_path: Path) -> None:
-    """One of each here; twenty of each: tests/bench/bench_kills.py."""
-    given, one = tmp_path / "in.csv", tmp_path / "one.csv"
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A batch's input, and the digest of its answers."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    given, one = folder / "in.csv", folder / "one.csv"
     kills.rows(given, 60_000)
     kills.batch(given, one).communicate(timeout=kills.PATIENCE)
-    told = kills.disturbed(
-        given, tmp_path / "two.csv", kills.digest(one), who, kills_cluster, Random(len(who)), count=3
-    )
+    return given, kills.digest(one)
+
+
+@pytest.mark.parametrize("who", ["worker", "client", "scheduler"])
+def test_a_kill_costs_at_most_the_chunks_in_hand(
+    who: str, kills_cluster: kills.Cluster, undisturbed: tuple[Path, str], tmp_path: Path
+) -> None:
+    """One of each here; twenty of each: tests/bench/bench_kills.py."""
+    given, expected = undisturbed
+    told = kills.disturbed(given, tmp_path / "two.csv", expected, who, kills_cluster, Random(len(who)), count=3)
     assert told.same, told
     assert told.redone == 0
     assert told.code in {"worker": (0, 3), "client": (0, 3, -9), "scheduler": (0, 1, 3)}[who], told

@@ -14,6 +14,7 @@ from armkin.cli import compiled_ik
 from armkin.errors import NoSolutionError, UsageError
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
+from armkin.motion import redundant
 from armkin.reachability import beside, from_place, planning
 from armkin.reachability import place as places
 from armkin.reachability.standing import Around, standing
@@ -231,13 +232,16 @@ def test_a_path_of_seven_joints_is_carried_where_path_plans_it(said: str, step: 
             assert planned == whole[i, j, k]
 
 
-def test_the_command_tells_where_the_redundant_joint_is_held(tmp_path: Path) -> None:
+def test_the_command_tells_where_the_redundant_joint_is_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    all_values = redundant.values_to_hold
+    monkeypatch.setattr(redundant, "values_to_hold", lambda *asked: all_values(*asked)[:6])  # each is an arm to prepare
     path, scene = tmp_path / "path.yaml", tmp_path / "scene.yaml"
     path.write_text(LINE)
     scene.write_text("keep_out:\n  - box: {min: [-600, 200, 0], max: [-500, 300, 900]}\n    name: post\n")
     words = ("place", "panda", path, "--step", 400, "--yaw", 180, "--area", "-100,0,0,0")
     best = run(*words, "--json").json["robots"][0]["best"]
     assert best["reached"] == best["of"]
+    assert abs(best["held"]["J7"]) > 1.0
     said = run(*words, "--scene", scene)  # which is not in the way
     assert f"panda, held there: J7 at {best['held']['J7']:.4g}\n" in said.out
     assert "have no max_accel" in said.err
