@@ -15,7 +15,9 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from xdist.remote import Producer
 
+from distribution import Distribution, mixed
 from slow import SLOW
 
 # Before numpy is imported: its threads bring small matrices nothing, and those of two workers wait for one another.
@@ -49,6 +51,10 @@ if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
 
 # What is collected stays until the end: looking through it for garbage again and again took a third of the collecting.
 gc.disable()
+
+import built_once  # noqa: E402
+
+built_once.install()
 
 _HERE = Path(__file__).parent
 # Helpers that compile the firmware, or run it in the emulator.
@@ -86,7 +92,7 @@ def _no_port_of_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark slow tests, and those of the firmware; without its compiler they are skipped, and say why.
 
-    Slow ones come first where there are several workers, so that these end together.
+    Where there are several workers slow ones come first.
     """
     for item in items:
         if _is_slow(item):
@@ -94,11 +100,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if not _needs_emulator(item.path, getattr(item, "module", None)):
             continue
         item.add_marker(pytest.mark.emulator)
-        item.add_marker(pytest.mark.xdist_group(item.path.name))  # one worker has a file: it shares what is compiled
         if any(shutil.which(tool) is None for tool in _TOOLS):
             item.add_marker(pytest.mark.skip(reason=_NO_COMPILER))
     if "PYTEST_XDIST_WORKER" in os.environ:
-        items.sort(key=lambda item: not _is_slow(item))
+        slow = [item for item in items if _is_slow(item)]
+        items[:] = mixed(slow, [item for item in items if not _is_slow(item)])
 
 
 def pytest_collection_finish() -> None:
@@ -125,6 +131,12 @@ def _needs_emulator(path: Path, module: ModuleType | None) -> bool:
         return True
     used = vars(module).values() if module else ()
     return any(getattr(x, "__name__" if isinstance(x, ModuleType) else "__module__", None) in _HELPERS for x in used)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Distribution:
+    """Files of tests that share something go to one worker, whatever `--dist` says."""
+    config.option.loadscopereorder = False  # the order is that of `mixed`
+    return Distribution(config, log)
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:

@@ -1,0 +1,36 @@
+"""An arm that is loaded again is the one that was built before, in tests that run in this process.
+
+What is prepared of an arm, its recorded formulas and its solver, is kept by arm: else each of some thousand tests
+prepares it anew. The robot file is read and validated each time, and must say the same as before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import armkin.keep_out.loading
+import armkin.model.build
+from armkin.model.arm import Arm
+from armkin.robot_file import RobotFile
+from armkin.robot_file.scene import Scene
+
+_build = armkin.model.build.build
+_arms: dict[tuple[str, str], Arm] = {}
+
+
+def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
+    """`armkin.model.build.build`, once for each robot file."""
+    if scene is not None or tool is not None:
+        return _build(file, scene, tool)
+    key = file.path, file.sha256
+    if key not in _arms or _arms[key].file != file:
+        if len(_arms) > 100:
+            _arms.clear()
+        _arms[key] = _build(file)
+    return _arms[key]
+
+
+def install() -> None:
+    """For all tests of this process."""
+    armkin.model.build.build = build
+    armkin.keep_out.loading.build = build
