@@ -33,4 +33,4 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
 def install() -> None:
     """For all tests of this process."""
     armkin.model.build.build = build
-    armkin.keep_out.loading.build = build
+    armkin.keep_out.loading.build = build  # type: ignore[attr-defined]

@@ -23,7 +23,7 @@ def together(path: Path) -> bool:
     return "firmware" in path.parts or bool(_SHARED.search(path.read_text("utf-8")))
 
 
-class Distribution(LoadScopeScheduling):
+class Distribution(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
     """To a worker that is free goes the next test, or the next file whose tests stay together."""
 
     def _split_scope(self, nodeid: str) -> str:
