@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import subprocess
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,14 +27,22 @@ class Agreement:
     largest_fk: float
 
 
+# what is written of an arm and compiled of that is the same for all tests of a process
+texts_of = cache(program)
+_libraries: dict[tuple[str, ...], ctypes.CDLL] = {}
+
+
 def library(arm: armkin.Arm, folder: Path, *options: str, single: bool = False) -> ctypes.CDLL:
     """The generated source as a shared library."""
-    texts = program(arm, "arm.c", single=single)
-    (folder / "arm.c").write_text(texts.source)
-    (folder / "arm.h").write_text(texts.header)
-    words = ["gcc", "-std=c99", "-O2", *options, "-shared", "-fPIC", "arm.c", "-o", "arm.so", "-lm"]
-    subprocess.run(words, cwd=folder, check=True)
-    return ctypes.CDLL(str(folder / "arm.so"))
+    texts = texts_of(arm, "arm.c", None, single)
+    key = texts.source, texts.header, *options
+    if key not in _libraries:
+        (folder / "arm.c").write_text(texts.source)
+        (folder / "arm.h").write_text(texts.header)
+        words = ["gcc", "-std=c99", "-O1", *options, "-shared", "-fPIC", "arm.c", "-o", "arm.so", "-lm"]
+        subprocess.run(words, cwd=folder, check=True)
+        _libraries[key] = ctypes.CDLL(str(folder / "arm.so"))
+    return _libraries[key]
 
 
 class Exported:

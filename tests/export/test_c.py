@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import Exported, agreement, postures
+from exported import Exported, agreement, postures, texts_of
 
 import armkin
 from armkin.export.c.program import identifier, program
@@ -30,7 +30,7 @@ GENERAL = ["jaco_j2n6s300", "moveo"]
 
 def written(folder: Path, robot: str, single: bool = False) -> Path:
     """The generated files of a shipped robot; the path of the source."""
-    texts = program(armkin.load(ROBOTS / f"{robot}.yaml"), f"{robot}.c", None, single)
+    texts = texts_of(armkin.load(ROBOTS / f"{robot}.yaml"), f"{robot}.c", None, single)
     (folder / f"{robot}.c").write_text(texts.source)
     (folder / f"{robot}.h").write_text(texts.header)
     (folder / f"{robot}_test.c").write_text(texts.test)
