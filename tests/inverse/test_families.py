@@ -268,6 +268,24 @@ def test_intervals_shorter_than_a_sample_are_listed(k: int, degrees: float, coun
     assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == count
 
 
+@pytest.mark.parametrize(
+    ("degrees", "value"),
+    [
+        ([140.89, 2.96, 77.21, -142.92, -83.16, 40.33, -89.95], -90.25),
+        ([-18.35, -62.5, 42.82, -6.59, 65.1, 43.56, -10.89], -11.0),
+        ([-72.79, -48.99, -100.34, -108.24, 42.55, 133.65, 83.48], 69.0),
+    ],
+)
+def test_gaps_and_families_between_two_samples_are_listed(degrees: list[float], value: float) -> None:
+    """A straight shoulder takes joint 1 over its limits and back; two limits lie within a degree."""
+    arm, value = armkin.load("panda"), float(np.deg2rad(value))
+    target = armkin.fk(arm, np.deg2rad(degrees))
+    s = armkin.ik(arm, target)
+    assert s.interval is not None
+    own = held_answers(arm, 6, value, target, None)
+    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == len(own)
+
+
 def axis_targets(arm: armkin.Arm, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Postures within limits (N, n), and where their tools are and point to (N, 6)."""
     low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)

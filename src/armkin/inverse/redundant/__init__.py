@@ -4,6 +4,7 @@ held.py            joints that are held: the arm of the others, and its targets
 follower.py        answers of the other joints at any value of the redundant one
 followed.py        its branches, followed along it
 samples.py         what samples of these show, and between which they change
+closer.py          between which more are taken
 ends.py            where these end
 arm_angle.py       those curves in closed form, of a shoulder, an elbow and a wrist
 arcs.py            the same traced through all joints, of other joints without a closed form

@@ -9,7 +9,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, NO_ROOM, SAME_END, TINY
 from armkin.inverse.redundant.pieces import Int, golden_section, margin
-from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside
+from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
 
 if TYPE_CHECKING:
     from armkin.inverse.redundant.follower import Follower
@@ -97,14 +97,15 @@ def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, A
         """Below zero: such a stretch."""
         return sign * rows.rooms(every, value)
 
-    _, _, peak, least = golden_section(depth, t[k], t[k] + (t[1] - t[0]), PEAK)
+    begin, end = value_at(t, row, k), value_at(t, row, k + 1)
+    _, _, peak, least = golden_section(depth, begin, end, PEAK)
     top = -least
     some = np.flatnonzero(top > 0)
     row, k, branch = row[some], k[some], branch[some]
     sign, peak, top = sign[some], peak[some], top[some]
     near = _Ends(find, np.tile(row, 2), np.tile(branch, 2), True)
     at_sample = room[some].T.ravel()
-    outer, inner = np.concatenate([t[k], t[k] + (t[1] - t[0])]), np.tile(peak, 2)
+    outer, inner = np.concatenate([begin[some], end[some]]), np.tile(peak, 2)
     inside = np.tile(sign < 0, 2)  # the stretch is the legal one
     good, bad = np.where(inside, inner, outer), np.where(inside, outer, inner)
     at_inner = np.tile(-sign * top, 2)
@@ -158,18 +159,18 @@ class Places(NamedTuple):
     ends: tuple[Array, Array]  # of these: where the branch ends, and where its limit is crossed
 
 
-def places_of(find: Follower, t: Array, found: Seen) -> Places:
-    """All ends of some targets, of samples along t.
+def places_of(find: Follower, found: Seen) -> Places:
+    """All ends of some targets.
 
     Where two branches merge both are legal, or none: one that is not at the next sample is for a stretch.
     """
-    gone, illegal = found.gone.at, found.crossed.at
+    t, gone, illegal = found.t, found.gone.at, found.crossed.at
     merged, room = _merged(find, t, found.gone)
     inside, outside = found.crossed.rooms.T
     # which of the branches that are not legal at the next sample end there, too, and where
     ending = np.isnan(outside)
     which = np.zeros(len(ending), np.intp)
-    which[ending] = number_of(gone, illegal.row[ending], illegal.k[ending], illegal.branch[ending], len(t))
+    which[ending] = number_of(gone, illegal.row[ending], illegal.k[ending], illegal.branch[ending], t.shape[1])
     if len(gone.row):
         outside = np.where(ending, room[which], outside)
     to_end = ending & (outside >= 0.0)

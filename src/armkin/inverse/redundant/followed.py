@@ -11,7 +11,7 @@ from armkin.inverse.numeric.tolerances import SOLUTION
 from armkin.inverse.redundant.ends import hidden_stretches, number_of, places_of
 from armkin.inverse.redundant.follower import Follower, over_a_turn
 from armkin.inverse.redundant.pieces import Int, Pieces
-from armkin.inverse.redundant.samples import Changes, Runs, Seen, seen
+from armkin.inverse.redundant.samples import Changes, Runs, Seen, seen, value_at
 from armkin.inverse.tasks.task import distance
 
 SAMPLES = 360  # of a turn of the redundant joint,
@@ -34,7 +34,7 @@ class Followed(NamedTuple):
         all of a nearly stretched arm lie within a degree."""
         t = over_a_turn(SAMPLES * finer)
         found = seen(find, t)
-        pieces, short = _pieces(find, t, found), found.short
+        pieces, short = _pieces(find, found), found.short
         if finer == 1:
             near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
             lost = found.lost & near_enough
@@ -65,10 +65,10 @@ class Followed(NamedTuple):
         return there.q, there.legal
 
 
-def _pieces(find: Follower, t: Array, found: Seen) -> Pieces:
-    """All pieces of the curves of some targets, from samples along t."""
-    K = len(t)
-    places = places_of(find, t, found)
+def _pieces(find: Follower, found: Seen) -> Pieces:
+    """All pieces of the curves of some targets."""
+    t, K = found.t, found.t.shape[1]
+    places = places_of(find, found)
     hidden, stretch = hidden_stretches(find, t, found.turns)
     gaps = hidden.set_before
     more, short = hidden.some(~gaps), places.short
@@ -88,10 +88,10 @@ def _pieces(find: Follower, t: Array, found: Seen) -> Pieces:
 
 
 def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -> Pieces:
-    """The pieces that hold runs of samples along t (K,); ends: where changes are."""
-    K, h = len(t), float(t[1] - t[0])
-    at = t[runs.first] + runs.best * h
-    a, b, low, high = np.full(len(at), -np.pi), np.full(len(at), np.pi), at - h, at + h
+    """The pieces that hold runs of samples at t (N, K); ends: where changes are."""
+    K, best = t.shape[1], runs.first + runs.best
+    low, at, high = (value_at(t, runs.row, best + side) for side in (-1, 0, 1))
+    a, b = np.full(len(at), -np.pi), np.full(len(at), np.pi)
     some = np.flatnonzero(runs.length < K)
     row, first, branch, middle = runs.row[some], runs.first[some], runs.branch[some], at[some]
     begin = ends[number_of(changes, row, (first - 1) % K, branch, K)]

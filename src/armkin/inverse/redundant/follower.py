@@ -17,6 +17,7 @@ from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric.tolerances import ACCEPTED
+from armkin.inverse.redundant.closer import values_between
 from armkin.inverse.redundant.pieces import motion_of_joint, within_limits
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved, moved_entries
@@ -39,6 +40,7 @@ class Postures(NamedTuple):
 class Sampled(NamedTuple):
     """Answers of targets S at K values of the redundant joint, in the columns of their branches."""
 
+    t: Array  # (S, K) these values
     values: list[Array]  # of each joint, its branch axes, perhaps of length 1, before all samples (S K,)
     axes: tuple[int, ...]  # lengths of the branch axes
     valid: Bool  # (S, K, B)
@@ -140,25 +142,48 @@ class Follower(NamedTuple):
         return Postures(q, valid, legal & valid)
 
     def sampled(self, some: NDArray[np.intp], t: Array) -> Sampled:
-        """Some of the targets (S,) at all of t (K,)."""
+        """Some of the targets (S,) at all of t (K,) and, of a closed form, at more values between."""
         rows, values = np.repeat(some, len(t)), np.tile(t, len(some))
-        if self.by_formula:
-            *columns, miss, _ = self._candidates(rows, values, [])
-            axes, there = _recorded(self.arm, self.free)[1], miss <= ACCEPTED**2
-        else:
+        if not self.by_formula:
             q = self.found(rows, values)
-            columns, axes = list(q.T), q.shape[1:2]
-            there, miss = ~np.isnan(columns[0]), np.full(columns[0].shape, np.nan)
-        shape, near = (*axes, len(rows)), self.near[rows].T
+            columns, missed = list(q.T), np.where(np.isnan(q[..., 0].T), np.inf, 0.0)
+            return self._within(some, np.tile(t, (len(some), 1)), columns, missed, q.shape[1:2])
+        axes = _recorded(self.arm, self.free)[1]
+        *columns, missed, _ = self._candidates(rows, values, [])
+        more = values_between(self.arm, columns, missed, axes, t)
+        real = np.isfinite(more)
+        *others, other, _ = self._candidates(np.broadcast_to(some[:, None], more.shape)[real], more[real], [])
+        every = np.concatenate([np.tile(t, (len(some), 1)), np.where(real, more, t[-1])], axis=1)
+        order = np.argsort(every, axis=1, kind="stable")
+
+        def merged(first: Array, second: Array) -> Array:
+            """With the values between; where there is none the last sample is there once more."""
+            axes, (S, K) = first.shape[:-1], every.shape
+            out = np.empty((*axes, S, K))
+            out[..., : len(t)] = first.reshape(*axes, S, len(t))
+            out[..., len(t) :] = out[..., len(t) - 1, None]
+            out[..., len(t) :][..., real] = second
+            return np.take_along_axis(out, order.reshape(*[1] * len(axes), S, K), axis=-1).reshape(*axes, -1)
+
+        columns = [merged(*pair) for pair in zip(columns, others, strict=True)]
+        return self._within(some, np.take_along_axis(every, order, axis=1), columns, merged(missed, other), axes)
+
+    def _within(
+        self, some: NDArray[np.intp], t: Array, columns: list[Array], missed: Array, axes: tuple[int, ...]
+    ) -> Sampled:
+        """Values of all joints on their own branch axes before samples of some of the targets, at legal copies."""
+        there = missed <= ACCEPTED**2
+        near = self.near[np.repeat(some, t.shape[1])].T
+        shape = (*axes, t.size)
         legal, cost, room = there, np.zeros(()), np.full(shape, 2 * np.pi)
         for j in sorted(range(len(columns)), key=lambda j: columns[j].size):  # those on few branch axes first
             columns[j], ok = nearest_of_joint(self.arm, j, columns[j], near[j])
             legal, cost = legal & ok, cost + motion_of_joint(self.arm, j, columns[j], near[j])
             within_limits(self.arm, j, columns[j], room)
         room = np.where(there, room, np.nan)
-        every = (there, legal, room, np.where(there, cost, np.inf), miss)
-        dense = (np.broadcast_to(x, shape).reshape(-1, len(some), len(t)).transpose(1, 2, 0) for x in every)
-        return Sampled(columns, axes, *dense)
+        every = (there, legal, room, np.where(there, cost, np.inf), missed)
+        dense = (np.broadcast_to(x, shape).reshape(-1, *t.shape).transpose(1, 2, 0) for x in every)
+        return Sampled(t, columns, axes, *dense)
 
     def own(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Array:
         """One branch each (M, n), as `found`."""

@@ -147,12 +147,15 @@ def within_limits(arm: Arm, j: int, value: Array, room: Array) -> None:
     np.minimum(room, 0.5 * (upper - lower) - off, out=room)
 
 
-def turning(values: Array) -> Bool:
+def turning(values: Array, t: Array) -> Bool:
     """Whether values of one sign at a sample and the next seem to have the other one in between, if they go on as on
-    the far sides of both: (N, K, B)."""
+    the far sides of both: (N, K, B), at t (N, K) of a turn."""
+    width = np.diff(t, axis=1, append=t[:, :1] + 2 * np.pi)[:, :, None]
     following = np.roll(values, -1, axis=1)
-    with np.errstate(invalid="ignore"):
-        on, back = 2 * values - np.roll(values, 1, axis=1), 2 * following - np.roll(values, -2, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slope = (following - values) / width
+        on = values + width * np.roll(slope, 1, axis=1)
+        back = following - width * np.roll(slope, -1, axis=1)
         up, down = (values < 0) & (following < 0), (values > 0) & (following > 0)
         return np.asarray((up & (on > 0) & (back > 0)) | (down & (on < 0) & (back < 0)))
 

@@ -42,8 +42,14 @@ class Changes(NamedTuple):
         return np.asarray(np.where(self.set_before, self.k + offset, self.k + 1 - offset) % K)
 
     def value(self, offset: int, t: Array) -> Array:
-        """As `sample`, the value of the joint, not less than the first one's if it goes over the end."""
-        return np.asarray(t[self.k] + (t[1] - t[0]) * np.where(self.set_before, offset, 1 - offset))
+        """As `sample`, the value of the joint of samples at t (N, K), whole turns on if it goes over the end."""
+        return value_at(t, self.row, np.where(self.set_before, self.k + offset, self.k + 1 - offset))
+
+
+def value_at(t: Array, row: Int, k: Int) -> Array:
+    """Values of the joint at samples k (M,) of targets (M,), whole turns on beyond the last one: t (N, K)."""
+    turns, k = np.divmod(k, t.shape[1])
+    return np.asarray(t[row, k] + 2 * np.pi * turns)
 
 
 class Gone(NamedTuple):
@@ -95,10 +101,11 @@ class Seen(NamedTuple):
     hidden: Bool  # (N,) branches seem to be there between two values at which they are not
     lost: Bool  # (N,) none is there at any of them
     short: Bool  # (N,) no joint moves by REACH along any
+    t: Array  # (N, K) the samples' values of the joint
 
 
 def seen(find: Follower, t: Array) -> Seen:
-    """What samples of all targets along t (K,) show."""
+    """What samples of all targets along t (K,) show, and others between them."""
     N = len(find.target)
     each = max(AT_A_TIME // len(t), 1) if find.by_formula else max(N, 1)
     some = (np.arange(k, min(k + each, N)) for k in range(0, max(N, 1), each))
@@ -124,17 +131,19 @@ def _seen(found: Sampled, rows: Int) -> Seen:
     earlier = np.where(np.isnan(other[every, gone.branch, 0]), np.nan, beside(other, gone.branch)[2])
     own = gone.row, now, gone.branch
     rooms = [room[crossed.row, crossed.sample(k, K), crossed.branch] for k in (0, 1)]
-    row, k, branch = turns = np.nonzero(turning(room))
+    row, k, branch = turns = np.nonzero(turning(room, found.t))
     off = np.where(valid, np.nan, -np.sqrt(found.missed))
+    there = _runs(found, valid, rows)
     return Seen(
         Gone(gone._replace(row=rows[gone.row]), twin, np.stack([apart, earlier], axis=1), room[own], legal[own]),
         Crossed(crossed._replace(row=rows[crossed.row]), np.stack(rooms, axis=1)),
         Turns(rows[row], k, branch, np.stack([room[turns], room[row, (k + 1) % K, branch]], axis=1)),
         _runs(found, legal, rows),
-        _runs(found, valid, rows),
-        np.asarray(turning(off).any(axis=(1, 2))),
+        there,
+        np.asarray(turning(off, found.t).any(axis=(1, 2))),
         np.asarray(~valid.any(axis=(1, 2))),
-        _all_short(found),
+        _all_short(found, there.row - rows[0], there.first, there.length) if len(rows) else np.zeros(0, bool),
+        found.t,
     )
 
 
@@ -162,12 +171,11 @@ def _runs(found: Sampled, good: Bool, rows: Int) -> Runs:
     return Runs(rows[row], branch, first, length, best, start, ~holding_none(legal, curve, first, length))
 
 
-def _all_short(found: Sampled) -> Bool:
-    """Whether no joint moves by REACH along any family of a target (S,)."""
-    together = found.valid
-    for shift in range(1, 2 + int(REACH / (2 * np.pi / found.valid.shape[1]))):
-        together = together & np.roll(found.valid, -shift, axis=1)
-    short = np.asarray(found.valid.any(axis=(1, 2)) & ~together.any(axis=(1, 2)))
+def _all_short(found: Sampled, row: Int, first: Int, length: Int) -> Bool:
+    """Whether no joint moves by REACH along any family of a target (S,), of which runs (R,) of samples are there."""
+    wide = value_at(found.t, row, first + length - 1) - value_at(found.t, row, first) > REACH
+    short = np.asarray(found.valid.any(axis=(1, 2)))
+    short[row[wide]] = False
     for k in np.flatnonzero(short).tolist():
         K, valid = found.valid.shape[1], found.valid[k]
         q = found.postures(np.full(K, k), np.arange(K))
