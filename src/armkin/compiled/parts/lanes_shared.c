@@ -5,46 +5,60 @@ typedef struct {
     double x, *v;
 } arm_many_group;
 
+/* Which of the columns k and later is the longest from row k on; *length: how long. */
+static arm_flags arm_longest_lanes(const arm_many *a, int n, int k, arm_many *length)
+{
+    arm_many most = arm_all(-1);
+    arm_flags chosen = (arm_flags){0} + k;
+    int i, j;
+    for (j = k; j < n; j++) {
+        arm_many square = arm_all(0);
+        arm_flags more;
+        for (i = k; i < n; i++)
+            square += a[n * i + j] * a[n * i + j];
+        more = (arm_flags)(square > most);
+        most = arm_pick(more, square, most);
+        chosen = (more & j) | (~more & chosen);
+    }
+    *length = arm_roots(most);
+    return chosen;
+}
+
+/* Column k and each lane's chosen one change places. */
+static void arm_swap_lanes(arm_many *a, int n, int k, arm_flags chosen, arm_flags *place)
+{
+    int i, j;
+    for (j = k + 1; j < n; j++) {
+        const arm_flags swap = (arm_flags)(chosen == j), kept = place[k];
+        if (!arm_any(swap))
+            continue;
+        place[k] = (swap & place[j]) | (~swap & kept);
+        place[j] = (swap & kept) | (~swap & place[j]);
+        for (i = 0; i < n; i++) {
+            const arm_many one = a[n * i + k], other = a[n * i + j];
+            a[n * i + k] = arm_pick(swap, other, one);
+            a[n * i + j] = arm_pick(swap, one, other);
+        }
+    }
+}
+
 /* Orthonormal rows, sixteen numbers apart, of what n x n matrices take to zero, by reflections with the longest column first;
    the lanes where that has d dimensions. */
 static arm_flags arm_null_space_lanes(arm_many *a, int n, int d, arm_many *basis)
 {
     arm_many first = arm_all(0), last = first, rest = first;
     arm_flags place[16], good = ~(arm_flags){0};
-    int i, j, k, f, t, round;
+    int j, k, f, t, round;
     for (k = 0; k < n; k++)
         place[k] = (arm_flags){0} + k;
     for (k = 0; k <= n - d; k++) { /* the last round only asks what is left */
-        arm_many most = arm_all(-1);
-        arm_flags chosen = place[0];
-        for (j = k; j < n; j++) {
-            arm_many square = arm_all(0);
-            arm_flags more;
-            for (i = k; i < n; i++)
-                square += a[n * i + j] * a[n * i + j];
-            more = (arm_flags)(square > most);
-            most = arm_pick(more, square, most);
-            chosen = (more & j) | (~more & chosen);
-        }
-        rest = arm_roots(most);
+        const arm_flags chosen = arm_longest_lanes(a, n, k, &rest);
         if (k == n - d)
             break;
         first = k == 0 ? rest : first;
         last = rest;
         good &= (arm_flags)(rest > 1e-9 * first);
-        for (j = k + 1; j < n; j++) {
-            const arm_flags swap = (arm_flags)(chosen == j);
-            const arm_flags kept = place[k];
-            if (!arm_any(swap))
-                continue;
-            place[k] = (swap & place[j]) | (~swap & kept);
-            place[j] = (swap & kept) | (~swap & place[j]);
-            for (i = 0; i < n; i++) {
-                const arm_many one = a[n * i + k], other = a[n * i + j];
-                a[n * i + k] = arm_pick(swap, other, one);
-                a[n * i + j] = arm_pick(swap, one, other);
-            }
-        }
+        arm_swap_lanes(a, n, k, chosen, place);
         arm_reflect_lanes(a, n, k, n);
     }
     good &= (arm_flags)(rest < 1e-3 * last) & (arm_flags)(rest < 1e-5 * first);
