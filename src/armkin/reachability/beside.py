@@ -59,9 +59,9 @@ def by_radius(
             return None
         for i, target in enumerate(some):
             dx, dy = target[0] - foot_x, target[1] - foot_y
-            cell = (np.sqrt(dx * dx + dy * dy) * (1.0 / table.apart)).astype(np.int32)
+            cell = np.minimum(np.sqrt(dx * dx + dy * dy) * (1.0 / table.apart), RADII).astype(np.int32)
             open_ = np.append((table.open[i] >= 0.0).any(axis=0), False)
-            near = np.flatnonzero(open_.take(cell, mode="clip"))
+            near = np.flatnonzero(open_.take(cell))
             at = cell.take(near)
             seen = np.arctan2(dy.take(near), dx.take(near))
             seen -= yaw.take(near)
