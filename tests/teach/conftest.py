@@ -29,9 +29,9 @@ def _needs_browser(module: ModuleType) -> bool:
     return any(getattr(one, "__module__", None) == "browsing" for one in vars(module).values())
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """One for all tests of this folder that come one after another; each page has a profile of its own."""
+    """One for all tests of a file, each page with a profile of its own; longer, others' event loops would meet it."""
     with chromium() as one:
         yield one
 
