@@ -49,8 +49,9 @@ class NewtonSteps:
         error = min(SLOPE * off, 0.5)  # its square after a step, and so on
         least = max(math.ceil(math.log2(math.log(LAST_ERROR) / math.log(error))), 1)
         self.steps = min(least + 1, MOST)  # one more, and two thirds of those near a singularity need no other way
-        self.absent = math.inf if arm.prismatic.any() else ABSENT * off  # the error grows with the slide's extension
         self.counted = task.name == "xyz" and not arm.prismatic.any()
+        # squared residual of a seed that leads nowhere, and need not; the error grows with a slide's extension
+        self.absent = None if self.counted or arm.prismatic.any() else ABSENT * off
 
     def corrected(self, seeds: Candidates, goal: list[Entry]) -> Candidates:
         """Seeds moved onto the arm, and which of them are in doubt.
@@ -67,12 +68,10 @@ class NewtonSteps:
         assert first is not None
         miss = arrays.dot(missing := self._linear(pairs, where)[0], missing)
         there = miss < precision().nearby
-        doubt = seeds.doubt | (_merged(pairs, self.unit) & there)
-        if self.counted:
-            return Candidates(pairs, doubt | (miss >= precision().nearby), miss)
-        return Candidates(
-            pairs, doubt | ((miss >= precision().nearby) & (arrays.dot(first, first) < self.absent)), miss
-        )
+        left: Truth = miss >= precision().nearby
+        if self.absent is not None:
+            left = left & (arrays.dot(first, first) < self.absent)
+        return Candidates(pairs, seeds.doubt | (_merged(pairs, self.unit) & there) | left, miss)
 
     def _linear(self, pairs: list[Pair], where: list[Entry]) -> tuple[list[Entry], list[list[Entry]]]:
         """What the point still misses, and its change with each of the first joints [reaches a radian or reach].
