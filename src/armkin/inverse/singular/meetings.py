@@ -16,7 +16,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, GROWTH, HIGH, SOLUTION
-from armkin.inverse.singular.self_motions import FAR, OBLIQUE, STEP, follow, null_directions, on_surface, pushed
+from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -68,14 +68,13 @@ def _steps_out(
     most: (M,) residual of what counts as on one: points beside a self-motion of double roots have more. Also which
     meetings (M,) all pushes fall back to.
     """
-    who, push = null_directions(arm.n, V, nullity)
-    # a surface is asked by one push more, in the same call
-    M, whose = len(q), np.concatenate([np.arange(len(q)), who])
-    every = np.concatenate([V[:, -1] + OBLIQUE * V[:, -2], push])
-    there, size, grown = pushed(arm, task, q[whose], FAR, every, target[whose])
-    rests = ~on_surface(arm, task, q, V, target, (there[:M], size[:M]))
-    left = rests[who]
-    who, there, size, grown = who[left], there[M:][left], size[M:][left], grown[M:][left]
+    rests = ~on_surface(arm, task, q, V, target)
+    rows = np.flatnonzero(rests)
+    if not len(rows):
+        return rows, np.zeros((0, arm.n)), rests
+    who, push = null_directions(arm.n, V[rows], nullity[rows])
+    who = rows[who]
+    there, size, grown = pushed(arm, task, q[who], np.full(len(who), 10 * STEP), push, target[who])
     rests[who[grown <= GROWTH]] = False
     unit, way = radian_or_reach(arm), newton.difference(arm, there, q[who])
     some = np.flatnonzero((size <= most[who]) & (np.abs(way).max(axis=1) > 3 * STEP))

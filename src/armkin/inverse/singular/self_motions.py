@@ -39,9 +39,7 @@ if TYPE_CHECKING:
 
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
-FAR = 10 * STEP
-OBLIQUE = 0.7  # of the second lost direction, where two are gone along at once
-STEPS = np.array([[STEP], [FAR]])  # a short one and a long one
+STEPS = np.array([[STEP], [10 * STEP]])  # a short one and a long one
 
 Int = NDArray[np.int64]
 
@@ -163,14 +161,12 @@ def follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
 
 
-def pushed(
-    arm: Arm, task: Task, q: Array, step: Array | float, push: Array, target: Array
-) -> tuple[Array, Array, Array]:
-    """Postures (M, n), a step, () or (M,), away along push (M, n), pulled back: they, what they miss, and how much more
-    than q that is a step's length; infinite for those that fell back.
+def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Array, Array, Array]:
+    """Postures (M, n), a step (M,) away along push (M, n), pulled back: they, what they miss, and how much more than
+    q that is a step's length; infinite for those that fell back.
     """
     unit = radian_or_reach(arm)
-    there, size = follow(arm, task, q + np.reshape(step, (-1, 1)) * push * unit, target)
+    there, size = follow(arm, task, q + step[:, None] * push * unit, target)
     far = (np.abs(there - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
     return there, size, np.where(far, size - newton.missing(arm, task, q, target), np.inf) / step
 
@@ -194,7 +190,7 @@ def _moved(away: Array, long: Bool) -> Bool:
     nearby: neither is motion of a joint.
     """
     most = np.abs(away).max(axis=1)
-    return np.asarray(np.where(long[:, None], most[1] > MOVED * FAR, most[0] > 10 * TURNED))
+    return np.asarray(np.where(long[:, None], most[1] > MOVED * 10 * STEP, most[0] > 10 * TURNED))
 
 
 def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
@@ -204,7 +200,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     who, push = null_directions(arm.n, V, nullity)
     # Most candidates fall back at once. Where several directions are lost, a short step is drawn back to the meeting.
     several = nullity[who] > 1
-    first = np.where(several, FAR, STEP)
+    first = np.where(several, 10 * STEP, STEP)
     _, _, grown = pushed(arm, task, q[who], first, push, target[who])
     some = np.flatnonzero(grown <= GROWTH)
     # of those that lose one direction most do not stay on a longer way
@@ -232,16 +228,13 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     return moving, joints
 
 
-def on_surface(
-    arm: Arm, task: Task, q: Array, V: Array, target: Array, pushed: tuple[Array, Array] | None = None
-) -> Bool:
+def on_surface(arm: Arm, task: Task, q: Array, V: Array, target: Array) -> Bool:
     """Which postures (M, n) that lose two directions still do a long step off, by both ways at once: (M,).
 
     Those lie on a self-motion of two dimensions, or on one of double roots. V: (M, n, n) right singular vectors.
-    pushed: where the step leads, (M, n), and what is missed there (M,), if that is known.
     """
-    push = FAR * (V[:, -1] + OBLIQUE * V[:, -2])
-    there, size = pushed or follow(arm, task, q + push * radian_or_reach(arm), target)
+    push = (V[:, arm.n - 1] + 0.7 * V[:, arm.n - 2]) * 10 * STEP
+    there, size = follow(arm, task, q + push * radian_or_reach(arm), target)
     nullity = newton.null_space(arm, task, there, target)[2]
     away = np.abs(newton.difference(arm, there, q)).max(axis=1)
     return np.asarray((size <= SOLUTION) & (nullity > 1) & (away > 3 * STEP))
