@@ -57,6 +57,7 @@ BLUR_OF_PAIRS = 3e-8  # [rad] how far rounding parts two roots of such a matrix,
 SAME_END = 1e-10  # [rad] places this close where a branch of seven joints ends are one
 NO_ROOM = 1e-13  # [rad, rad^2] what is left there that is nothing
 BEFORE_MERGING = 1e-8  # [rad] from where two branches merge to where they are still there
+JOINED = 1e-3  # and how close two are just before they merge, in parts of what lay between them at the last sample
 STEADY = 0.05  # singular value above which a branch of an arm near a class continues one of the class
 FAR = 20  # reaches that a target of a sliding arm may be away for its branches to be known complete
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.inverse.numeric.tolerances import BEFORE_MERGING, NO_ROOM, SAME_END, TINY
+from armkin.inverse.numeric.tolerances import BEFORE_MERGING, JOINED, NO_ROOM, SAME_END, TINY
 from armkin.inverse.redundant.pieces import Int, golden_section, margin
 from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
 
@@ -18,7 +18,6 @@ HALVINGS = 60  # steps to where a branch ends, at most
 SECANTS = 24  # of which the later ones halve
 BACK = 0.1  # of what is left, from past an end to where the branch is there
 MERGING = 0.01  # [rad^2] branches that merge are less than so far apart
-JOINED = 1e-3  # as a part of that at the last sample: just before they do
 PEAK = 12  # steps to where a branch is nearest to its limits, or farthest beyond them
 
 
