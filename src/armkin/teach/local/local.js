@@ -26,9 +26,9 @@ export async function act(name) {
   throw new Refused("this page has no server: start armkin teach for that");
 }
 
-/** The posture that the address names [deg | mm]; home if it names none. @returns {number[]} */
-function addressed() {
-  const words = new URLSearchParams(location.hash.slice(1)).get("q")?.split(",") ?? [];
+/** The posture that an address names [deg | mm]; home if it names none. @param {string} link @returns {number[]} */
+function addressed(link) {
+  const words = new URLSearchParams(new URL(link).hash.slice(1)).get("q")?.split(",") ?? [];
   const values = words.map(Number);
   const good = words.length === home.length && words.every((word) => word.trim() !== "") && values.every(Number.isFinite);
   return good ? values : home;
@@ -105,7 +105,8 @@ function ready(page) {
   );
   const section = make("section", { id: "share", "aria-labelledby": "share-title" }, title, buttons, make("p", { id: "copied", role: "status" }));
   get("keys").before(section);
-  addEventListener("hashchange", () => page.turn(addressed()));
+  // the event's own address: the page may have written the posture before into it meanwhile
+  addEventListener("hashchange", (event) => page.turn(addressed(event.newURL)));
 }
 
 /**
@@ -116,5 +117,5 @@ export async function enter(hears) {
   /** @type {any} */ (window).armkin = arm;
   hears.control({ holder: "yours", pages: 1 });
   const program = { moves: [], blend: 0, speed: 100, tool_speed: null, via: false, undo: 0, redo: 0 };
-  return { scene, look: shown({ q: addressed() }), program, ready, alone: shown };
+  return { scene, look: shown({ q: addressed(location.href) }), program, ready, alone: shown };
 }
