@@ -80,6 +80,17 @@ def test_a_self_motion_of_two_dimensions_that_meets_another(q: list[float]) -> N
         assert not verdict.solutions.complete[0]
 
 
+@pytest.mark.parametrize("q", [[-90, 0, -90, 90, -90, 0], [180, 180, 90, -90, -90, -90]])
+def test_two_axes_in_line_where_three_directions_are_lost(q: list[float]) -> None:
+    """Joints 3 and 5 turn about one line: of all directions lost that one alone holds the joints beside these."""
+    arm, screw, *_ = case(right_angles(np.random.default_rng(2385)), "pose")
+    task, _ = solver(arm, "pose")
+    joints = np.radians([q])
+    verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array())
+    assert verdict, verdict
+    assert verdict.solutions.free[0].tolist() == [False, False, True, False, True, False]
+
+
 def test_a_folded_arm_of_equal_links_beside_its_kite() -> None:
     """Joints 2 and 4 alone move the folded arm; it meets the four-bar motion that moves joints 3 and 6 as well."""
     rows = zip([90, 0, 0, 90, -90, 0], [0, -200, -200, 0, 0, 0], [100, 0, 0, 100, 100, 100], strict=True)

@@ -254,23 +254,30 @@ def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
     return who[once], push[once]
 
 
+def _across(held: Array) -> Array:
+    """Vectors (m, k) at right angles to the k - 1 columns of (m, k, k - 1): in three dimensions the cross product."""
+    k = held.shape[1]
+    return np.stack([(-1) ** i * np.linalg.det(np.delete(held, i, axis=1)) for i in range(k)], axis=1)
+
+
 def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
     """The same in parts, some of them several times.
 
     In a null space of several dimensions a self-motion may hide between the basis vectors: there every joint
-    is pushed as far as the null space lets it, and in a plane of them every joint is held.
+    is pushed as far as the null space lets it, and of k dimensions any k - 1 joints are held.
     """
     for index in range(int(nullity.max())):
         who = np.flatnonzero(nullity > index)
         yield who, V[who, n - 1 - index]
-    plane = np.flatnonzero(nullity == 2)
-    for joint in range(n if len(plane) else 0):
-        u, v = V[plane, n - 1], V[plane, n - 2]
-        hold = v[:, joint, None] * u - u[:, joint, None] * v
-        size = np.linalg.norm(hold, axis=1)
-        some = size > 0.1
-        if some.any():
-            yield plane[some], hold[some] / size[some, None]
+    for k in range(2, int(nullity.max()) + 1):
+        some = np.flatnonzero(nullity == k)
+        basis = V[some, ::-1][:, :k]
+        for held in itertools.combinations(range(n), k - 1) if len(some) else ():
+            hold = np.einsum("mk,mkn->mn", _across(basis[:, :, held]), basis)
+            size = np.linalg.norm(hold, axis=1)
+            far = size > 0.1
+            if far.any():
+                yield some[far], hold[far] / size[far, None]
     many = np.flatnonzero(nullity > 1)
     in_null = np.arange(n) >= n - nullity[many][:, None]
     for joint in range(n if len(many) else 0):
