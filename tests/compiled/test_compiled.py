@@ -35,7 +35,7 @@ def same(a: armkin.Solutions, b: armkin.Solutions) -> None:
     np.testing.assert_allclose(a.target, b.target, rtol=1e-14)  # an axis of length one to rounding is taken as it is
     np.testing.assert_allclose(a.q, b.q, rtol=0, atol=1e-8)
     np.testing.assert_array_equal(a.best, b.best)
-    assert (a.names, a.method, a.why, a.arm, a.task) == (b.names, b.method, b.why, b.arm, b.task)
+    assert (a.names, a.method, a.why, a.arm, a.task.name) == (b.names, b.method, b.why, b.arm, b.task.name)
 
 
 def found_by_elimination(a: armkin.Solutions, b: armkin.Solutions) -> None:
