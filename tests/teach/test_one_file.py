@@ -203,10 +203,12 @@ def test_a_fragment_that_is_no_posture_is_home(browser: Browser, tmp_path: Path)
     bad = ("#q=<img src=x onerror=bad=1>", "#q=1,2", "#q=1e999,0,0", "#q=,,", "#%00")
     with opened(browser, written(tmp_path, "three_dof") + bad[0]) as page:
         assert page.evaluate(numbers) == home
+        until(page, "location.hash === '#q=0,90,-90'")
         for fragment in bad:
             for named, shown in (("#q=10,60,-60", other), (fragment, home)):
                 page.evaluate("text => { location.hash = text; }", named)
                 until(page, f"{numbers}.join() === argument", ",".join(shown))
+            until(page, "location.hash === '#q=0,90,-90'")  # the address says so, too, 0.1 s later at most
         # the page writes what it showed before into the address, just before it hears of another one
         page.evaluate("location.hash = '#q=10,60,-60'; history.replaceState(null, '', '#q=0,90,-90');")
         until(page, f"{numbers}.join() === argument", ",".join(other), seconds=10.0)
