@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.branches.whole_turns import nearest_copy, nearest_row
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.wrist import meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
 from armkin.inverse.redundant.pieces import Int, Pieces, best_samples, holding_none, none, runs
@@ -193,7 +193,7 @@ def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     psi = np.empty((M, 2 * K + 1))
     psi[:, ::2], psi[:, 1::2] = ends, 0.5 * (ends[:, 1:] + ends[:, :-1])
     t = _angles(of, circles.R, psi[:, :-1])
-    elbow, reached = nearest_copy(wrapped(circles.q4), near[:, 3], float(arm.lower[3]), float(arm.upper[3]))
+    elbow, reached = nearest_of_joint(arm, 3, circles.q4, near[:, 3])
     cost = np.broadcast_to(np.abs(elbow - near[:, 3])[:, None, None, None], (M, 2, 2, 2 * K)).copy()
     legal = np.broadcast_to(np.broadcast_to(reached, M)[:, None, None, None], cost.shape).copy()
     for half in range(2):
@@ -202,7 +202,7 @@ def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
             some = (slice(None), half) if k == 0 else (slice(None), slice(None), half)
             for i, joint in enumerate(joints):
                 close = near[:, joint, None]
-                value, ok = nearest_copy(wrapped(q[i, k]), close, float(arm.lower[joint]), float(arm.upper[joint]))
+                value, ok = nearest_of_joint(arm, joint, q[i, k], close)
                 moved, fits = np.abs(value - close), np.broadcast_to(ok, (M, 2 * K))
                 cost[some] += moved[:, None]
                 legal[some] &= fits[:, None]
