@@ -25,13 +25,17 @@ HALF = np.pi + SLACK  # how far above `near` a copy may be
 MOST = 50_000  # copies of one branch that `turns` gives
 
 
-def nearest_copy(value: Array, near: Array | float, lower: float, upper: float) -> tuple[Array, Truth]:
-    """The copy of a revolute joint's values, modulo whole turns, that is legal and nearest.
+def nearest_copy(
+    value: Array, near: Array | float, lower: float, upper: float, slides: bool = False
+) -> tuple[Array, Truth]:
+    """The copy of a joint's values, modulo whole turns, that is legal and nearest; one that slides has no copies.
 
     value: any shape, in [-pi, pi]; near: broadcastable [rad]. Returns the values and
     whether they are within [lower, upper]; where no copy is, the principal value. Of two that are half a turn from
     `near`, to within SLACK, the one above it: rounding must not decide.
     """
+    if slides:
+        return value, (value >= lower - SLACK) & (value <= upper + SLACK)
     if lower >= -np.pi and upper <= np.pi:
         # the principal value is the only one that can be legal, but for half a turn, which has two
         value, low, high = _principal(value), lower - SLACK, upper + SLACK
@@ -138,17 +142,17 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
     if not q.size:
         return out, inside
     for i in range(arm.n):
-        out[..., i], ok = nearest_of_joint(arm, i, q[..., i], near[..., i])
+        slides, value = bool(arm.prismatic[i]), q[..., i]
+        limits = float(arm.lower[i]), float(arm.upper[i])
+        out[..., i], ok = nearest_copy(value if slides else wrapped(value), near[..., i], *limits, slides)
         inside &= ok
     return out, inside
 
 
 def nearest_of_joint(arm: Arm, i: int, value: Array, near: Array) -> tuple[Array, Truth]:
-    """`nearest_copy` of any values of joint i, of an arm that turns as it is told; what slides has no copies."""
-    lower, upper = float(arm.lower[i]), float(arm.upper[i])
-    if arm.prismatic[i]:
-        return value, (value >= lower - SLACK) & (value <= upper + SLACK)
-    return nearest_copy(wrapped(value), near, lower, upper)
+    """`nearest_copy` of values of joint i, of an arm that turns as it is told."""
+    slides, limits = bool(arm.prismatic[i]), (float(arm.lower[i]), float(arm.upper[i]))
+    return nearest_copy(value if slides else wrapped(value), near, *limits, slides)
 
 
 def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
