@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -195,8 +196,7 @@ def test_hits_are_those_of_python(name: str, tmp_path: Path) -> None:
 
 
 def test_a_name_in_the_module_ends_no_script_and_no_line() -> None:
-    arm = armkin.load("three_dof")
-    object.__setattr__(arm, "name", "</script><script>alert(1)//\u2028throw 1")
+    arm = replace(armkin.load("three_dof"), name="</script><script>alert(1)//\u2028throw 1")
     text = module(arm)
     assert "</script" not in text
     assert "\u2028" not in text
