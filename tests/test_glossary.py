@@ -22,7 +22,7 @@ def test_each_term_is_defined_once_and_in_order() -> None:
     found = terms()
     assert len(found) > 30
     assert len(found) == len({term.lower() for term in found})
-    assert sorted(found, key=str.lower)[0] == found[0]
+    assert found == sorted(found, key=str.lower)
     lines = [line for line in GLOSSARY.read_text().splitlines() if line.startswith("- ")]
     assert len(lines) == len(found), "a line without a term"
 

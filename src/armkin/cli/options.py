@@ -88,7 +88,7 @@ Compiled = Annotated[
     typer.Option(
         "--compiled",
         callback=_built,
-        help="By machine code that this computer's C compiler builds: for batches.",
+        help="Run machine code that this computer's C compiler builds, in place of Python: for batches.",
     ),
 ]
 Workers = Annotated[

@@ -37,15 +37,20 @@ def calibrate(
     ] = None,
     suggest: Annotated[
         int | None,
-        typer.Option("--suggest", metavar="N", help="Instead, the next N poses whose measurement tells most."),
+        typer.Option(
+            "--suggest",
+            metavar="N",
+            help="List the next N poses to measure instead: those that would reduce the uncertainty most.",
+        ),
     ] = None,
     json: Json = False,
     out: Out = None,
 ) -> None:
     """A corrected robot file from measured tips.
 
-    Rows that do not fit the others are forgotten, and corrections that the rows do not show stay with the file. How
-    much is corrected is decided on rows that the fit has not seen. --out NEW.yaml writes the robot file.
+    Rows that do not fit the others are left out, and numbers that the rows do not determine keep the file's value. How
+    much is corrected is decided by cross-validation, on rows that the fit has not seen. --out NEW.yaml writes the
+    robot file.
     """
     import numpy as np
 
@@ -157,7 +162,7 @@ def _text(arm: Arm, answer: dict[str, Any]) -> str:
             lines.append("+- is not stated from fewer than 20 rows")
     if flagged := answer["flagged"]:
         said = ", ".join(f"{entry['row']} ({entry['off_mm']:.1f} mm)" for entry in flagged)
-        lines.append(render.wrapped(said, "forgotten rows: ", " " * 16))
+        lines.append(render.wrapped(said, "rows left out: ", " " * 15))
     if unseen := answer["unseen"]:
         lines.append(render.wrapped(", ".join(unseen), "not seen in these rows: ", " " * 24))
     lines.append(f"noise of a measured coordinate: {answer['noise_mm']:.3f} mm")

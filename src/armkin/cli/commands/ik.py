@@ -75,7 +75,8 @@ def ik(
     """All joint values that reach a target.
 
     Lists the branch within limits that moves the joints least from --near. Exit code 3: no branch does;
-    the nearest pose within limits is shown instead. Without a target, standard input's answers of fk are reached.
+    the nearest pose within limits is shown instead. Without a target, the poses that
+    `armkin fk --json` wrote to standard input are the targets.
     """
     from armkin.inverse import choose
     from armkin.inverse.redundant.position_first import check as position_first_is_for

@@ -39,7 +39,9 @@ def path(
         str | None,
         typer.Option("--port", "-p", metavar="PORT", help="Move: to the start by a joint move, then along the path."),
     ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Plan and tell, whatever --port says.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Plan and report; nothing moves, whatever --port says.")
+    ] = False,
     tolerance: Annotated[
         str | None, typer.Option("--tolerance", metavar="MM", help="Between plan and path. [default: 0.05]")
     ] = None,

@@ -47,7 +47,7 @@ def place(
 
     Each robot by itself, as a comparison. A place is a position on a grid and a yaw, in the targets' frame; the best
     one is farthest from places that do not reach all. Of a path the best places are planned. Exit code 3: no place
-    does; the best part is told.
+    reaches all; the one that reaches most is shown.
     """
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")

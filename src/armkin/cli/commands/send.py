@@ -79,7 +79,7 @@ def send(
         typer.Option(
             "--accel",
             metavar="DEG/S2|MM/S2",
-            help="In a rehearsal (--dry-run, --port sim): of the joints whose max_accel nobody states.",
+            help="In a rehearsal (--dry-run, --port sim): for joints without a max_accel in the robot file.",
         ),
     ] = None,
     resume: Resume = False,
