@@ -27,7 +27,10 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
         if len(_arms) > 100:
             _arms.clear()
         _arms[key] = _build(file)
-    return _arms[key]
+    one = _arms[key]
+    names = (file.name, *(joint.name for joint in file.joints))
+    assert (one.name, *one.joint_names) == names, "a test before this one changed the arm of all: it may `replace` it"
+    return one
 
 
 def install() -> None:

@@ -13,8 +13,8 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 _ROOT = Path(__file__).parents[1]
-# helpers that start a browser, or compile the firmware or an exported arm
-_SHARED = re.compile(r"^(?:from|import) (?:browsing|emulator|measure|bare_host|exported)\b", re.MULTILINE)
+# helpers that start a browser, or compile the firmware or an exported arm; syntax trees of the whole package
+_SHARED = re.compile(r"^(?:from|import) (?:browsing|emulator|measure|bare_host|exported|ast)\b", re.MULTILINE)
 
 
 @cache

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from workshop import built, commands, measured, rms
 
 import armkin
 from armkin import robot_file
+from armkin.calibration import fit
 from armkin.calibration.chain import KINDS, model
 from armkin.calibration.procedure import next_poses
 from armkin.errors import UsageError
@@ -54,6 +56,20 @@ def test_the_corrected_arm_is_the_model(name: str) -> None:
     assert np.abs(armkin.fk(new, c) - corrections.poses(p, c)[0]).max() < 1e-9
     none = corrections.corrected(np.zeros(len(p)))[0]
     assert np.abs(armkin.fk(none, c) - armkin.fk(arm, c)).max() < 1e-9
+
+
+def test_a_row_s_weight_is_the_slope_of_its_cost() -> None:
+    """Geman and McClure: iteratively reweighted least squares goes down that cost, to which a far row adds nothing."""
+    at, step = np.array([0.0, 0.5, 2.0, 5.0, 30.0]), 1e-6
+    low, high = (np.sqrt(np.maximum(at + side, 0.0)) for side in (-step, step))
+
+    def cost(r: float) -> float:
+        return fit._cost(np.array([[r, 0.0, 0.0]]), None, (1.0, 1.0), np.zeros(1))
+
+    slopes = [(cost(b) - cost(a)) / (b * b - a * a) for a, b in zip(low, high, strict=True)]
+    r = np.sqrt(at)[:, None] * [1.0, 0.0, 0.0]
+    assert fit._weights(r, 1.0) == pytest.approx(slopes, rel=1e-6)
+    assert fit._weights(3.0 * r, 3.0) == pytest.approx(fit._weights(r, 1.0))
 
 
 @pytest.mark.parametrize(("name", "noise", "figure"), FIGURES)
@@ -100,18 +116,20 @@ def test_four_rows_do_no_harm() -> None:
 
 
 @pytest.mark.parametrize(("name", "rows", "moved"), [("yaw_two_link", 6, 10), ("yaw_two_link", 4, 4), ("ur5e", 6, 7)])
-def test_few_rows_show_that_the_base_stands_elsewhere(name: str, rows: int, moved: int) -> None:
+def test_few_rows_show_that_the_base_stands_elsewhere(
+    name: str, rows: int, moved: int, sample: Callable[[int, int], int]
+) -> None:
     """The file was kept, 20 to 77 mm off, where base and tool alone leave 4 to 18: 8 of 12 at six rows, 11 at four."""
     arm = armkin.load(name)
-    shares = []
-    for seed in range(12):
+    shares, seeds = [], sample(12, 6)
+    for seed in range(seeds):
         rng = np.random.default_rng(500 + seed)
         true = built(arm, seed)
         c, unseen = commands(arm, rows, rng), commands(arm, 300, rng)
         found = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
         after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], true.tips(unseen)) for a in (found.arm, arm))
         shares.append(after / before)
-    assert np.sum(np.array(shares) < 0.75) >= moved
+    assert np.sum(np.array(shares) < 0.75) >= moved * seeds // 12
     assert max(shares) < 1.05
 
 

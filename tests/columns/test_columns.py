@@ -1,6 +1,8 @@
 """Batches by columns: the bytes of CSV, other files, processes, and going on with what is finished."""
 
+import csv
 import errno
+import io
 import json
 import os
 from pathlib import Path
@@ -24,6 +26,12 @@ from command_line import THREE_DOF, Result, run
 
 ODD = [0.0, -0.0, 1.0, -1.0, 1e-3, 1e-4, 9.9e-5, 1.5e-7, 1e-10, 1e-9, 1e9, 1e10, 1e15, 1e16, 1e17, 1e22, 5e-324, 1e-99]
 ODD += [1e-100, 2.5e-100, 1.7976931348623157e308, 0.1, 1 / 3, 123456789.125, 1234567890.5, 9007199254740993.0, np.nan]
+
+
+def test_a_reader_of_csv_gets_every_word_back() -> None:
+    words = ['left, "elbow" up', '"', "a\nb", "c\r\nd", ",", "plain", "", " x ", "'"]
+    assert list(csv.reader(io.StringIO(csv_line(words) + "\n", newline=""))) == [words]
+    assert csv_line([None, True, False, 2, 1.5]) == ",true,false,2,1.5"
 
 
 def by_python(table: Table, monkeypatch: pytest.MonkeyPatch) -> tuple[bytes, bytes]:

@@ -110,7 +110,7 @@ def test_a_workspace_is_the_same_bytes_wherever_it_is_sampled(
     address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
 ) -> None:
     one, two = tmp_path / "one.npz", tmp_path / "two.npz"
-    words = ("workspace", "three_dof", "--samples", 150_000, *more, "--json")
+    words = ("workspace", "three_dof", "--samples", 70_000, *more, "--json")
     alone = run(*words, "--out", one).json
     spread = run(*words, "--out", two, "--cluster", address).json
     pool = run(*words, "--workers", 2).json if not more else alone

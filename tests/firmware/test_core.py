@@ -18,7 +18,7 @@ FLASH, RAM = {"atmega328p": 32_256, "atmega2560": 253_952}, {"atmega328p": 2048,
 
 def test_the_core_keeps_its_promises_under_sanitizers(sample: Callable[[int, int], int]) -> None:
     # unit tests, golden vectors; with --long a million random and a million damaged frames
-    make("-C", str(FIRMWARE), "check", f"FRAMES={sample(1_000_000, 200_000)}", f"LIVES={sample(1000, 300)}")
+    make("-C", str(FIRMWARE), "check", f"FRAMES={sample(1_000_000, 60_000)}", f"LIVES={sample(1000, 100)}")
 
 
 def test_random_lives_take_the_branches_of_what_guards_a_motion() -> None:

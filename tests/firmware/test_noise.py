@@ -5,6 +5,7 @@ A computer that has nothing else to do begins a motion at once, and its queue is
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from itertools import count
 
@@ -57,9 +58,12 @@ def clean(who: str) -> float:
 @pytest.mark.parametrize(
     ("who", "noises"), [("quiet", [(0.001, 4), (0.01, 20), (0.01, 9), (0.0125, 1)]), ("busy", [(0.01, 2)])]
 )
-def test_noise_costs_a_twentieth_and_ends_at_exact_counts(who: str, noises: list[tuple[float, int]]) -> None:
+def test_noise_costs_a_twentieth_and_ends_at_exact_counts(
+    who: str, noises: list[tuple[float, int]], sample: Callable[[int, int], int]
+) -> None:
     """The quiet ones of 1 % are held on their first degree, and gone on with. Of 24 seeds the worst takes 1.041."""
-    took = np.array([seconds(who, f"noise flip {rate} seed {seed}") for rate, seed in noises]) / clean(who)
+    some = noises[: sample(4, 2)]
+    took = np.array([seconds(who, f"noise flip {rate} seed {seed}") for rate, seed in some]) / clean(who)
     assert took.max() < 1.05
 
 

@@ -46,7 +46,7 @@ def check(name: str, off: float, seed: int, count: int) -> Report:
     return report
 
 
-@pytest.mark.parametrize("off", OFF)
+@pytest.mark.parametrize("off", range(0, len(OFF), 2))
 @pytest.mark.parametrize(
     "name",
     [
@@ -57,9 +57,12 @@ def check(name: str, off: float, seed: int, count: int) -> Report:
         "pitch arm, 4 joints, usual table", "pitch arm, 5 joints, usual table", "pitch arm, 4 joints, slide first",
     ],
 )  # fmt: skip
-def test_short_arms(name: str, off: float, sample: Callable[[int, int], int]) -> None:
-    for seed in range(sample(2, 1)):
-        check(name, off, seed, sample(40, 16))
+def test_short_arms(name: str, off: int, sample: Callable[[int, int], int]) -> None:
+    """Of two neighbouring sizes the gate takes one for half the arms, the other for the rest."""
+    two = OFF[off : off + 2] if len(name) % 2 else OFF[off : off + 2][::-1]
+    for size in two[: sample(2, 1)]:
+        for seed in range(sample(2, 1)):
+            check(name, size, seed, sample(40, 16))
 
 
 @pytest.mark.parametrize("off", [1e-13, 1e-11, 1e-8, 1e-5, 1e-3])
@@ -146,10 +149,10 @@ def test_folds_far_apart() -> None:
 
 
 @pytest.mark.parametrize("off", [1e-5, 1e-4, 1e-3, 1e-2])
-def test_four_roots_of_three_joints_are_all(off: float) -> None:
+def test_four_roots_of_three_joints_are_all(off: float, sample: Callable[[int, int], int]) -> None:
     """Seeds and Newton steps in straight-line code: `complete` where four are there, by the quartic's degree."""
     arm, screw = moved(armkin.load("three_dof"), off, 5)
-    case_joints = random_joints(screw, 2000, 5)
+    case_joints = random_joints(screw, sample(2000, 500), 5)
     report = examine(arm, screw, "xyz", case_joints)
     found = report.solutions
     assert not report.lost.any()
