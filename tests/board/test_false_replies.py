@@ -104,8 +104,13 @@ CORNERS = np.deg2rad([[20, 80, -90], [20, 60, -70], [0, 70, -80]])
 GOAL = np.deg2rad([30, 60, -60])
 LONG = "ARMKIN_LONG" in os.environ  # all 90 for all commands: five minutes
 # A jog ends where the board says, and needs no credit; homing takes its position from what the board counts, and its
-# caller asks for `lost_joints`.
-CANNOT_KNOW = {"jog": {"counts", "known", "free", "state"}, "home": {"counts", "free", "known"}}
+# caller asks for `lost_joints`. A wrong tag alone misleads nobody: a gripper needs no answer to a question of its own,
+# and while a joint jogs every tag is asked with once.
+CANNOT_KNOW = {
+    "jog": {"counts", "known", "free", "state", "tag"},
+    "home": {"counts", "free", "known"},
+    "grip": {"tag"},
+}
 COMMANDS: dict[str, Callable[[Machine], object]] = {
     "send": lambda one: one.run([one.plan(one.counts(), GOAL)]),
     "batch": lambda one: one.run([one.plan(one.counts(), np.stack([GOAL, GOAL / 2, GOAL]))]),

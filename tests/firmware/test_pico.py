@@ -176,7 +176,7 @@ def test_a_silent_host_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None
 # Homing, resets, servos
 
 
-@pytest.mark.parametrize("where", [-900, 40])
+@pytest.mark.parametrize("where", [-3000, 40])
 def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, where: int) -> None:
     board.control(f"set-switch B at {where} below")
     host = ready(board, MODERATE)
