@@ -3,6 +3,8 @@
 held.py            joints that are held: the arm of the others, and its targets
 follower.py        answers of the other joints at any value of the redundant one
 followed.py        its branches, followed along it
+boundaries.py      where along it these may end, all such places
+turn_roots.py      the roots of trigonometric polynomials that these places are
 samples.py         what samples of these show, and between which they change
 closer.py          between which more are taken
 ends.py            where these end

@@ -8,13 +8,15 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import SOLUTION
+from armkin.inverse.redundant.boundaries import boundaries, places
 from armkin.inverse.redundant.ends import hidden_stretches, number_of, places_of
 from armkin.inverse.redundant.follower import Follower, over_a_turn
-from armkin.inverse.redundant.pieces import Int, Pieces
-from armkin.inverse.redundant.samples import Changes, Runs, Seen, seen, value_at
+from armkin.inverse.redundant.pieces import Int, Pieces, none
+from armkin.inverse.redundant.samples import Changes, Runs, Seen, seen, unexplained, value_at
 from armkin.inverse.tasks.task import distance
 
-SAMPLES = 360  # of a turn of the redundant joint,
+EVEN = 180  # samples of a turn of the redundant joint besides all places where something may change;
+SAMPLES = 360  # where these are not known,
 CLOSER = 4  # times as many values where branches may be there between them,
 FINER = 48  # and where none had an answer
 STEPS = 16  # of the golden section
@@ -26,32 +28,38 @@ class Followed(NamedTuple):
     find: Follower
     pieces: Pieces
     short: Bool
+    complete: Bool  # (N,) all places are known at which a curve may end
     steps: int = STEPS
 
     @classmethod
-    def along(cls, find: Follower, finer: int = 1) -> Followed:
-        """Of some targets; one of which something may be hidden between samples, or without an answer, is asked again:
-        all of a nearly stretched arm lie within a degree."""
-        t = over_a_turn(SAMPLES * finer)
-        found = seen(find, t)
-        pieces, short = _pieces(find, found), found.short
-        if finer == 1:
-            near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
-            lost = found.lost & near_enough
-            for more, which in ((CLOSER, found.hidden & ~lost), (FINER, lost)):
-                again = np.flatnonzero(which)
-                each = max(SAMPLES // more, 1)
-                for some in (again[k : k + each] for k in range(0, len(again), each)):
-                    part = cls.along(find._replace(target=find.target[some], near=find.near[some]), more)
-                    kept, new = pieces.of(~np.isin(pieces.row, some)), part.pieces._replace(row=some[part.pieces.row])
-                    pieces = Pieces(*(np.concatenate(pair) for pair in zip(kept, new, strict=True)))
-                    short[some] = part.short
-        return cls(find, pieces, short)
+    def along(cls, find: Follower) -> Followed:
+        """Of some targets; in two ways: those of which all places are known where something changes, and others."""
+        N = len(find.target)
+        curves = cls(find, none(find.arm.n), np.zeros(N, bool), np.zeros(N, bool))
+        of = boundaries(find.arm) if find.by_formula and find.free.joint == find.arm.n - 1 else None
+        left = np.ones(N, bool)
+        if of is not None:
+            at, known = places(of, find.target)
+            some = np.flatnonzero(known)
+            part = find.of(some)
+            found = seen(part, over_a_turn(EVEN), at[some])
+            left[some] = unexplained(found, at[some])
+            kept = ~left[some]
+            own = _pieces(part, found)
+            curves = curves._with(some[kept], own.of(kept[own.row]), np.cumsum(kept) - 1, found.short[kept], True)
+        some = np.flatnonzero(left)
+        if len(some):
+            own, short = _sampled(find.of(some), 1)
+            curves = curves._with(some, own, np.arange(len(some)), short, False)
+        return curves
 
-    @property
-    def complete(self) -> Bool:
-        """Never: what lies between two samples may be missing."""
-        return np.zeros(len(self.find.target), bool)
+    def _with(self, rows: Int, pieces: Pieces, number: Int, short: Bool, complete: bool) -> Followed:
+        """Those of targets rows as well; number: of the pieces' targets, in rows."""
+        for out, value in ((self.short, short), (self.complete, complete)):
+            out[rows] = value
+        new = pieces._replace(row=rows[number[pieces.row]])
+        both = Pieces(*(np.concatenate(pair) for pair in zip(self.pieces, new, strict=True)))
+        return self._replace(pieces=both)
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
         """Where near has the joint, and beside the best sample."""
@@ -63,6 +71,25 @@ class Followed(NamedTuple):
         """As `Curves.at`."""
         there = self.find.one(pieces.row, pieces.branch, parameter)
         return there.q, there.legal
+
+
+def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
+    """Pieces of some targets, and which are short: one of which something may be hidden between samples, or without an
+    answer, is asked again: all of a nearly stretched arm lie within a degree."""
+    found = seen(find, over_a_turn(SAMPLES * finer))
+    pieces, short = _pieces(find, found), found.short
+    if finer == 1:
+        near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
+        lost = found.lost & near_enough
+        for more, which in ((CLOSER, found.hidden & ~lost), (FINER, lost)):
+            again = np.flatnonzero(which)
+            each = max(SAMPLES // more, 1)
+            for some in (again[k : k + each] for k in range(0, len(again), each)):
+                part, few = _sampled(find.of(some), more)
+                kept, new = pieces.of(~np.isin(pieces.row, some)), part._replace(row=some[part.row])
+                pieces = Pieces(*(np.concatenate(pair) for pair in zip(kept, new, strict=True)))
+                short[some] = few
+    return pieces, short
 
 
 def _pieces(find: Follower, found: Seen) -> Pieces:

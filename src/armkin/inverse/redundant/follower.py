@@ -77,6 +77,11 @@ def over_a_turn(count: int) -> Array:
     return np.asarray(-np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count))
 
 
+def by_formula(free: Redundancy) -> bool:
+    """Whether the others have a closed form that needs no more than its recorded formula."""
+    return free.labelled and free.geometry.doubts is None
+
+
 class Follower(NamedTuple):
     """Answers of some targets (N, ...) at any value of the redundant joint; near: (N, n)."""
 
@@ -85,6 +90,10 @@ class Follower(NamedTuple):
     free: Redundancy
     target: Array
     near: Array
+
+    def of(self, some: NDArray[np.intp]) -> Follower:
+        """For some of the targets."""
+        return self._replace(target=self.target[some], near=self.near[some])
 
     def found(self, rows: NDArray[np.intp], t: Array) -> Array:
         """Branches (M, B, n) of targets (M,) at values t (M,), each in the column of its index, nan where there is
@@ -104,8 +113,8 @@ class Follower(NamedTuple):
 
     @property
     def by_formula(self) -> bool:
-        """Whether the others have a closed form that needs no more than its recorded formula."""
-        return self.free.labelled and self.free.geometry.doubts is None
+        """As the function."""
+        return by_formula(self.free)
 
     def _by_formula(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
         """The candidates of a closed form (M, B, n), real or not, one joint after another in memory; what they miss,
@@ -141,8 +150,9 @@ class Follower(NamedTuple):
         np.copyto(q, np.nan, where=~valid[:, :, None])
         return Postures(q, valid, legal & valid)
 
-    def sampled(self, some: NDArray[np.intp], t: Array) -> Sampled:
-        """Some of the targets (S,) at all of t (K,) and, of a closed form, at more values between."""
+    def sampled(self, some: NDArray[np.intp], t: Array, more: Array | None = None) -> Sampled:
+        """Some of the targets (S,) at all of t (K,) and, of a closed form, at more values (S, M), inf where there are
+        fewer, or between those at which more may happen."""
         rows, values = np.repeat(some, len(t)), np.tile(t, len(some))
         if not self.by_formula:
             q = self.found(rows, values)
@@ -150,7 +160,8 @@ class Follower(NamedTuple):
             return self._within(some, np.tile(t, (len(some), 1)), columns, missed, q.shape[1:2])
         axes = _recorded(self.arm, self.free)[1]
         *columns, missed, _ = self._candidates(rows, values, [])
-        more = values_between(self.arm, columns, missed, axes, t)
+        if more is None:
+            more = values_between(self.arm, columns, missed, axes, t)
         real = np.isfinite(more)
         *others, other, _ = self._candidates(np.broadcast_to(some[:, None], more.shape)[real], more[real], [])
         every = np.concatenate([np.tile(t, (len(some), 1)), np.where(real, more, t[-1])], axis=1)

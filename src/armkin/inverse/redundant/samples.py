@@ -12,6 +12,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric.tolerances import REACH
+from armkin.inverse.redundant.boundaries import beside as beside_all
 from armkin.inverse.redundant.pieces import Int, best_samples, holding_none, runs, turning
 
 if TYPE_CHECKING:
@@ -104,13 +105,29 @@ class Seen(NamedTuple):
     t: Array  # (N, K) the samples' values of the joint
 
 
-def seen(find: Follower, t: Array) -> Seen:
-    """What samples of all targets along t (K,) show, and others between them."""
+def seen(find: Follower, t: Array, known: Array | None = None) -> Seen:
+    """What samples of all targets along t (K,) show, and others between them; known: all places where something may
+    change (N, V), with samples beside each."""
     N = len(find.target)
     each = max(AT_A_TIME // len(t), 1) if find.by_formula else max(N, 1)
     some = (np.arange(k, min(k + each, N)) for k in range(0, max(N, 1), each))
-    found: Seen = _together([_seen(find.sampled(rows, t), rows) for rows in some])
+    if known is None:
+        found: Seen = _together([_seen(find.sampled(rows, t), rows, False) for rows in some])
+    else:
+        more = beside_all(known)
+        found = _together([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in some])
     return found
+
+
+def unexplained(found: Seen, known: Array) -> Bool:
+    """Whether something changes between samples of targets (N,) that no known place (N, V) lies between."""
+    out = np.zeros(len(known), bool)
+    for at in (found.gone.at, found.crossed.at):
+        low, high = value_at(found.t, at.row, at.k)[:, None], value_at(found.t, at.row, at.k + 1)[:, None]
+        own = known[at.row]
+        explained = ((own >= low) & (own <= high)) | ((own + 2 * np.pi >= low) & (own + 2 * np.pi <= high))
+        out[at.row[~explained.any(axis=1)]] = True
+    return out
 
 
 def _together(parts: Sequence[Any]) -> Any:
@@ -120,8 +137,8 @@ def _together(parts: Sequence[Any]) -> Any:
     return np.concatenate(parts)
 
 
-def _seen(found: Sampled, rows: Int) -> Seen:
-    """What samples of some targets, rows (S,) of all, show."""
+def _seen(found: Sampled, rows: Int, known: bool) -> Seen:
+    """What samples of some targets, rows (S,) of all, show; known: nothing happens between them that they do not."""
     valid, legal, room = found.valid, found.legal, found.room
     gone, crossed = Changes.of(valid), Changes.of(legal)
     K, every = valid.shape[1], np.arange(len(gone.row))
@@ -131,8 +148,11 @@ def _seen(found: Sampled, rows: Int) -> Seen:
     earlier = np.where(np.isnan(other[every, gone.branch, 0]), np.nan, beside(other, gone.branch)[2])
     own = gone.row, now, gone.branch
     rooms = [room[crossed.row, crossed.sample(k, K), crossed.branch] for k in (0, 1)]
-    row, k, branch = turns = np.nonzero(turning(room, found.t))
-    off = np.where(valid, np.nan, -np.sqrt(found.missed))
+    row, k, branch = turns = np.nonzero(np.zeros_like(valid) if known else turning(room, found.t))
+    hidden: Bool = np.zeros(len(rows), bool)
+    if not known:
+        off = np.where(valid, np.nan, -np.sqrt(found.missed))
+        hidden = np.asarray(turning(off, found.t).any(axis=(1, 2)))
     there = _runs(found, valid, rows)
     return Seen(
         Gone(gone._replace(row=rows[gone.row]), twin, np.stack([apart, earlier], axis=1), room[own], legal[own]),
@@ -140,7 +160,7 @@ def _seen(found: Sampled, rows: Int) -> Seen:
         Turns(rows[row], k, branch, np.stack([room[turns], room[row, (k + 1) % K, branch]], axis=1)),
         _runs(found, legal, rows),
         there,
-        np.asarray(turning(off, found.t).any(axis=(1, 2))),
+        hidden,
         np.asarray(~valid.any(axis=(1, 2))),
         _all_short(found, there.row - rows[0], there.first, there.length) if len(rows) else np.zeros(0, bool),
         found.t,

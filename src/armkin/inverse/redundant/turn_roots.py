@@ -1,0 +1,120 @@
+"""All real roots of real trigonometric polynomials over a turn, each in a cell of its own, or that some may be missing.
+
+About the middle of a cell a polynomial is its Taylor series, whose rest Bernstein's inequality bounds. A cell holds no
+root where the constant term outweighs all others, at most one where the linear term outweighs the slopes of all others;
+any other is halved. What is above the degree in the samples is rounding, and tells how much of it there is: where what
+is left is within it the polynomial is undecided, as two roots may be one or none.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric.tolerances import ROUNDING
+
+TERMS = 12  # of a Taylor series
+WIDE = 0.35  # half a cell times the degree: what is left out is 1e-14 of the polynomial's size
+HALVINGS = 28
+MORE = 4  # coefficients above the degree that samples tell, too
+ASIDE = 0.15  # of the real values are the samples
+SAFE = 4.0  # times what these show
+STEPS = 8  # of Newton's method in a cell in which a polynomial is monotone
+
+
+class Roots(NamedTuple):
+    """Roots (R,) in no order: which polynomial, where [rad]; of each polynomial whether all are known (F,)."""
+
+    which: NDArray[np.intp]
+    at: Array
+    decided: Bool
+
+
+@lru_cache(maxsize=8)
+def _cells(degree: int) -> tuple[Array, float, Array]:
+    """Middles of cells (C,), half their width, and the Taylor coefficients there, for one half, of a polynomial by the
+    real and the imaginary parts of its coefficients: (2 degree + 2, C TERMS)."""
+    count = math.ceil(np.pi * degree / WIDE)
+    middle, half = -np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count), np.pi / count
+    k, order = np.arange(degree + 1), np.arange(TERMS)
+    factor = (1j * k[:, None] * half) ** order / np.array([math.factorial(i) for i in order])
+    factor[1:] *= 2.0  # that of -k is the conjugate
+    wave = np.exp(1j * k[:, None] * middle)[:, :, None] * factor[:, None]  # (k, C, TERMS)
+    series: Array = np.concatenate([wave.real, -wave.imag])
+    return np.asarray(middle), half, series.reshape(2 * degree + 2, -1)
+
+
+@lru_cache(maxsize=8)
+def _coefficients(degree: int) -> NDArray[np.complex128]:
+    """Those of exp(i k t), k from 0 to degree + MORE, of values at samples: (M, degree + MORE + 1)."""
+    t = sampled_at(degree)
+    return np.asarray(np.exp(-1j * t[:, None] * np.arange(degree + MORE + 1)) / len(t))
+
+
+@lru_cache(maxsize=1)
+def _halves() -> Array:
+    """Taylor coefficients of a half about its own middle, of those of the whole: (2, TERMS, TERMS), left and right."""
+    out = np.zeros((2, TERMS, TERMS))
+    for i in range(TERMS):
+        for j in range(i + 1):
+            out[:, i, j] = math.comb(i, j) * np.array([-1.0, 1.0]) ** (i - j) / 2.0**i
+    return out
+
+
+def sampled_at(degree: int) -> NDArray[np.complex128]:
+    """Where polynomials of a degree are asked (M,): aside of the real values, at which quotients may be 0 / 0."""
+    samples = 2 * (degree + MORE) + 1
+    return np.asarray(np.arange(samples) * (2 * np.pi / samples) - 1j * ASIDE)
+
+
+def roots(values: NDArray[np.complex128], degree: int) -> Roots:
+    """Those of polynomials from values (F, M) at `sampled_at`."""
+    middle, half, series = _cells(degree)
+    F, order = len(values), np.arange(TERMS)
+    c = values @ _coefficients(degree)
+    # their errors shrink with the order, as the samples lie aside
+    c, above = c[:, : degree + 1], np.abs(c[:, degree + 1 :]) * np.exp(ASIDE * np.arange(degree + 1, degree + MORE + 1))
+    slack = SAFE * (2 * degree + 1) * above.max(axis=1) + 10.0 * ROUNDING * np.abs(c).sum(axis=1)
+    a = (np.concatenate([c.real, c.imag], axis=1) @ series).reshape(-1, TERMS)
+    which, at = np.repeat(np.arange(F), len(middle)), np.tile(middle, F)
+    found_which, found_at, decided = [], [], np.ones(F, bool)
+    for _ in range(HALVINGS):
+        rest, blur = np.abs(a), slack[which]
+        some = np.flatnonzero(rest[:, 0] <= rest[:, 1:].sum(axis=1) + blur)
+        a, which, at, rest, blur = a[some], which[some], at[some], rest[some], blur[some]
+        single = rest[:, 1] > (rest[:, 2:] * order[2:]).sum(axis=1) + TERMS * blur
+        ends = a[:, ::2].sum(axis=1)[:, None] + a[:, 1::2].sum(axis=1)[:, None] * np.array([-1.0, 1.0])
+        touches = (ends[:, 0] * ends[:, 1] <= 0.0) | (np.abs(ends).min(axis=1) <= blur)
+        one = np.flatnonzero(single & touches)
+        found_which.append(which[one])
+        found_at.append(at[one] + half * _zero(a[one]))
+        noise = ~single & (rest[:, 1:].sum(axis=1) <= TERMS * blur)
+        decided[which[noise]] = False
+        found_which.append(which[noise])
+        found_at.append(at[noise])
+        left = np.flatnonzero(~single & ~noise)
+        half *= 0.5
+        a = (a[left] @ _halves()).reshape(-1, TERMS)
+        at = (at[left] + half * np.array([[-1.0], [1.0]])).ravel()
+        which = np.tile(which[left], 2)
+        if not len(which):
+            break
+    decided[which] = False
+    return Roots(np.concatenate([*found_which, which]), np.concatenate([*found_at, at]), decided)
+
+
+def _zero(a: Array) -> Array:
+    """Of series (R, TERMS), monotone from -1 to 1, the root (R,)."""
+    x = np.zeros(len(a))
+    for _ in range(STEPS):
+        value, slope = a[:, -1].copy(), np.zeros(len(a))
+        for k in range(TERMS - 2, -1, -1):
+            slope = slope * x + value
+            value = value * x + a[:, k]
+        x = np.clip(x - value / slope, -1.0, 1.0)
+    return x

@@ -1,0 +1,74 @@
+"""Roots of trigonometric polynomials over a turn, and the equations of a seven-joint arm that they solve."""
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.inverse.redundant.boundaries import boundaries, places
+from armkin.inverse.redundant.turn_roots import roots, sampled_at
+from armkin.model.arm import Arm, from_links
+
+DEGREE = 8
+
+
+def values(c: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Of c[0] + 2 Re(sum of c[k] exp(i k t)), at real or complex t."""
+    k = np.arange(1, len(c))[:, None]
+    return np.asarray(c[0] + (c[1:, None] * np.exp(1j * k * t) + c[1:, None].conj() * np.exp(-1j * k * t)).sum(axis=0))
+
+
+def test_all_roots_are_those_that_an_eigenvalue_problem_has() -> None:
+    rng = np.random.default_rng(0)
+    c = rng.normal(size=(100, DEGREE + 1)) + 1j * rng.normal(size=(100, DEGREE + 1))
+    c[:, 0] = c[:, 0].real
+    found = roots(np.stack([values(one, sampled_at(DEGREE)) for one in c]), DEGREE)
+    assert found.decided.all()
+    for k, one in enumerate(c):
+        z = np.roots(np.concatenate([one[:0:-1], one[:1], one[1:].conj()]))
+        own = np.sort(np.remainder(np.angle(z[np.abs(np.abs(z) - 1) < 1e-7]), 2 * np.pi))
+        at = np.sort(np.remainder(found.at[found.which == k], 2 * np.pi))
+        assert np.allclose(at, own, atol=1e-9)
+
+
+@pytest.mark.parametrize(("lift", "count", "decided"), [(-1e-9, 2, True), (1e-9, 0, True), (0.0, None, False)])
+def test_two_roots_are_told_from_none_and_one_double_one_is_undecided(
+    lift: float, count: int | None, decided: bool
+) -> None:
+    t = sampled_at(DEGREE)
+    found = roots(((1 + lift - np.cos(t - 0.7)) * (3 + np.cos(2 * t)))[None], DEGREE)
+    assert found.decided.tolist() == [decided]
+    assert count is None or len(found.at) == count
+
+
+def class_arm(rng: np.random.Generator, limits: np.ndarray) -> Arm:
+    """Seven axes anywhere, but for a shoulder and a wrist."""
+    links = np.tile(np.eye(4), (8, 1, 1))
+    for k in range(8):
+        Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        links[k, :3, :3] = Q * np.linalg.det(Q)
+        if k not in (1, 2, 5):
+            links[k, :3, 3] = 200 * rng.normal(size=3)
+    return from_links(links, [False] * 7, limits=limits)
+
+
+def test_where_a_joint_stands_on_a_limit_there_is_a_place() -> None:
+    """Whatever branches are real: of random arms of the class, each limit of each joint in turn."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        q = rng.uniform(-2.5, 2.5, 7)
+        for joint in range(6):
+            for side in range(2):
+                limits = np.tile([-2.9, 2.9], (7, 1))
+                limits[joint, side] = q[joint]
+                arm = class_arm(np.random.default_rng(100 + seed), limits)
+                of = boundaries(arm)
+                assert of is not None
+                found = places(of, armkin.fk(arm, q)[None])
+                assert np.abs(np.remainder(found.at[0] - q[6] + np.pi, 2 * np.pi) - np.pi).min() < 1e-7
+
+
+def test_an_arm_without_such_a_shoulder_or_wrist_has_none() -> None:
+    assert boundaries(armkin.load("kinova_gen3")) is None
+    links = armkin.load("panda").link.copy()
+    links[5, 0, 3] += 1e-6
+    assert boundaries(from_links(links, [False] * 7)) is None
