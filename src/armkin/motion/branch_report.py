@@ -10,7 +10,7 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion.branches.branch_chains import Chain, why_ended
-from armkin.motion.plan.path_plan import Branch, PathPlan, PathRun, Reconfiguration
+from armkin.motion.plan.path_plan import Branch, Passed, PathPlan, PathRun, Reconfiguration
 from armkin.motion.plan.proved_free import hits_said
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def note(plan: PathPlan, carried: Carried, near: Array) -> None:
         plan.branches = _branches(arm, carried, near)
     for k, run in enumerate(carried.runs):
         for window in run.chain.windows:
-            plan.turned = max(plan.turned or 0.0, window.turned)
+            if c.s[run.first] <= window.begin and window.end <= c.s[run.last]:
+                plan.passed.append(Passed(base + window.begin, base + window.end, window.turned, window.aside))
         q = run.chain.run(run.first, run.last, near)
         begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
         if end > begin:
@@ -104,6 +105,18 @@ def closeness(plan: PathPlan) -> str:
     )
 
 
+def passes(plan: PathPlan) -> list[str]:
+    """How each wrist singularity is passed straight through."""
+    said = []
+    for one in plan.passed:
+        tip = f"the tip at most {one.aside:.2g} mm aside, the tool not turned"
+        tool = f"the tip on the path, the tool turned by at most {one.turned / units.DEGREE:.2g} deg"
+        said.append(
+            f"a wrist singularity is passed between {one.begin:.3f} and {one.end:.3f} mm: {tool if one.turned else tip}"
+        )
+    return said
+
+
 def answer(plan: PathPlan) -> dict[str, Any]:
     """A plan as data of JSON [mm, deg, s]; of one that was refused what is known of it."""
     arm = plan.arm
@@ -158,9 +171,14 @@ def answer(plan: PathPlan) -> dict[str, Any]:
         else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
         **({"held": held(plan)} if plan.held else {}),
         **({} if plan.turned is None else {"turned_deg": float(np.rad2deg(plan.turned))}),
+        **({"wrists_passed": [_passed(one) for one in plan.passed]} if plan.passed else {}),
         **({} if plan.approach is None else {"approach": _approach(plan.approach)}),
         **({} if plan.clearance is None else {"clearance": plan.clearance}),
     }
+
+
+def _passed(one: Passed) -> dict[str, Any]:
+    return {"s_mm": [one.begin, one.end], "turned_deg": one.turned / units.DEGREE, "aside_mm": one.aside}
 
 
 def held(plan: PathPlan) -> dict[str, float]:

@@ -23,6 +23,7 @@ from armkin.model.limits import check_limits, outside, said
 from armkin.motion import branch_report
 from armkin.motion.branches.branch_path import Pace, carry, stands, stretches
 from armkin.motion.branches.grid import Missed, deviation, missed
+from armkin.motion.branches.windows import detoured
 from armkin.motion.joint_moves import approach, straight
 from armkin.motion.plan.path_plan import Marker, PathPlan
 from armkin.motion.timing.curve import Curve, Smoothed, way_of, ways_of
@@ -244,7 +245,7 @@ class Walk:
             curves, given = _curves(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
                 self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
-            self.append_curves(route, curves, order, given)
+            self.append_curves(detoured(route, run.chain.windows), curves, order, given)
             near = self.q
         for kind, value in self.pauses.get(len(self.pieces), ()):
             self.emit_event(kind, value)
@@ -313,7 +314,7 @@ def _curves(
 
 def _measure(plan: PathPlan, route: Route, path: Knots, given: Missed) -> None:
     """Note how far a curve leaves the route, or given points, and how near it comes to a singularity."""
-    off = deviation(plan.arm, route, path) if given is None else given[0]
+    off = route.aside + deviation(plan.arm, route, path) if given is None else given[0]
     if given is not None and off > plan.deviation:
         plan.rounded_most = plan.length + given[1]
     plan.deviation = max(plan.deviation, off)

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.forward import position
 from armkin.model import units
-from armkin.motion.branch_report import closeness
+from armkin.motion.branch_report import closeness, passes
 from armkin.plot.canvas import flat, picture, space, true_proportions
 from armkin.view.skeleton import skeleton
 
@@ -35,7 +35,7 @@ def plot_path(plan: PathPlan, out: str) -> None:
     with picture(out, 11.5, 7.2) as figure:
         figure.text(0.03, 0.975, _title(plan), fontsize=11, va="top")
         figure.text(0.03, 0.94, _names(plan), fontsize=9, va="top")
-        figure.text(0.03, 0.915, closeness(plan), fontsize=9, va="top")
+        figure.text(0.03, 0.915, "\n".join([closeness(plan), *_passes(plan)]), fontsize=9, va="top")
         _in_space(plan, figure, q)
         rows = [figure.add_axes((0.60, bottom, 0.37, 0.185)) for bottom in (0.735, 0.51, 0.285, 0.06)]
         _joints(plan, rows[0], t, q)
@@ -52,6 +52,12 @@ def plot_path(plan: PathPlan, out: str) -> None:
             axes.tick_params(labelsize=8)
             for when in _breaks(plan):
                 axes.axvline(when, color=_SINGULAR, linewidth=0.8, linestyle="--")
+
+
+def _passes(plan: PathPlan) -> list[str]:
+    """How the first wrist singularity is passed, and how many others there are."""
+    said = passes(plan)
+    return [f"{said[0]}{f'; {len(said) - 1} more' if len(said) > 1 else ''}"] if said else []
 
 
 def _fine(plan: PathPlan, t: Array) -> Array:

@@ -95,6 +95,14 @@ PathClearance = TypedDict(
 )
 
 
+class WristPassed(TypedDict):
+    """A wrist singularity that a path goes straight through."""
+
+    s_mm: Annotated[list[float], "where joints 4 to 6, or the tip, leave their exact way, and where they are back"]
+    turned_deg: Annotated[float, "by which the tool is turned at most; 0: the tip goes aside"]
+    aside_mm: Annotated[float, "by which the tip goes aside at most; 0: the tool is turned"]
+
+
 class Path(Head, Tooled):
     """`path`: a plan, or with exit 3 what is known of one that is not carried to its end."""
 
@@ -119,6 +127,7 @@ class Path(Head, Tooled):
     segments: Annotated[int | None, "that a board is sent; null without drives"]
     held: Annotated[NotRequired[dict[str, float]], "joints that are held along the path, and where [deg or mm]"]
     turned_deg: Annotated[NotRequired[float], "by which the tool is turned at wrist singularities, if it is"]
+    wrists_passed: Annotated[NotRequired[list[WristPassed]], "straight through singularities, if there are any"]
     approach: Annotated[NotRequired[Approach], "absent where the arm stands at the path's start"]
     clearance: Annotated[NotRequired[PathClearance], "where there are keep-outs"]
     dry_run: Annotated[NotRequired[bool], "of `send --path --dry-run`"]

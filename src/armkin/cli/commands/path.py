@@ -340,7 +340,7 @@ def _print(plan: PathPlan, found: dict[str, Any], *, json: bool, out: str | None
 
 def _text(plan: PathPlan, found: dict[str, Any]) -> str:
     """The plan for people."""
-    from armkin.motion.branch_report import closeness, words
+    from armkin.motion.branch_report import closeness, passes, words
 
     arm = plan.arm
     lines = [f"{arm.name}: {found['length_mm']:.3f} mm of path"]
@@ -381,8 +381,7 @@ def _text(plan: PathPlan, found: dict[str, Any]) -> str:
             size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
             lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
         lines.append(closeness(plan))
-        if plan.turned is not None:
-            lines.append(f"the tool is turned by at most {found['turned_deg']:.2g} deg past a wrist singularity")
+        lines += passes(plan)
         if plan.reduced.count:
             wished, became = plan.reduced.wished, plan.reduced.became
             lines.append(

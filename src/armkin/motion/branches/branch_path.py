@@ -21,7 +21,8 @@ from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.grid import fine_enough
 from armkin.motion.branches.joint_steps import change
 from armkin.motion.branches.linked_branches import ENDS, linked
-from armkin.motion.branches.wrist_turn import through_wrists
+from armkin.motion.branches.windows import detoured
+from armkin.motion.branches.wrist_turn import ASIDE, through_wrists
 from armkin.motion.timing.cubics import Knots
 from armkin.motion.timing.curve import Curve, Smoothed
 from armkin.motion.timing.hold_cap import hold_cap
@@ -109,8 +110,9 @@ def carry(
     columns = linked(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
     all_ = chains(arm, columns)
     all_ = through_boundaries(arm, columns, all_, fixed, tolerance)
-    if pace.turn and route.task.orientation == "full":
-        all_ = through_wrists(arm, route, columns, all_, pace.turn)
+    if route.task.orientation == "full" and arm.n == 6 and not arm.prismatic.any():
+        aside = 0.0 if len(route.given[0]) else ASIDE * tolerance  # a curve of points has little tolerance left
+        all_ = through_wrists(arm, route, columns, all_, pace.turn, aside)
     starts = [c for c in all_ if c.first == 0]
     if fixed is not None:
         starts = [c for c in starts if stands(c, fixed)]
@@ -163,11 +165,12 @@ def stretches(
 ) -> list[Curve | Smoothed]:
     """A run as curves from rest to rest, one between each two stops of the route; s: the route's samples."""
     q = run.chain.run(run.first, run.last, near, fixed)
+    route = detoured(route, run.chain.windows)
     s = s[run.first : run.last + 1]
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
     edges = [a for a, b in pairwise(edges) if b - a > 1e-9] + edges[-1:]
-    kept = None if grid < _GRID else pace.tolerance
+    kept = None if grid < _GRID else pace.tolerance - route.aside
     made: list[Curve | Smoothed] = []
     for part in _groups(edges, s):
         a, b, inner = part[0], part[-1], np.array(part[1:-1])
@@ -175,7 +178,7 @@ def stretches(
         solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
         path, off = fine_enough(arm, route, s[here], q[here], a, b, number, kept, run.chain.windows, inner)
-        _check_kept(path, off, pace)
+        _check_kept(path, off + route.aside, pace)
         if made:  # the stop is the same to the last digit
             path.q[0] = made[-1].end
         made += _timed(arm, route, finer(path), pace)

@@ -171,6 +171,8 @@ def _solved(
     guess = np.stack([np.interp(where[new], s, q[:, j]) for j in range(arm.n)], axis=1)
     values[new] = corrected(arm, route.task, guess, route.targets(where[new]), damping)
     for one in windows:
+        if one.detour is not None:  # the route is detoured itself
+            continue
         inside = new & (where > one.begin) & (where < one.end)
         if inside.any():
             values[inside] = one.joints(arm, route, where[inside], one.copy_of(arm, guess[inside[new]][0]))

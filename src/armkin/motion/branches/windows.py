@@ -1,8 +1,12 @@
-"""A stretch of a route on which the wrist's joints are cubics and the other three hold the tip on the path."""
+"""A stretch of a route on which the wrist goes straight through a singularity.
+
+Either its joints are cubics and the other three hold the tip on the path, the tool turned a little; or the tip goes
+aside within the tolerance, to where the wrist is straight, and the tool keeps its direction.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +17,7 @@ from armkin.motion.branches.joint_steps import turns_of
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.tool_path.route import Route
+    from armkin.motion.tool_path.route import Detour, Route
 
 _STEPS = 12  # of Newton's method
 _LONGEST = 0.1  # [rad] of one of them
@@ -28,6 +32,12 @@ class Window:
     q: Array  # (2, n) [rad]
     d: Array  # (2, n) [rad/mm]
     turned: float  # [rad] at most
+    detour: Detour | None = None
+
+    @property
+    def aside(self) -> float:
+        """How far the tip goes aside [mm]."""
+        return 0.0 if self.detour is None else float(np.linalg.norm(self.detour.by))
 
     def joints(self, arm: Arm, route: Route, s: Array, offset: Array | float = 0.0) -> Array:
         """Joint values at lengths s (N,) inside: (N, n); offset: whole turns (n,) of a copy."""
@@ -49,3 +59,9 @@ class Window:
         """Whole turns (n,) from a window to the copy that a run is on; q: (n,) of it, somewhere inside."""
         turns = turns_of(arm)
         return np.asarray(turns * np.rint((q - self.q.mean(axis=0)) / turns))
+
+
+def detoured(route: Route, windows: tuple[Window, ...]) -> Route:
+    """A route with the detours of its windows."""
+    found = tuple(one.detour for one in windows if one.detour is not None)
+    return replace(route, detours=found) if found else route

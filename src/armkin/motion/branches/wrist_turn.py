@@ -2,11 +2,14 @@
 
 Beside a singularity of the wrist joint 4 has to swing round within a distance as short as the path's own from it.
 Over a window about that place the last three joints are cubics instead, from the posture before it to the one behind
-it in which the wrist is flipped, and the first three hold the tip on the path.
+it in which the wrist is flipped, and the first three hold the tip on the path. Where the tool may not be turned and
+the singularity lies within the tolerance, the tip goes there: straight through it joint 4 need not swing at all.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,14 +19,16 @@ from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian
 from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Columns
-from armkin.motion.branches.joint_steps import change
+from armkin.motion.branches.joint_steps import LEAST_LEVER, change
 from armkin.motion.branches.on_route import corrected
-from armkin.motion.branches.windows import Window
+from armkin.motion.branches.windows import Window, detoured
+from armkin.motion.tool_path.route import Detour
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.tool_path.route import Route
 
+ASIDE = 0.5  # of the tolerance: so far the tip may go aside
 _NEAR = 2.0  # tolerances: a wrist that stays farther from straight is not looked at
 _ARM = 0.1  # [rad] of the first three joints between two postures that are a flip of the wrist apart
 _HALF, _GROW, _WIDTHS = 0.25, 1.5, 14  # [mm] half of the least window; the next one; how many are tried
@@ -31,6 +36,10 @@ _GAP = 0.1  # [mm] between the end of one and the begin of the next
 _STEP = 0.01  # [mm] to either side, for slopes
 _LOOKED = 97  # places in a window at which the tool's rotation is looked at
 _MOST = 16  # singularities on the way
+_EXACT = 1e-6  # [mm and rad] a posture misses its target by less
+_TOLD = 1e-4  # of the wrist's volume: less does not tell joint 4
+_LEAST = 1e-8  # [1/mm] what a millimetre counts beside a radian, where the tool's direction must be kept
+_STEPS = 8  # of Newton's method to a straight wrist
 
 
 def check(arm: Arm) -> None:
@@ -42,17 +51,23 @@ def check(arm: Arm) -> None:
         )
 
 
-def through_wrists(arm: Arm, route: Route, columns: Columns, all_: list[Chain], tolerance: float) -> list[Chain]:
-    """Chains, and those that go on with the wrist flipped behind a singularity; tolerance: [rad]."""
+def through_wrists(
+    arm: Arm, route: Route, columns: Columns, all_: list[Chain], turn: float, aside: float
+) -> list[Chain]:
+    """Chains, and those that go on with the wrist flipped behind a singularity.
+
+    turn: [rad] by which the tool may be turned for it, aside: [mm] that the tip may go.
+    """
     s, found, new = columns.s, list(all_), list(all_)
+    near = _NEAR * max(np.sin(turn), aside / LEAST_LEVER)
     for _ in range(_MOST):
         made = []
         for c in new:
-            for j in _straight(arm, c, tolerance):
+            for j in _straight(arm, c, near):
                 if c.windows and s[j] <= c.windows[-1].end:
                     continue
                 for other in all_:
-                    joined = _joined(arm, route, s, c, other, j, tolerance)
+                    joined = _joined(arm, route, s, c, other, j, (turn, aside))
                     made += [] if joined is None else [joined]
         found, new = found + made, made
         if not made or len(found) > _MOST * len(all_):
@@ -60,17 +75,42 @@ def through_wrists(arm: Arm, route: Route, columns: Columns, all_: list[Chain], 
     return found
 
 
-def _straight(arm: Arm, c: Chain, tolerance: float) -> list[int]:
+def _bent(arm: Arm, q: Array) -> Array:
+    """The volume of the wrist's axes at joint values (N, n): 0 where it is straight; joint 5 alone tells: (N,)."""
+    tried = np.tile(arm.home, (3, 1))
+    tried[:, 4] = np.array([0.0, 0.5, 1.0]) * np.pi / arm.ratio[4]
+    axes = jacobian(arm, tried)[:, 3:, 3:]
+    a, b, c = np.linalg.det(axes / np.linalg.norm(axes, axis=1, keepdims=True)).tolist()
+    angle = q[:, 4] * arm.ratio[4]
+    return np.asarray((a + c) / 2 + (a - c) / 2 * np.cos(angle) + (b - (a + c) / 2) * np.sin(angle))
+
+
+def _straight(arm: Arm, c: Chain, near: float) -> list[int]:
     """Samples at which a chain's wrist comes nearest to straight, and near enough."""
-    axes = np.concatenate([jacobian(arm, part)[:, 3:, 3:] for part in np.array_split(c.q, len(c.q) // 8192 + 1)])
-    off = np.abs(np.linalg.det(axes / np.linalg.norm(axes, axis=1, keepdims=True)))
+    off = np.abs(_bent(arm, c.q))
     step = np.diff(off)
     least = np.append(True, step <= 0) & np.append(step > 0, True)
     between = np.maximum(np.append(0.0, np.abs(step)), np.append(np.abs(step), 0.0))  # it may be nearer by so much
-    return (c.first + np.flatnonzero(least & (off - between < _NEAR * np.sin(tolerance)))).tolist()
+    return (c.first + np.flatnonzero(least & (off - between < near))).tolist()
 
 
-def _joined(arm: Arm, route: Route, s: Array, c: Chain, other: Chain, j: int, tolerance: float) -> Chain | None:
+def _spans(route: Route, s: Array, c: Chain, other: Chain, j: int) -> Iterator[tuple[int, int]]:
+    """First and last samples of windows about sample j, wider and wider, on one piece of the route."""
+    k = int(np.searchsorted(route.breaks, s[j]))
+    low, high = route.breaks[max(k - 1, 0)], route.breaks[min(k, len(route.breaks) - 1)]
+    low = max(low, s[c.first], c.windows[-1].end if c.windows else 0.0)
+    high = min(high, s[other.last])
+    for half in _HALF * _GROW ** np.arange(_WIDTHS):
+        a, b = int(np.searchsorted(s, s[j] - half, side="right")) - 1, int(np.searchsorted(s, s[j] + half))
+        if a < c.first or b > min(other.last, len(s) - 1) or s[a] < low or s[b] > high:
+            return
+        if b >= other.first:
+            yield a, b
+
+
+def _joined(
+    arm: Arm, route: Route, s: Array, c: Chain, other: Chain, j: int, allowed: tuple[float, float]
+) -> Chain | None:
     """A chain up to a window about sample j, and from there on another one, or itself again; None: none is allowed."""
     on = max(j, other.first)  # exactly on the singularity one may end, and the other one begin behind it
     if not (c.first <= j <= c.last and on <= other.last and s[on] - s[j] <= _GAP):
@@ -78,29 +118,80 @@ def _joined(arm: Arm, route: Route, s: Array, c: Chain, other: Chain, j: int, to
     step = change(arm, c.q[j - c.first], other.q[on - other.first])
     if np.abs(step[:3]).max() > _ARM:
         return None
-    k = int(np.searchsorted(route.breaks, s[j]))
-    low, high = route.breaks[max(k - 1, 0)], route.breaks[min(k, len(route.breaks) - 1)]
-    low = max(low, s[c.first], c.windows[-1].end if c.windows else 0.0)
-    high = min(high, s[other.last])
+    turn, aside = allowed
     best: tuple[int, int, Window] | None = None
-    for half in _HALF * _GROW ** np.arange(_WIDTHS):
-        a, b = int(np.searchsorted(s, s[j] - half, side="right")) - 1, int(np.searchsorted(s, s[j] + half))
-        if a < c.first or b > min(other.last, len(s) - 1) or s[a] < low or s[b] > high:
-            break
-        if b < other.first:
-            continue
+    spans = list(_spans(route, s, c, other, j))
+    for a, b in spans if turn else ():
         one = _window(arm, route, s[[a, b]], c.q[a - c.first], other.q[b - other.first])
-        if one.turned <= tolerance:
+        if one.turned <= turn:
             best = a, b, one
+    for a, b in reversed(spans) if aside and best is None else ():
+        one = _window(arm, route, s[[a, b]], c.q[a - c.first], other.q[b - other.first])
+        around = _around(arm, route, one)
+        if around is None or around.aside > aside:  # of a narrower one as well
+            break
+        if _passes(arm, route, around):
+            best = a, b, around
+            break
     if best is None:
         return None
     a, b, one = best
-    inside = one.joints(arm, route, s[a + 1 : b])
+    inside = _within(arm, route, one, s[a + 1 : b])
     offset = one.q[1] - other.q[b - other.first]
     q = np.concatenate([c.q[: a + 1 - c.first], inside, other.q[b - other.first :] + offset])
     left, right = c.labels[: j - c.first], other.labels[on - other.first :]
     labels = np.concatenate([left, np.repeat(right[:1], len(q) - len(left) - len(right)), right])
     return Chain(arm, c.first, q, labels, (*c.windows, one))
+
+
+def _within(arm: Arm, route: Route, one: Window, s: Array) -> Array:
+    """Joint values at lengths s (N,) inside of a window: (N, n)."""
+    q = one.joints(arm, route, s)
+    if one.detour is None or not len(s):
+        return q
+    q = corrected(arm, route.task, q, detoured(route, (one,)).targets(s), steps=12)
+    known = np.abs(_bent(arm, q)) > _TOLD  # nearer to straight joints 4 and 6 go on as they do beside it
+    at, beside = np.concatenate([[one.begin], s[known], [one.end]]), np.concatenate([one.q[:1], q[known], one.q[1:]])
+    for j in (3, 5):
+        q[~known, j] = np.interp(s[~known], at, beside[:, j])
+    return q
+
+
+def _around(arm: Arm, route: Route, window: Window) -> Window | None:
+    """The window with the tip aside, as little as it can be, to where the wrist is straight; None: it is nowhere."""
+    s = np.linspace(window.begin, window.end, _LOOKED)
+    q = window.joints(arm, route, s)
+    bent = _bent(arm, q)
+    flips = np.flatnonzero(bent[:-1] * bent[1:] <= 0)
+    if len(flips) != 1:
+        return None
+    i = int(flips[0])
+    f = float(bent[i] / (bent[i] - bent[i + 1]))
+    posture, at = q[i] + f * (q[i + 1] - q[i]), float(s[i] + f * (s[i + 1] - s[i]))
+    free = [0, 1, 2, 3, 5]
+    for _ in range(_STEPS):  # the tool's direction first, then the tip as near as it goes; joint 5 is straight
+        target, beyond = route.targets(np.array([at, at + _STEP]))
+        along = (beyond - target)[:3, 3] / _STEP
+        T, J = fk(arm, posture), jacobian(arm, posture)[:, free]
+        by = T[:3, 3] - target[:3, 3]
+        miss = np.concatenate([-_LEAST * by, _rotation(T, target)])
+        posture[free] += np.linalg.lstsq(np.concatenate([_LEAST * J[:3], J[3:]]), miss, rcond=1e-9)[0]
+        at += float(by @ along)  # what leads along the path is no way aside
+    return replace(window, turned=0.0, detour=Detour(window.begin, window.end, by))
+
+
+def _passes(arm: Arm, route: Route, window: Window) -> bool:
+    """Whether the joints follow a window's detour, all along."""
+    s = np.linspace(window.begin, window.end, _LOOKED)
+    T, goal = fk(arm, _within(arm, route, window, s)), detoured(route, (window,)).targets(s)
+    missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_rotation(T, goal)).max()
+    return bool(missed < _EXACT)
+
+
+def _rotation(T: Array, target: Array) -> Array:
+    """Small turns from poses (..., 4, 4) to targets, in the base frame: (..., 3) [rad]."""
+    R = target[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
+    return np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1) / 2
 
 
 def _window(arm: Arm, route: Route, at: Array, before: Array, behind: Array) -> Window:
@@ -116,7 +207,6 @@ def _window(arm: Arm, route: Route, at: Array, before: Array, behind: Array) -> 
     T, target = fk(arm, window.joints(arm, route, s)), route.targets(s)
     if np.linalg.norm(T[:, :3, 3] - target[:, :3, 3], axis=1).max() > 1e-6:
         return window
-    R = np.swapaxes(T[:, :3, :3], 1, 2) @ target[:, :3, :3]
-    turned = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    angle = np.arctan2(np.linalg.norm(turned, axis=1), np.trace(R, axis1=1, axis2=2) - 1)
+    trace = np.einsum("nij,nij->n", T[:, :3, :3], target[:, :3, :3])
+    angle = np.arctan2(2 * np.linalg.norm(_rotation(T, target), axis=1), trace - 1)
     return Window(window.begin, window.end, q, window.d, float(angle.max()))

@@ -49,6 +49,16 @@ class Reconfiguration:
 
 
 @dataclass(frozen=True)
+class Passed:
+    """A wrist singularity that is passed straight through: the tool turned a little, or the tip aside."""
+
+    begin: float  # [mm]
+    end: float
+    turned: float  # [rad] at most
+    aside: float  # [mm] at most
+
+
+@dataclass(frozen=True)
 class Branch:
     """A branch at the path's start: how far it carries, and why no farther."""
 
@@ -87,7 +97,7 @@ class PathPlan:
     deviation: float = 0.0
     rounded_most: float | None = None  # [mm] where a given point lies farthest from the motion
     reduced: Reduced = field(default_factory=Reduced)
-    turned: float | None = None  # [rad] by which the tool is turned at wrist singularities; None: it never is
+    passed: list[Passed] = field(default_factory=list)
     runs: list[PathRun] = field(default_factory=list)
     branches: list[Branch] = field(default_factory=list)
     reconfigurations: list[Reconfiguration] = field(default_factory=list)
@@ -98,6 +108,11 @@ class PathPlan:
     clearance: dict[str, Any] | None = None  # mm (a lower bound), s_mm, body, with: where there are keep-outs
     held: dict[str, float] = field(default_factory=dict)  # joints held all along, and where [rad | mm]
     on_path: dict[int, tuple[Stretch, float]] = field(default_factory=dict)  # stretch number -> it, and s before it
+
+    @property
+    def turned(self) -> float | None:
+        """By how much the tool is turned at wrist singularities [rad]; None: it never is."""
+        return max((one.turned for one in self.passed if one.turned), default=None)
 
     def along(self, number: int, stretch: Stretch, base: float) -> None:
         """Note that a stretch is on the tool's way."""

@@ -20,12 +20,28 @@ _SMOOTH = 1e-3  # [rad] between two directions that count as one
 
 
 @dataclass(frozen=True)
+class Detour:
+    """From length `begin` to `end` the way goes aside: all of `by` (3,) [mm] in its middle third, none at its ends."""
+
+    begin: float
+    end: float
+    by: Array
+
+    def at(self, s: Array) -> Array:
+        """How far aside at lengths s (N,): (N, 3) [mm], with a bend that does not jump."""
+        f = (s - self.begin) / (self.end - self.begin)
+        f = np.clip(3 * np.minimum(f, 1 - f), 0.0, 1.0)
+        return np.asarray((f**3 * (10 - f * (15 - 6 * f)))[:, None] * self.by)
+
+
+@dataclass(frozen=True)
 class Route:
     """Pieces in order; `rests`: numbers of the pieces before which the arm stands, and for how long."""
 
     task: Task
     pieces: tuple[Piece, ...]
     stops: frozenset[int]  # piece numbers (and len(pieces)) at whose start the arm is at rest
+    detours: tuple[Detour, ...] = ()
 
     @cached_property
     def ends(self) -> Array:
@@ -50,7 +66,14 @@ class Route:
                 out = np.empty((len(s), *values.shape[1:]))
             out[here] = values
         assert out is not None
+        for one in self.detours:
+            out[..., :3, 3] += one.at(s)
         return out
+
+    @cached_property
+    def aside(self) -> float:
+        """How far its detours lead away from its pieces, at most [mm]."""
+        return max((float(np.linalg.norm(one.by)) for one in self.detours), default=0.0)
 
     @cached_property
     def breaks(self) -> Array:
