@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.model.rotation import rpy
 from armkin.motion.branch_report import answer, passes
 from armkin.motion.branches.branch_columns import Columns, Samples
+from armkin.plot.path import plot_path
 
 
 def with_rates(name: str) -> armkin.Arm:
@@ -146,9 +148,19 @@ def test_a_plan_says_where_and_how_a_singularity_is_passed() -> None:
         [said] = passes(plan)
         assert said.startswith("a wrist singularity is passed between 35.817 and 134.741 mm: ")
         assert how in said
+        names = [branch["name"] for branch in answer(plan)["branches"]]
+        assert len(names) == len(set(names))
         [one] = answer(plan)["wrists_passed"]
         assert (one["aside_mm"] > 0) == (turn == 0)
         assert (one["turned_deg"] > 0) == (turn > 0)
+
+
+def test_a_picture_says_how_a_singularity_is_passed(tmp_path: Path) -> None:
+    for turn, how in ((0.0, "tip 0.0045 mm aside"), (0.002, "tool turned by 0.0017 deg")):
+        plan, _ = beside(with_rates("puma560"), QS["puma560"], 0.01, turn)
+        plot_path(plan, str(tmp_path / "plan.svg"))
+        said = f"straight through a wrist singularity, 36 to 135 mm: {how}"
+        assert said in (tmp_path / "plan.svg").read_text()
 
 
 def test_nothing_goes_along_the_line_faster_than_its_slowest_joint_alone() -> None:

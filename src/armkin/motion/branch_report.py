@@ -10,6 +10,7 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion.branches.branch_chains import Chain, why_ended
+from armkin.motion.branches.joint_steps import change
 from armkin.motion.plan.path_plan import Branch, Passed, PathPlan, PathRun, Reconfiguration
 from armkin.motion.plan.proved_free import hits_said
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from armkin.motion.branches.branch_path import Carried
     from armkin.motion.timing.trajectory import Trajectory
 
+_SAME = 1e-6  # [rad | mm] of two postures that are one
 _WHY = {
     "end": "carries all",
     "reach": "the path leaves the reach",
@@ -66,7 +68,13 @@ def _branches(arm: Arm, carried: Carried, near: Array) -> list[Branch]:
             found.append((e, Branch(_name(c, int(chain.labels[0])), q, far, why)))
             if carried.runs and chain is carried.runs[0].chain:
                 chosen = found[-1][1]
-    return [branch for _, branch in sorted(found, key=lambda one: (-round(one[1].carries, 2), one[1] is not chosen))]
+    found.sort(key=lambda one: (-round(one[1].carries, 2), one[1] is not chosen))
+    one_each: list[Branch] = []  # with and without the wrist straight through a singularity is one branch
+    for _, branch in found:
+        q = branch.start_joints
+        if not any(b.name == branch.name and np.abs(change(arm, b.start_joints, q)).max() < _SAME for b in one_each):
+            one_each.append(branch)
+    return one_each
 
 
 def _name(c: Columns, label: int) -> str:

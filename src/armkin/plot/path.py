@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.forward import position
 from armkin.model import units
-from armkin.motion.branch_report import closeness, passes
+from armkin.motion.branch_report import closeness
 from armkin.plot.canvas import flat, picture, space, true_proportions
 from armkin.view.skeleton import skeleton
 
@@ -25,6 +25,7 @@ _WIDE = 84  # characters of a line above the arm
 _INKED, _WIDTHS = 150.0, (0.1, 0.6)  # [pt] of a line as long as what is seen is wide, to ink about half of it; lines
 _COLOURS = ("#1f77b4", "#d95f02", "#2ca02c", "#9467bd", "#c03d6b", "#8c6d31", "#17a2b8", "#7f7f7f")
 _SINGULAR = "#c0392b"
+_STRAIGHT = "#fbe9e7"  # behind what is drawn over time, where the wrist passes a singularity
 _INK = "#333333"
 
 
@@ -46,18 +47,26 @@ def plot_path(plan: PathPlan, out: str) -> None:
         for axes in rows[:-1]:
             axes.set_xticklabels([])
         rows[-1].set_xlabel("time / s", labelpad=2, fontsize=8)
+        straight = [(_time_of(plan, one.begin), _time_of(plan, one.end)) for one in plan.passed]
         for axes in rows:
             axes.set_xlim(0.0, max(plan.duration, 1e-9))
             axes.grid(True, linewidth=0.4)
             axes.tick_params(labelsize=8)
             for when in _breaks(plan):
                 axes.axvline(when, color=_SINGULAR, linewidth=0.8, linestyle="--")
+            for begin, end in straight:
+                axes.axvspan(begin, end, color=_STRAIGHT, linewidth=0)
 
 
 def _passes(plan: PathPlan) -> list[str]:
-    """How the first wrist singularity is passed, and how many others there are."""
-    said = passes(plan)
-    return [f"{said[0]}{f'; {len(said) - 1} more' if len(said) > 1 else ''}"] if said else []
+    """How the wrist passes singularities: the first in words, the others in number."""
+    if not plan.passed:
+        return []
+    first, more = plan.passed[0], len(plan.passed) - 1
+    turned = f"tool turned by {first.turned / units.DEGREE:.2g} deg"
+    how = turned if first.turned else f"tip {first.aside:.2g} mm aside"
+    where = f"straight through a wrist singularity, {first.begin:.0f} to {first.end:.0f} mm"
+    return [f"{where}: {how}{f'; {more} more' if more else ''}"]
 
 
 def _fine(plan: PathPlan, t: Array) -> Array:
@@ -130,7 +139,11 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
         at = position(arm, plan.q(_time_of(plan, one.s))[None])
         axes.plot(*at.T, color=_SINGULAR, marker="x", markersize=8, linestyle="none")
     axes.legend(
-        loc="upper left", bbox_to_anchor=(0.03, 0.90), bbox_transform=figure.transFigure, fontsize=8, frameon=False
+        loc="upper left",
+        bbox_to_anchor=(0.03, 0.88 if plan.passed else 0.90),
+        bbox_transform=figure.transFigure,
+        fontsize=8,
+        frameon=False,
     )
     true_proportions(axes, points, float(arm.base[2, 3]))
 
