@@ -23,9 +23,10 @@ _TIMES = 16.0  # as many points, at most, where the tolerance needs them
 _ROUNDS = 8  # in which intervals are divided
 _BLOCK = 8192  # points that are looked at together
 _COARSE = 0.05  # [mm] steps are no coarser, if the tolerance is not
+_TURN = 1.6  # [rad] where slopes are exact, steps that turn by less may be coarser
 _EACH = (4, 64)  # of a section between two bends, at least, with many sections and with few
 _FEWEST = 2  # of a section where slopes are exact: they need no neighbours
-_GROWTH = 3.0  # of an interval beside the next one, at most: motions speed up and slow down beside bends
+_GROWTH = 2.5  # of an interval beside the next one, at most: motions speed up and slow down beside bends
 _GROWS = 1.3  # times that: what is hardly longer stays
 _AROUND = 0.5  # [mm] of the way, about a given point
 _ALIKE = 1e-3  # distances of points that differ by less, relative, are alike: the first place is told
@@ -76,10 +77,13 @@ def fine_enough(
                 return path, np.zeros(len(path.h))
             every, steps = interval_deviations(arm, route, path, before), _steps(arm, path)
             before = path, every
-            off, steps = (np.delete(each, path.rests) for each in (every, steps / max(tolerance, _COARSE)))
-            if max(off.max() / tolerance, steps.max()) <= 1.0 or len(where) > most:
+            off, steps, h = (np.delete(each, path.rests) for each in (every, steps, path.h))
+            coarse = np.sqrt(steps / max(tolerance, _COARSE))  # of second order in h
+            if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
+                coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
+            needed = np.maximum(np.cbrt(off / tolerance), coarse)  # of third order in h
+            if needed.max() <= 1.0 or len(where) > most:
                 break
-            needed = np.maximum(np.cbrt(off / tolerance), np.sqrt(steps))  # of third and of second order in h
             parts = np.ceil(np.clip(1.15 * needed, 1.0, 6.0)).astype(int)
             if not exact:  # slopes that neighbours tell want even steps
                 beside = np.maximum(np.append(parts[1:], 1), np.append(1, parts[:-1])) > 2
