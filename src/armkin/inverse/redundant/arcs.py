@@ -15,7 +15,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import CONVERGING, SAME_SEED, SHORTEST_ARC
+from armkin.inverse.numeric.tolerances import CONVERGING, PAIR_SETTLED, SAME_SEED, SHORTEST_ARC
 from armkin.inverse.redundant.follower import Follower, over_a_turn
 from armkin.inverse.redundant.pieces import Int
 from armkin.model.units import radian_or_reach
@@ -47,17 +47,21 @@ def onto(find: Follower, row: Int, q: Array, last: Array, fixed: bool = False) -
     """
     arm, task, unit = find.arm, find.free.task, radian_or_reach(find.arm)
     target = find.target[row]
-    tangent = last
+    q, tangent, going = q.copy(), last.copy(), np.arange(len(q))
     for _ in range(NEWTON):
-        missing, J = newton.scaled(arm, task, q, target)
-        rows = np.concatenate([J, last[:, None]], axis=1)
+        some = slice(None) if len(going) == len(q) else going
+        missing, J = newton.scaled(arm, task, q[some], target[some])
+        rows = np.concatenate([J, last[some, None]], axis=1)
         right = np.zeros((*rows.shape[:2], 2))
         right[:, :-1, 0], right[:, -1, 1] = missing, 1.0
         # the direction of a tool's axis is three numbers for two constraints
         x = nudged(np.linalg.solve, rows, right) if rows.shape[1] == arm.n else np.linalg.pinv(rows) @ right
-        step, tangent = x[:, :, 0], x[:, :, 1] / np.linalg.norm(x[:, :, 1], axis=1, keepdims=True)
-        q = q + step * np.minimum(1.0, LONGEST / np.maximum(np.abs(step).max(axis=1), LONGEST))[:, None] * unit
-        if np.abs(step).max(initial=0.0) < CONVERGING:
+        step = x[:, :, 0]
+        tangent[some] = x[:, :, 1] / np.linalg.norm(x[:, :, 1], axis=1, keepdims=True)
+        size = np.abs(step).max(axis=1)
+        q[some] += step * np.minimum(1.0, LONGEST / np.maximum(size, LONGEST))[:, None] * unit
+        going = going[~(size < PAIR_SETTLED)]  # its square is below rounding
+        if not len(going):
             break
     miss = newton.missing(arm, task, q, target)
     return Points(q, tangent, np.where(np.isnan(tangent).any(axis=1), np.inf, miss))
@@ -161,8 +165,9 @@ class Curve(NamedTuple):
 def curves_of(find: Follower) -> list[Curve]:
     """All curves of all targets that a seed is on."""
     seeds = _answers(find)
-    ways: dict[tuple[int, int], tuple[Points, tuple[int, int]]] = {}  # (seed, side): points on the way, where it ends
+    ways: dict[tuple[int, int], tuple[Int, tuple[int, int]]] = {}  # (seed, side): points on the way, where it ends
     tried: set[tuple[int, int]] = set()
+    passed, count = [], 0
     for k in range(ROUNDS):
         rays = [
             (seed, side)
@@ -176,30 +181,40 @@ def curves_of(find: Follower) -> list[Curve]:
         ray, side = (np.array(column) for column in zip(*rays, strict=True))
         arcs = _trace(find, seeds, ray, side)
         seeds, ends = _matched(find, seeds, seeds.row[ray], arcs)
+        index = np.arange(count, count + len(arcs.ray))
         cut = np.searchsorted(arcs.ray, np.arange(len(ray) + 1)).tolist()
         stays = (arcs.plane == seeds.plane[ray]).tolist()
         for i, ((seed, s), to) in enumerate(zip(rays, ends.tolist(), strict=True)):
             back = (to, s if stays[i] else -s)
             if to >= 0 and (seed, s) not in ways and back not in ways:
-                points = arcs.points.of(np.arange(cut[i], cut[i + 1]))
-                ways[seed, s] = points, back
-                ways[back] = points.of(np.arange(len(points.miss))[::-1]), (seed, s)
-    return _chained(seeds, ways)
+                own = index[cut[i] : cut[i + 1]]
+                ways[seed, s] = own, back
+                ways[back] = own[::-1], (seed, s)
+        passed.append(arcs.points)
+        count += len(arcs.ray)
+    points = Points(*(np.concatenate(column) for column in zip(*passed, seeds.points, strict=True)))
+    return _chained(seeds, points, ways)
 
 
 def _matched(find: Follower, seeds: _Seeds, row: Int, arcs: _Arcs) -> tuple[_Seeds, Int]:
     """Which seed each arc ends at, -1: none; ends that are no seed yet become one."""
     ends = np.full(len(row), -1)
-    new: list[int] = []
     key = seeds.row * PLANES + seeds.plane
     order = np.argsort(key, kind="stable")
-    first, last = (np.searchsorted(key[order], row * PLANES + arcs.plane, side) for side in ("left", "right"))
-    for i in np.flatnonzero(~np.isnan(arcs.end[:, 0])).tolist():
-        some = order[first[i] : last[i]]
-        apart = newton.wrapped_distance(find.arm, seeds.points.q[some], arcs.end[i])
-        if len(some) and apart.min() < SAME_SEED:
-            ends[i] = some[apart.argmin()]
-        elif not any(
+    there = np.flatnonzero(~np.isnan(arcs.end[:, 0]))
+    first, last = (
+        np.searchsorted(key[order], row[there] * PLANES + arcs.plane[there], side) for side in ("left", "right")
+    )
+    place = first[:, None] + np.arange(max(int((last - first).max(initial=0)), 1))
+    some = order[np.minimum(place, len(order) - 1)]
+    apart = newton.wrapped_distance(find.arm, seeds.points.q[some], arcs.end[there, None])
+    apart[place >= last[:, None]] = np.inf
+    nearest = apart.argmin(axis=1)
+    found = apart[np.arange(len(there)), nearest] < SAME_SEED
+    ends[there[found]] = some[found, nearest[found]]
+    new: list[int] = []
+    for i in there[~found].tolist():
+        if not any(
             row[k] == row[i]
             and arcs.plane[k] == arcs.plane[i]
             and newton.wrapped_distance(find.arm, arcs.end[k], arcs.end[i]) < SAME_SEED
@@ -215,22 +230,23 @@ def _matched(find: Follower, seeds: _Seeds, row: Int, arcs: _Arcs) -> tuple[_See
     return seeds, ends
 
 
-def _chained(seeds: _Seeds, ways: dict[tuple[int, int], tuple[Points, tuple[int, int]]]) -> list[Curve]:
-    """Arcs joined to curves: open ones from their ends, then those that close."""
-    out, left = [], set(range(len(seeds.row)))
-    ends = [(seed, -side) for seed in sorted(left) for side in (1, -1) if (seed, side) not in ways]
-    for begin, side in [*ends, *((seed, 1) for seed in sorted(left))]:
+def _chained(seeds: _Seeds, points: Points, ways: dict[tuple[int, int], tuple[Int, tuple[int, int]]]) -> list[Curve]:
+    """Arcs joined to curves: open ones from their ends, then those that close; points: on the ways, then the seeds'."""
+    M, own = len(seeds.row), np.arange(len(points.miss))[:, None]
+    before = len(own) - M
+    out, left = [], set(range(M))
+    ends = [(seed, -side) for seed in range(M) for side in (1, -1) if (seed, side) not in ways]
+    for begin, side in [*ends, *((seed, 1) for seed in range(M))]:
         if begin not in left:
             continue
         parts, seed, closed = [], begin, False
         while seed in left:
             left.remove(seed)
-            parts.append(seeds.points.of(np.array([seed])))
+            parts.append(own[before + seed])
             if (seed, side) not in ways:
                 break
-            points, (seed, came) = ways[seed, side]
-            parts.append(points)
+            some, (seed, came) = ways[seed, side]
+            parts.append(some)
             side, closed = -came, seed == begin
-        points = Points(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-        out.append(Curve(int(seeds.row[begin]), points, closed))
+        out.append(Curve(int(seeds.row[begin]), points.of(np.concatenate(parts)), closed))
     return out

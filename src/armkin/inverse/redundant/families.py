@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 64  # targets whose arm angles are worked on together
-TRACED = 24  # and whose curves are traced together
+TRACED = 48  # and whose curves are traced together
 FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free
 
 
