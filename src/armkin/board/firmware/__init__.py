@@ -5,6 +5,7 @@ segments/          a trajectory as moves in counts, and these as segments of con
 streaming.py       segments to the board while it moves
 configuration.py   a robot file as its board must know it
 machine.py         the arm: configured, its position known or lost, moved by plans
+resets_and_stops.py  why a motion ended early, and what the arm still knows
 homing.py          homing by limit switches
 jogging.py         one joint at a constant speed
 gripping.py        the gripper, whose counts are in gripper_counts.py

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.backend.board import LostSteps
+from armkin.board.firmware import resets_and_stops
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.session import DeviceError
 from armkin.errors import NoHomingError, UsageError
@@ -145,7 +146,7 @@ def _found(machine: Machine, search: Search) -> tuple[Status, Status]:
         machine.in_time()
         return machine.status, session.status(page=1)
     except DeviceError as error:
-        raise machine.explain(error) from None
+        raise resets_and_stops.explain(machine, error) from None
 
 
 def lost_joints(machine: Machine) -> list[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.backend.starting import check_jog
+from armkin.board.firmware import resets_and_stops
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.firmware.wire.session import DeviceError
@@ -102,6 +103,6 @@ def jog(machine: Machine, rate: dict[int, int], seconds: float, more: Callable[[
         for _ in session.arrivals():
             pass
     except DeviceError as error:
-        raise machine.explain(error) from None
+        raise resets_and_stops.explain(machine, error) from None
     machine.status = session.status()
     machine.in_time()

@@ -13,15 +13,15 @@ import numpy as np
 
 from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.starting import from_counts, unbelievable
-from armkin.board.firmware import streaming
-from armkin.board.firmware.board_status import WHY, as_json
+from armkin.board.firmware import resets_and_stops, streaming
+from armkin.board.firmware.board_status import as_json
 from armkin.board.firmware.segments import trajectory_to_counts
 from armkin.board.firmware.segments.onwards import onwards, places_on
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.protocol import Error, Flag, Status
+from armkin.board.firmware.wire.protocol import Flag, Status
 from armkin.board.firmware.wire.session import DeviceError, Session
 from armkin.board_kinds import board_name
-from armkin.errors import HeldError, LinkError, PositionKnownError, PositionLostError
+from armkin.errors import LinkError, PositionKnownError
 from armkin.model.units import joints_out
 from armkin.motors import joints, pulses
 
@@ -123,7 +123,7 @@ class Machine(Backend):
                 joints=joints_out(self.arm, self.joints()).tolist(),
             )
         if lost and assume is None and not self._simulated:
-            raise _demand(self)
+            raise resets_and_stops.must_be_told(self)
         if not self.configured:
             self.configure()
         if lost:
@@ -200,9 +200,9 @@ class Machine(Backend):
             self.status = stopped.status or self.status
             raise
         except DeviceError as error:
-            raise self.explain(error) from None
+            raise resets_and_stops.explain(self, error) from None
         if self.position() == "lost":
-            raise _lost(self, "the board has lost the arm's position on the way")
+            raise resets_and_stops.lost(self, "the board has lost the arm's position on the way")
         self.in_time()
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
@@ -228,7 +228,7 @@ class Machine(Backend):
             frames = streaming.batches(self.session, move, (axis,), clock)
             self.status = streaming.stream(self.session, frames, lambda left: None)
         except DeviceError as error:
-            raise self.explain(error) from None
+            raise resets_and_stops.explain(self, error) from None
         return self.status
 
     # Words
@@ -236,29 +236,6 @@ class Machine(Backend):
     def describe(self) -> str:
         """Where it stands, in words: ``q1 = 0, q2 = 90, q3 = -90 deg``."""
         return describe(self.arm, self.joints())
-
-    def explain(self, error: DeviceError) -> LinkError:
-        """What the board's error means, and where the arm stands now."""
-        why = WHY.get(error.error)
-        if why is None:
-            return LinkError(
-                f"the board refused what it was sent: {error.error.name} ({error.detail}); it stands still\n"
-                "armkin and its firmware disagree: please report it with the robot file"
-            )
-        try:
-            self.status = self.session.rest()
-            if self.status.error == Error.NO_SESSION:
-                self.info = self.session.reopen()
-                self.status = self.session.status()
-        except LinkError:
-            return LinkError(f"{why}; then the board did not answer any more: armkin status tells where it stands")
-        if self.position() == "lost":
-            return _lost(self, f"{why}\n{self.standing()}")
-        return HeldError(
-            f"{why}\nthe arm stands at {self.describe()}, its position is known",
-            advice="the next motion starts there",
-            joints=joints_out(self.arm, self.joints()).tolist(),
-        )
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
@@ -270,29 +247,7 @@ class Machine(Backend):
         try:
             self.session.call(make)
         except DeviceError as error:
-            raise self.explain(error) from None
-
-
-def _demand(machine: Machine) -> PositionLostError:
-    what = "the arm's position is lost"
-    if machine.info.config and not machine.configured:
-        changed = f"{machine.arm.path} has changed"
-        what = f"the board is configured for another arm, or {changed}: its position is lost"
-    elif machine.configured and (far := unbelievable(machine.arm, machine.counts())):
-        what = f"{what}: {far}"
-    return _lost(machine, what)
-
-
-def _lost(machine: Machine, message: str) -> PositionLostError:
-    homing = all(machine.arm.homing)
-    put = "put the arm in its home pose and prepare(assume=arm.home)"
-    return PositionLostError(
-        message,
-        advice=f"home it, or {put}" if homing else put,
-        robot_file=machine.arm.path,
-        port=machine.session.port.name,
-        homing=homing,
-    )
+            raise resets_and_stops.explain(self, error) from None
 
 
 def describe(arm: Arm, q: Array) -> str:
