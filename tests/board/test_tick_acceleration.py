@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from armkin.board.firmware.segments import straight_lines
+from armkin.board.firmware.segments import counts_to_segments, straight_lines
 from armkin.board.firmware.segments.straight_lines import Pieces
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.streaming import later
@@ -33,6 +33,14 @@ def intervals(s: Segment) -> NDArray[np.float64]:
     more, block = (128 * s.bend, 1) if s.quick else (4 * s.bend, BLOCK)
     add = s.add * 256 + more * np.concatenate([[0], np.cumsum(left % block == 0)[:-1]])
     return np.asarray(s.interval + np.concatenate([[0], np.cumsum(add >> 8)[:-1]]) / 65536)
+
+
+@pytest.mark.parametrize(("quick", "bend"), [(False, 64), (True, 2)])  # by which `add` grows by one
+def test_a_bend_counts_in_the_last_interval_as_often_as_the_device_adds_it_up(quick: bool, bend: int) -> None:
+    for ticks in (*range(1, 70), 255, 256, 1024):
+        segment = Segment(ticks, 1000, 0, (0,), bend, quick)
+        last = intervals(segment)[-1] - segment.interval
+        assert counts_to_segments._bends(ticks, quick) == round(65536 * last)
 
 
 def unheard(cut: list[Segment]) -> float:

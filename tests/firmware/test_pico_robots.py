@@ -75,19 +75,21 @@ def test_a_six_axis_arm_moves_end_to_end(name: str) -> None:
         assert (status["position"], status["board"]) == ("known", PICO)
 
 
-@pytest.mark.parametrize("name", ["ar4_pico6", "parol6_pico6"])
-def test_a_six_axis_arm_finds_its_switches(
-    name: str, pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_six_axis_arms_find_their_switches(pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch) -> None:
     """A degree off each switch it takes itself to be at home; homing tells how wrong that was, to the step.
 
-    The last joint, which homes fast; with --long all six.
+    The last joint of one arm, which homes fast; with --long all six of two.
     """
+    long = pytestconfig.getoption("--long")
+    for name in ["parol6_pico6", "ar4_pico6"] if long else ["parol6_pico6"]:
+        finds_its_switches(name, range(6) if long else range(5, 6), monkeypatch)
+
+
+def finds_its_switches(name: str, wanted: range, monkeypatch: pytest.MonkeyPatch) -> None:
     # the emulator takes 5 s of a core for a second of six fast axes: the host must not take that for a standstill
     monkeypatch.setattr("armkin.board.firmware.wire.session._STALLED", 120.0)
     robot = ROOT / "robots" / f"{name}.yaml"
     arm = armkin.load(robot)
-    wanted = range(6) if pytestconfig.getoption("--long") else range(5, 6)
     step = np.radians([switch.direction for switch in arm.homing if switch is not None])
     away = armkin.pulses(arm, arm.home + step)
     with EmulatedBoard(PICO) as board:

@@ -159,7 +159,7 @@ def _killed_often(seed: int, times: int) -> list[str]:
 
 
 def test_a_sender_killed_at_random_moments(sample: Callable[[int, int], int]) -> None:
-    kills = sample(50, 16)
+    kills = sample(50, 8)
     with ThreadPoolExecutor(2) as pool:
         assert list(pool.map(lambda seed: _killed_often(seed, kills // 2), (1, 2))) == [[], []]
 

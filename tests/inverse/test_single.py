@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 
 import numpy as np
@@ -49,7 +50,7 @@ def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutio
 
 @pytest.mark.parametrize("name", CLOSED)
 @pytest.mark.parametrize("limits", ["own", "half a turn", "narrow", "wide", "none"])
-def test_one_is_as_in_a_batch(name: str, limits: str) -> None:
+def test_one_is_as_in_a_batch(name: str, limits: str, sample: Callable[[int, int], int]) -> None:
     arm, screw = shipped(name)
     task, geometry = solver(arm, None)
     assert geometry.pairs
@@ -66,11 +67,11 @@ def test_one_is_as_in_a_batch(name: str, limits: str) -> None:
     q = rng.uniform(-np.pi, np.pi, (30, arm.n)) * np.where(arm.prismatic, arm.reach / 10, 1.0)
     targets = goal(task, screw, q).array()
     short = 0
-    for k, target in enumerate(targets[:12]):
+    for k, target in enumerate(targets[: sample(12, 6)]):
         near = None if k % 3 == 0 else rng.uniform(-1.5, 1.5, arm.n) * turn
         alone = ask(arm, target, near)
         short += alone is not None and bool(alone.valid.any())
-    assert short > 9
+    assert short > 0.75 * sample(12, 6)
     beyond = targets[0].copy()
     beyond[(..., 3) if beyond.ndim == 2 else slice(0, 2)] *= 1.0 if beyond.ndim == 2 else 50.0
     if beyond.ndim == 2:
