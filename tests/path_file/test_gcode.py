@@ -14,7 +14,7 @@ from armkin.errors import PathFileError, UsageError
 from armkin.inverse.tasks.fitting import task_for
 from armkin.model import units
 from armkin.motion.tool_path.placing import placing
-from armkin.path_file import gcode
+from armkin.path_file import gcode, gcode_arcs
 from armkin.path_file.drawing import Placing, Wishes
 from command_line import run
 
@@ -78,6 +78,29 @@ def test_arcs(text: str, via: tuple[float, ...], to: tuple[float, ...]) -> None:
     assert kind == "arc"
     assert value.via == pytest.approx(via, abs=1e-9)
     assert value.to == pytest.approx(to, abs=1e-9)
+
+
+@pytest.mark.parametrize("plane", [(0, 1, 2), (2, 0, 1), (1, 2, 0)])
+def test_a_printed_centre_becomes_as_far_from_both_ends(plane: tuple[int, int, int]) -> None:
+    """Three decimals put an arc's end beside its circle, and the misses of arcs one after another would add up.
+
+    Of chords longer than half the radius; of shorter ones the centre would move too far.
+    """
+    x, y, across = plane
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        start, sweep, radius = rng.uniform(-3, 3), rng.uniform(0.7, 3.0), rng.uniform(0.5, 80)
+        a, b = np.zeros(3), np.zeros(3)
+        a[[x, y]] = radius * np.array([math.cos(start), math.sin(start)])
+        b[[x, y]] = radius * np.array([math.cos(start + sweep), math.sin(start + sweep)])
+        a, b = a.round(3), b.round(3)
+        offsets = {"IJK"[k]: round(-a[k] + rng.uniform(-0.001, 0.001), 3) for k in (x, y)}
+        ends = [(float(p[0]), float(p[1]), float(p[2])) for p in (a, b)]
+        centre, normal, angle = gcode_arcs.arc("G3", plane, offsets, 1.0, *ends)
+        assert math.dist(centre, a) == pytest.approx(math.dist(centre, b), abs=1e-9)
+        assert math.dist(centre, (0, 0, 0)) < 0.01
+        assert angle == pytest.approx(sweep, abs=0.01)
+        assert normal[across] == 1.0
 
 
 def test_circles_and_helices() -> None:
