@@ -73,9 +73,12 @@ def test_random_motions_are_free_when_proved_and_hit_when_not(kind: str, table: 
     assert 5 < free < 60
 
 
-def test_a_body_moves_no_farther_than_its_levers(table: Path) -> None:
+@pytest.mark.parametrize("ratio", [1.0, 2.0])
+def test_a_body_moves_no_farther_than_its_levers(ratio: float, table: Path) -> None:
+    """Of a calibrated arm, too, whose joints move by more than they are told."""
     for kind in ("ur5e", "rail"):
         arm = _arm(kind, table)
+        arm = replace(arm, ratio=np.full(arm.n, ratio))
         held, rng = guard(arm), np.random.default_rng(7)
         q = _postures(arm, 2000, 6)
         step = rng.normal(size=q.shape) * np.where(arm.prismatic, 1.0, 0.01)
@@ -83,6 +86,10 @@ def test_a_body_moves_no_farther_than_its_levers(table: Path) -> None:
         bound = np.abs(step) @ levers(held, np.where(arm.prismatic, np.abs(q).max(axis=0) + 5.0, 0.0))
         assert (moved <= bound + 1e-9).all()
         assert (moved.max(axis=0) > 0.2 * bound.max(axis=0)).any()  # and the bound is no guess in the sky
+        out = np.where(arm.prismatic, np.abs(q).max(axis=0), 0.0)
+        last = [k for k, pair in enumerate(held.pairs) if pair.body == arm.n and not pair.other]
+        tip = armkin.fk(arm, q)[:, :2, 3]  # axis 1 stands upright in the base's origin
+        assert (levers(held, out)[0, last] >= ratio * np.hypot(*tip.T).max()).all()
 
 
 def test_parts_of_cubics_go_no_farther_than_told() -> None:

@@ -146,6 +146,9 @@ def test_a_voxel_takes_the_cell_that_its_centre_lies_in() -> None:
     inside = voxels.rows_at(grid, np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1))
     assert np.array_equal(inside, np.arange(found.cells))
     assert (voxels.rows_at(grid, np.array([[5000.0, 0, 0], [0, 0, -5000.0]])) == -1).all()
+    top, low = (float(end(local[:, 2])) for end in (np.max, np.min))  # of the cells, and the next ones beyond
+    beyond = voxels.rows_at(grid, np.array([[1.0, 0, top + 150.0], [1.0, 0, low - 150.0]]))
+    assert (beyond == -1).all()
     side = voxels.section(grid)
     assert (side.row % 7 == np.where(side.places[:, 0] >= 0, 0, side.row % 7)).all()
     assert side.table(found.share).shape == (np.ptp(side.places[:, 1]) + 1, np.ptp(side.places[:, 0]) + 1)
