@@ -73,3 +73,16 @@ def test_circuits_that_nearly_meet_are_two() -> None:
     assert s.free.tolist() == [[False, True, True, True, False, True]]
     assert leads_to(screw, goals, q, s.q).sum() == 1
     assert s.valid.sum() == 6  # two circuits with a wrist that is straight, four branches with another shoulder
+
+
+@pytest.mark.parametrize(
+    "degrees",
+    [[166.2, -7.4, 92.69287, -36.87, -171.28, -30.1], [166.197, -7.388, 92.69287, -36.868, -171.277, -30.108]],
+)
+def test_of_a_self_motion_with_two_ends_the_posture_nearest_to_near_is_listed(degrees: list[float]) -> None:
+    """A folded wrist all but on two axes: 0.2 rad long, and both of its roots were taken for self-motions."""
+    arm, q = armkin.load("puma560"), np.radians(degrees)
+    s = armkin.ik(arm, armkin.fk(arm, q))
+    off = np.abs(np.angle(np.exp(1j * (s.q[s.valid] - q)))).max(axis=1)
+    assert off.min() < 1e-6  # nearer to home than the other root of the same component
+    assert (off < 0.25).sum() == 1

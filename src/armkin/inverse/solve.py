@@ -24,7 +24,6 @@ from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination.merge import projection
-from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.redundant.families import families
 from armkin.inverse.redundant.position_first import check as check_position_first
@@ -210,7 +209,8 @@ def _rows(
 ) -> tuple[Batch, int]:
     """Solvers that return joint values row by row. Also the number of branch columns."""
     assert geometry.rows is not None
-    q, doubt, complete, lost, guesses = _solved(geometry.rows, target, workers)
+    solve = (geometry.unmoved if examine else None) or geometry.rows
+    q, doubt, complete, lost, guesses = _solved(solve, target, workers)
     B = q.shape[1]
     out = empty(len(target), B, arm.n)
     out.q[...], inside = nearest_row(arm, q, near[:, None, :])
@@ -228,22 +228,17 @@ def _rows(
         doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, position(arm, near)))] = True
     doubted = np.flatnonzero(doubt)
     if examine and len(doubted):
-        solve = geometry.rows
-
         found = q[doubted] if guesses is None else np.concatenate([q[doubted], guesses[doubted]], axis=1)
         seeds = Seeds.of(found, np.arange(found.shape[1]) % max(B, 1))
 
-        def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
+        def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64], Bool]:
             """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.
 
-            And of targets that may lack branches what Newton's method finds from many starts.
+            They say nothing of a corner of the workspace, beside which no target is reached, and of self-motions.
             """
-            there = around(arm, task, target)
-            found = solve(there.reshape(-1, *target.shape[1:])).q
+            found = solve(around(arm, task, target).reshape(-1, *target.shape[1:])).q
             found = found.reshape(len(target), -1, arm.n)
-            if lost.any():
-                found = np.concatenate([found, many_starts(arm, task, target, lost)], axis=1)
-            return found, np.arange(found.shape[1]) % max(B, 1)
+            return found, np.arange(found.shape[1]) % max(B, 1), lost
 
         unsettled = np.zeros(len(target), bool) if lost is None else lost
         out = examined(goals, out, doubted, seeds, others, unsettled)

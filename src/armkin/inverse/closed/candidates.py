@@ -18,7 +18,6 @@ from armkin.inverse.closed import crossings, four_bars
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, spin
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED, SHAKE, TURNED
 from armkin.inverse.tasks.task import Task, moved
 
@@ -112,12 +111,12 @@ class Recorded:
         *_, miss, edge, _ = rows = np.moveaxis(as_rows(found, N), 2, 0)
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
-    def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64]]:
+    def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64], Bool]:
         """More candidates of targets that leave joints free or seem to have no branch: (N, M, n), and branches (M,).
 
         Where branches seem lost (N,): with other values for the joints that are free, and for targets moved a little,
-        which do not, and of some classes from many starts. Everywhere: of places where a self-motion meets another one.
-        nan where there is none, or where the candidate is far from its target. near: (N, n).
+        which do not. Everywhere: of places where a self-motion meets another one. nan where there is none, or where the
+        candidate is far from its target. near: (N, n). Also of which targets (N,) these may not lead to all.
         """
         q, miss = self._all_round(target, near)
         exact = np.where((miss <= ACCEPTED**2)[..., None], q, np.nan)
@@ -139,10 +138,8 @@ class Recorded:
             others = np.full((len(q), (FREED + SHAKEN) * q.shape[2], self.arm.n), np.nan)
             others[rest] = self._random(target[rest], near[rest])
             more.append(others)
-        if self.geometry.ends and lost.any():
-            more.append(many_starts(self.arm, self.task, target, lost))
         branch = np.concatenate([np.arange(part.shape[1]) % q.shape[2] for part in more])
-        return np.concatenate(more, axis=1), branch
+        return np.concatenate(more, axis=1), branch, lost if self.geometry.ends else np.zeros_like(lost)
 
     def samples(self, target: Array, near: Array) -> Array:
         """Candidates (N, FREED, B, n) with values for free joints all round; nan where they miss their target."""

@@ -44,6 +44,7 @@ class Geometry:
     complete: bool
     pairs: Callable[[list[Entry], Prefer], Candidates] | None = None
     rows: Callable[[Array], Rows] | None = None
+    unmoved: Callable[[Array], Rows] | None = None  # `rows` for targets that are examined where they are in doubt
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
     ordered: bool = True  # a branch keeps its index along a path; else `branches.tracking` sees to it
     elimination: Any = None  # of `rows`: the prepared elimination that they come from, if they do

@@ -88,12 +88,13 @@ class Branches(NamedTuple):
     guesses: Array
 
 
-def solve(elimination: Elimination, T: Array) -> Branches:
+def solve(elimination: Elimination, T: Array, moved: bool = True) -> Branches:
     """All isolated branches of many targets.
 
     Args:
         elimination: from `prepare`.
         T: (N, 4, 4) targets [mm].
+        moved: whether passes that move a pose follow where those that leave it where it is settle nothing.
 
     Returns:
         q: (N, B, 6) [rad in (-pi, pi] | mm], sorted by a fixed projection, NaN past a target's last branch;
@@ -105,7 +106,7 @@ def solve(elimination: Elimination, T: Array) -> Branches:
         guesses: (N, G, 6) postures close to answers of these, NaN past the last: to be corrected.
     """
     count = T.shape[0]
-    parts = [_solve_block(elimination, T[begin : begin + BLOCK]) for begin in range(0, count, BLOCK)]
+    parts = [_solve_block(elimination, T[begin : begin + BLOCK], moved) for begin in range(0, count, BLOCK)]
     q = np.full((count, max((part.q.shape[1] for part in parts), default=0), 6), np.nan)
     near_singular, settled, shaken = np.zeros((3, count), dtype=np.bool_)
     guesses = np.full((count, max((part.guesses.shape[1] for part in parts), default=0), 6), np.nan)
@@ -116,7 +117,7 @@ def solve(elimination: Elimination, T: Array) -> Branches:
     return Branches(q, near_singular, settled, shaken, guesses)
 
 
-def _solve_block(elimination: Elimination, T: Array) -> Branches:
+def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:
     """`solve` for as many targets as one should keep intermediate results of."""
     closed, count = elimination.loop, T.shape[0]
     finite: Bool = np.all(np.isfinite(T), axis=(1, 2))
@@ -126,7 +127,7 @@ def _solve_block(elimination: Elimination, T: Array) -> Branches:
         shaken = ~settled
         near = none()
     else:
-        answers, near, touching, settled, shaken = _passes(elimination, goal)
+        answers, near, touching, settled, shaken = _passes(elimination, goal, moved)
     answers = answers.take(finite[answers.pose])
     answers, merged = merge(closed.chain, closed.prismatic, goal, answers)
     q, weak = pack(answers, count)
@@ -135,7 +136,7 @@ def _solve_block(elimination: Elimination, T: Array) -> Branches:
     return Branches(q * unit, (weak | merged | touching) & finite, settled, shaken & finite, guesses * unit)
 
 
-def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Answers, Bool, Bool, Bool]:
+def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers, Answers, Bool, Bool, Bool]:
     """Answers of all passes, each over the poses that the last one left open, and what is close to answers; then (N,)
     poses with touching pairs, settled ones, and those that went to a pass which moves them."""
     found, guesses = [none()], [none()]
@@ -146,6 +147,8 @@ def _passes(elimination: Elimination, goal: Array) -> tuple[Answers, Answers, Bo
         open_poses = np.flatnonzero(kind == one)
         for number, pencil in enumerate(elimination.of_kind(one) if open_poses.size else ()):
             shaken[open_poses] |= SHAKES[number] > 0
+            if SHAKES[number] > 0 and not moved:
+                break
             still = np.zeros(open_poses.size, dtype=np.bool_)
             for begin in range(0, open_poses.size, CHUNK):
                 part = open_poses[begin : begin + CHUNK]

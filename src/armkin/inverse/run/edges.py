@@ -169,13 +169,13 @@ def examined(
     out: Batch,
     doubted: NDArray[np.intp],
     seeds: Seeds,
-    others: Callable[[Array, Array, Bool], tuple[Array, NDArray[np.int64]]],
+    others: Callable[[Array, Array, Bool], tuple[Array, NDArray[np.int64], Bool]],
     unsettled: Bool | None = None,
 ) -> Batch:
     """Examine the doubted targets and write what is found: branches first, nan behind.
 
-    seeds: candidates of these; others: more of them, for targets and preferred values, and whether
-    branches seem lost or an elimination did not settle them; unsettled: (N,), see `components.examine`.
+    seeds: candidates of these; others: more of them, for targets and preferred values, and whether branches seem lost
+    or an elimination did not settle them, and whether they may not be all; unsettled: (N,), see `components.examine`.
     """
     for start in range(0, len(doubted), AT_ONCE):
         rows = doubted[start : start + AT_ONCE]

@@ -34,7 +34,7 @@ from armkin.inverse.numeric.tolerances import (
     TURNED,
 )
 from armkin.inverse.singular import circuits, meetings, roots, self_motions
-from armkin.inverse.singular.local_structure import beyond_folds, local_structure, members
+from armkin.inverse.singular.local_structure import beyond_folds, ended, local_structure, members
 
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 FEW = 24  # candidates of a target that are compared all with all
@@ -42,9 +42,9 @@ PATIENCE = 6  # steps that bring hardly anything after which a candidate is left
 OWN = -1  # label of a posture that comes from `near`
 
 Int = NDArray[np.int64]
-# For targets (rows of those examined) and whether branches seem lost: more postures to start from (rows, M, n), and
-# their branches (M,).
-More = Callable[[Int, Bool], tuple[Array, Int]]
+# For targets (rows of those examined) and whether branches seem lost: more postures to start from (rows, M, n), their
+# branches (M,), and of which targets (rows,) these may not lead to all.
+More = Callable[[Int, Bool], tuple[Array, Int, Bool]]
 
 
 class Examined(NamedTuple):
@@ -134,10 +134,11 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     if not wider.any():
         return Examined(*found[:5], np.zeros(len(q), bool))
     rows = np.flatnonzero(wider)
-    others, labels = more(rows, again[rows])
-    surface = found.surface[rows]  # another self-motion may meet it along a line, or at a point
-    if unsettled is None and surface.any():  # else `more` has searched from there already
-        starts = many_starts(goals.arm, goals.task, goals.target[rows], surface)
+    others, labels, open_ = more(rows, again[rows])
+    if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
+        open_ |= found.surface[rows]
+    if open_.any():
+        starts = many_starts(goals.arm, goals.task, goals.target[rows], open_)
         others, labels = np.concatenate([others, starts], axis=1), np.append(labels, np.zeros(starts.shape[1], int))
     there = again[rows] | ~np.isnan(others[:, :, 0]).all(axis=1)
     rows, others = rows[there], others[there]
@@ -193,7 +194,7 @@ class _Groups:
         self.asked: Bool = ~(self.open & (lost.sigma < FOLDED) & ~on)
         self.known: Bool = on.copy()
         self.moves: Bool = on.copy()
-        self.which, self.edge = at.sure.copy(), np.zeros((K, M), bool)
+        self.which, self.edge, self.ended = at.sure.copy(), np.zeros((K, M), bool), np.zeros((K, M), bool)
         self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
         self.chosen, self.curve = at.simple.copy(), np.zeros((K, M, n), bool)
         self.free, self.singular, self.double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
@@ -246,6 +247,7 @@ class _Groups:
             at = local_structure(arm, task, q[i, c], target[i])
             self.known[i, c], self.moves[i, c], self.which[i, c] = at.known, at.manifold, at.joints
             self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
+            self.ended[i, c] = ended(at)
             ways = newton.difference(arm, q[i], q[i, c][:, None])
             self.component = np.concatenate([self.component, members(at, np.arange(len(i)), ways)])
         rest = ~self.known[k, b] & ~self.rests[k, b] & (self.lost.sigma[k, b] < MOVING)
@@ -300,6 +302,8 @@ class _Groups:
         # (two postures of it, each off by as much as a double root)
         mine: Bool = self.moves[k, b][:, None] & (held < 3 * TURNED) & (self.lost.sigma[k] < SOLUTION) & self.open[k]
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
+        mine &= ~(far & self.ended[k, b][:, None])  # all that is on such a one is one with it
+        far &= mine
         some = np.flatnonzero(far.any(axis=1))
         if len(some):
             at, goal = q[k[some], b[some]], target[k[some]]
@@ -332,7 +336,7 @@ class _Groups:
         if len(rows):
             at, kept, curve = q[rows], chosen[rows], self.curve[rows]
             self_motions.drop_contained(arm, task, at, sigma[rows], self.resting[rows], kept, curve, target[rows])
-            self_motions.drop_twins(arm, task, at, kept, curve, target[rows])
+            self_motions.drop_twins(arm, task, at, kept, curve, self.ended[rows], target[rows])
             chosen[rows] = kept
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
         there = np.take_along_axis(chosen, order, axis=1)
@@ -369,18 +373,15 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
     flat, goal = q.reshape(-1, n).copy(), np.repeat(np.arange(K), q.shape[1])
     size, some = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
     size[some] = newton.missing(arm, task, flat[some], target[goal[some]])
-    own, beyond = np.zeros(q.shape[:2], bool), np.zeros(len(flat), bool)
-    own[:, 0] = True
-    free = np.flatnonzero(~(own.ravel() | sure.reshape(-1, n).any(axis=1) | (size < CLOSED)))
+    beyond, first = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
+    free = np.flatnonzero(~(first | sure.reshape(-1, n).any(axis=1) | (size < CLOSED)))
     if len(free):
         some = free[size[free] < most]
         far = some[size[some] > SOLUTION]
         beyond[far] = beyond_folds(arm, task, flat[far], target[goal[far]])
         some = some[~beyond[some]]
-        steps = 40  # towards a root of third order each step goes a third of the way
-        flat[some], size[some] = newton.correct(
-            arm, task, flat[some], target[goal[some]], steps=steps, patience=PATIENCE
-        )
+        # towards a root of third order each step goes a third of the way
+        flat[some], size[some] = newton.correct(arm, task, flat[some], target[goal[some]], steps=40, patience=PATIENCE)
     q, size = flat.reshape(K, -1, n), size.reshape(K, -1)
     # `near` is taken as it is, or not at all, or is the posture that stands for a self-motion already
     stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)

@@ -33,9 +33,9 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
     """
     arm, task, target, near = goals
 
-    def no_more(rows: NDArray[np.int64], lost: Bool) -> tuple[Array, NDArray[np.int64]]:
+    def no_more(rows: NDArray[np.int64], lost: Bool) -> tuple[Array, NDArray[np.int64], Bool]:
         """Further candidates: none, those that were found are all."""
-        return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64)
+        return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64), np.zeros(len(rows), bool)
 
     rows = np.flatnonzero(((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR)) & ~out.within.any(axis=1))
     if not len(rows):

@@ -43,6 +43,7 @@ NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev's, 
 ITERATIONS = 8  # Newton steps onto the curve
 SHRINK = 8  # a curve that turns away within a span is asked for a span so many times shorter,
 SHRINKS = 3  # as often as this
+DOUBLED = 3  # times that a span is, of a manifold with ends
 STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
@@ -110,16 +111,46 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
     for _ in range(SHRINKS + 2):
         if not len(left):
             break
-        start = _Curve(q[left], target[left], U[left, :, n - 1 :], V[left, -1], w[left], out.span[left])
-        on, x, g = _polynomials(arm, task, start)
-        some = left[on]
-        out.x[:, some], out.g[:, some] = x[:, on], g[:, on]
-        _decide(out, some)
+        on = _follow(arm, task, q, target, U, V, w, out, left)
         # where two directions are all but lost no shorter curve stays at hand; what leaves a span leaves shorter ones
         left = left[~out.known[left] & (out.second[left] > HIGH) & (short[left] | ~on)]
         out.span[left] = np.where(short[left], whole[left], out.span[left] / SHRINK)
         short[left], w[left] = False, 0.0
+    # a manifold on which the residual grows has ends
+    size = np.linalg.norm(np.abs(out.g).sum(axis=0), axis=1)
+    left = np.flatnonzero(out.manifold & ~ended(out) & (size > CLOSED) & (out.second > HIGH))
+    for _ in range(DOUBLED if len(left) else 0):
+        out.span[left] *= 2.0
+        on = _follow(arm, task, q, target, U, V, w, out, left)
+        out.span[left[~on]] /= 2.0
+        left = left[on & ~ended(out)[left]]
     return out
+
+
+def ended(at: Structure) -> Bool:
+    """Of which components (M,) both ends are known: all that is on them is one of their `members`."""
+    return np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
+
+
+def _follow(
+    arm: Arm,
+    task: Task,
+    q: Array,
+    target: Array,
+    U: Array,
+    V: Array,
+    w: Array,
+    out: Structure,
+    rows: NDArray[np.intp],
+) -> Bool:
+    """Follow the curves of some postures as far as their spans, and write what those tell that stay at hand (m,)."""
+    n = q.shape[1]
+    start = _Curve(q[rows], target[rows], U[rows, :, n - 1 :], V[rows, -1], w[rows], out.span[rows])
+    on, x, g = _polynomials(arm, task, start)
+    some = rows[on]
+    out.x[:, some], out.g[:, some] = x[:, on], g[:, on]
+    _decide(out, some)
+    return on
 
 
 def _second_order(

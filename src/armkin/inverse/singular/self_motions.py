@@ -94,11 +94,12 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     return np.asarray(out.reshape(2, -1).any(axis=0))
 
 
-def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target: Array) -> None:
+def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, ended: Bool, target: Array) -> None:
     """Keep one of chosen postures (K, M) of self-motions that turn out to be the same: change chosen.
 
-    curve: (K, M, n) the joints that a posture's self-motion moves. One group's posture may be close to another's;
-    where a self-motion consists of double roots, known to the root of rounding, its postures were taken for many.
+    curve: (K, M, n) the joints that a posture's self-motion moves; ended: (K, M) those of which both ends are known,
+    and all that is between. One group's posture may be close to another's; where a self-motion consists of double
+    roots, known to the root of rounding, its postures were taken for many.
     """
     moving = np.asarray(curve.any(axis=2))
     moving[:, 0] = True  # `near`, the first: nothing is said to move where three directions are lost at once
@@ -114,7 +115,7 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, target
     held = (turned < TURNED) & ((size > TURNED).sum(axis=1) <= ALONG)
     # a joint may move too slowly at one of the two alone to be called free there
     most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
-    slow = ~held & (most > TURNED) & (most < DRIFT)
+    slow = ~held & (most > TURNED) & (most < DRIFT) & ~(ended[k, i] | ended[k, j])
     held |= np.equal(j, 0)  # `near` stands for all that meet there
     open_ = np.flatnonzero(held)
     same[open_] = _straight(arm, task, at[open_], apart[open_], target[k[open_]])
@@ -255,9 +256,9 @@ def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
 
 
 def _across(held: Array) -> Array:
-    """Vectors (m, k) at right angles to the k - 1 columns of (m, k, k - 1): in three dimensions the cross product."""
-    k = held.shape[1]
-    return np.stack([(-1) ** i * np.linalg.det(np.delete(held, i, axis=1)) for i in range(k)], axis=1)
+    """Vectors (..., k) at right angles to the k - 1 columns of (..., k, k - 1): of three, the cross product."""
+    k = held.shape[-2]
+    return np.stack([(-1) ** i * np.linalg.det(np.delete(held, i, axis=-2)) for i in range(k)], axis=-1)
 
 
 def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
@@ -272,17 +273,15 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
     for k in range(2, int(nullity.max()) + 1):
         some = np.flatnonzero(nullity == k)
         basis = V[some, ::-1][:, :k]
-        for held in itertools.combinations(range(n), k - 1) if len(some) else ():
-            hold = np.einsum("mk,mkn->mn", _across(basis[:, :, held]), basis)
-            size = np.linalg.norm(hold, axis=1)
-            far = size > 0.1
-            if far.any():
-                yield some[far], hold[far] / size[far, None]
+        held = list(itertools.combinations(range(n), k - 1))
+        yield _far(some, np.einsum("cmk,mkn->cmn", _across(np.moveaxis(basis[:, :, held], 2, 0)), basis))
     many = np.flatnonzero(nullity > 1)
-    in_null = np.arange(n) >= n - nullity[many][:, None]
-    for joint in range(n if len(many) else 0):
-        push = np.einsum("mi,mij->mj", np.where(in_null, V[many, :, joint], 0.0), V[many])
-        size = np.linalg.norm(push, axis=1)
-        some = size > 0.1
-        if some.any():
-            yield many[some], push[some] / size[some, None]
+    in_null = (np.arange(n) >= n - nullity[many][:, None])[:, :, None]
+    yield _far(many, np.moveaxis(V[many].swapaxes(1, 2) @ np.where(in_null, V[many], 0.0), 1, 0))
+
+
+def _far(who: Int, push: Array) -> tuple[Int, Array]:
+    """Those of directions (C, m, n) of postures (m,) that are long enough, of length one."""
+    size = np.linalg.norm(push, axis=2)
+    far = size > 0.1
+    return np.broadcast_to(who, size.shape)[far], push[far] / size[far][:, None]

@@ -47,6 +47,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
             "no axes meet or run parallel as a closed form would need: numeric elimination, up to 16 branches",
             prepared.complete,
             rows=lambda T: _six(prepared, T),
+            unmoved=lambda T: _six(prepared, T, False),
             ordered=False,
             elimination=prepared,
         )
@@ -85,12 +86,12 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     )
 
 
-def _six(prepared: method.Elimination, T: Array) -> Rows:
+def _six(prepared: method.Elimination, T: Array, moved: bool = True) -> Rows:
     """Branches of six joints; complete where the elimination settled the pose as it stands, by a regular pencil.
 
     Of a target that had to be moved, self-motions and double roots are not where they were.
     """
-    q, doubt, settled, shaken, guesses = method.solve(prepared, T)
+    q, doubt, settled, shaken, guesses = method.solve(prepared, T, moved)
     return Rows(q, doubt | shaken, settled & prepared.complete & ~shaken, shaken, guesses)
 
 
