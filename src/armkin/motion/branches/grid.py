@@ -172,7 +172,10 @@ def _solved(
     if known is not None:
         old = np.searchsorted(where, known.s)
         values[old], new[old] = known.q, False
-    guess = np.stack([np.interp(where[new], s, q[:, j]) for j in range(arm.n)], axis=1)
+    if known is None or windows:
+        guess = np.stack([np.interp(where[new], s, q[:, j]) for j in range(arm.n)], axis=1)
+    else:  # they are nearer than chords of samples
+        guess, _ = known.at(where[new])
     values[new] = corrected(arm, route.task, guess, route.targets(where[new]), damping)
     for one in windows:
         if one.detour is not None:  # the route is detoured itself
