@@ -17,6 +17,7 @@ import pytest
 import armkin
 from armkin.compiled import toolchain
 from armkin.inverse import solve as solving
+from armkin.inverse.elimination import method
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.build import build
@@ -324,23 +325,30 @@ def test_workers_are_a_whole_number_for_one_target_too(workers: object) -> None:
                 solve(arm, goal, workers=workers)  # type: ignore[arg-type]
 
 
+def left_to_python(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many targets Python is asked, call by call, from now on."""
+    asked: list[int] = []
+    answered = solving.answered
+
+    def counted(arm: armkin.Arm, task: Any, geometry: Any, targets: np.ndarray, *more: Any) -> armkin.Solutions:
+        asked.append(len(targets))
+        return answered(arm, task, geometry, targets, *more)
+
+    monkeypatch.setattr(solving, "answered", counted)
+    return asked
+
+
 @pytest.mark.parametrize("robot", ["xarm6", "jaco_j2n6s300"])
 def test_roots_that_solutions_share_are_taken_apart_in_c(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The tool straight down: C left four of five of an xArm6's targets to Python, 464 to 853 us each."""
     arm = armkin.load(robot)
-    rng, asked = np.random.default_rng(6), []
+    rng = np.random.default_rng(6)
     T = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (40, 1, 1))
     yaw = rng.uniform(-np.pi, np.pi, 40)
     T[:, 0, 0], T[:, 0, 1], T[:, 1, 0], T[:, 1, 1] = np.cos(yaw), np.sin(yaw), np.sin(yaw), -np.cos(yaw)
     T[:, :3, 3] = arm.reach * rng.uniform(-0.4, 0.4, (40, 3)) + [0, 0, 0.2 * arm.reach]
     own = armkin.ik(arm, T)
-    solve = solving.ik
-
-    def counted(one: armkin.Arm, targets: np.ndarray, *words: Any, **more: Any) -> armkin.Solutions:
-        asked.append(len(targets))
-        return solve(one, targets, *words, **more)
-
-    monkeypatch.setattr(solving, "ik", counted)
+    asked = left_to_python(monkeypatch)
     found = armkin.compile(arm).ik(T)
     assert sum(asked) <= 1
     assert own.valid.sum() > 100
@@ -349,17 +357,41 @@ def test_roots_that_solutions_share_are_taken_apart_in_c(robot: str, monkeypatch
 
 def test_an_arm_off_its_class_is_solved_in_c_and_named_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A calibrated UR5e: all of its targets were solved in Python, 0.2 ms each."""
-    arm = build(parse((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 90,", "alpha: 89.99,", 1)))
+    arm = build(parse((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 0,", "alpha: 0.01,", 1)))
     target = questions(arm, "random", 60)
-    own, one, asked, solve = armkin.ik(arm, target), armkin.ik(arm, target[0]), [], solving.ik
-
-    def counted(some: armkin.Arm, targets: np.ndarray, *words: Any, **more: Any) -> armkin.Solutions:
-        asked.append(len(targets))
-        return solve(some, targets, *words, **more)
-
-    monkeypatch.setattr(solving, "ik", counted)
+    own, one = armkin.ik(arm, target), armkin.ik(arm, target[0])
+    asked = left_to_python(monkeypatch)
     found = armkin.compile(arm).ik(target)
     assert sum(asked) <= 1
+    assert found.method == "general elimination"
     assert "flip" in found.names[0]
     found_by_elimination(found, own)
     found_by_elimination(armkin.compile(arm).ik(target[0]), one)
+
+
+def test_targets_on_an_edge_are_eliminated_in_c(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A calibrated UR5e with its wrist all but straight: Python eliminated such a target, and four around it, again."""
+    arm = build(parse((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 0,", "alpha: 0.01,", 1)))
+    q = np.random.default_rng(8).uniform(-3, 3, (40, 6))
+    low, high = q.copy(), q.copy()
+    low[:, 4], high[:, 4] = -0.1, 0.1
+    start = np.sign(np.linalg.det(armkin.jacobian(arm, low)))
+    for _ in range(40):  # where the determinant vanishes
+        q = (low + high) / 2
+        below = np.sign(np.linalg.det(armkin.jacobian(arm, q))) == start
+        low[below], high[~below] = q[below], q[~below]
+    q[:, 4] += np.linspace(1e-5, 1e-4, 40)
+    target = armkin.fk(arm, q)
+    own, fast = armkin.ik(arm, target), armkin.compile(arm)
+    solve, eliminated = method.solve, []
+
+    def counted(elimination: method.Elimination, T: np.ndarray, *more: Any) -> method.Branches:
+        eliminated.append(len(T))
+        return solve(elimination, T, *more)
+
+    monkeypatch.setattr(method, "solve", counted)
+    asked = left_to_python(monkeypatch)
+    found = fast.ik(target)
+    assert sum(asked) > 5
+    assert sum(eliminated) <= 2
+    found_by_elimination(found, own)

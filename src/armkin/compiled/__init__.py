@@ -2,6 +2,7 @@
 
 arm.py         `compile`, and what it returns
 one_target.py  one target at a time, in microseconds
+eliminated.py  an elimination's branches for targets on an edge, which Python examines
 results.py     results of a batch, as `Solutions` has them
 text.py        columns as lines of text
 nearest.py     of many branches those that move the joints least

@@ -9,10 +9,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armkin import forward
-from armkin.compiled import source, toolchain
+from armkin.compiled import eliminated, source, toolchain
 from armkin.compiled.one_target import Single
 from armkin.compiled.results import Results
 from armkin.errors import UsageError
@@ -137,6 +137,10 @@ class _CompiledTask:
         self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 6], size
         code.arm_single.argtypes, code.arm_single.restype = [pointer], size
         self._single = self._quick(code.arm_single)
+        self._in_c: eliminated.InC | None = None
+        if form is not None and source.has_rows(self.task, form):
+            code.arm_rows.argtypes, code.arm_rows.restype = [size, *[pointer] * 3], None
+            self._in_c = eliminated.InC(self.geometry, form, code.arm_rows, self.branches, self.n)
 
     def fk(self, q: ArrayLike, workers: int) -> Array:
         """Poses (..., 4, 4) of joint values (..., n)."""
@@ -204,8 +208,7 @@ class _CompiledTask:
         rounding, most = target_rounding.of_targets(self.arm, self.task, target, shown, single, said, lead)
         rows = near_itself.standing(self.arm, self.task, target, each, most)
         if len(rows):
-            beside = each if each.ndim == 1 else each.reshape(-1, self.n)[rows]
-            out.write(rows, solve.ik(self.arm, target[rows], self.name, near=beside, rounding=most[rows] - SOLUTION))
+            self._by_python(out, rows, target, each.reshape(-1, self.n), most - SOLUTION)
         if self.arm.prismatic.any():
             out.complete[distance(self.arm, self.task, target) > FAR] = False
         if not self.geometry.ordered:
@@ -286,8 +289,18 @@ class _CompiledTask:
             self._place(out, target)
         if left:
             rows = np.flatnonzero(out.state.view(np.bool_))  # all targets have been read: 0 or 1, which is quicker told
-            out.write(rows, solve.ik(self.arm, target[rows], self.name, near=each[rows] if step else each[0]))
+            self._by_python(out, rows, target, each)
         return out
+
+    def _by_python(
+        self, out: Results, rows: NDArray[np.intp], target: Array, near: Array, rounding: Array | None = None
+    ) -> None:
+        """Write the answers of some targets, all of which have been read; near: (1, n) or (N, n)."""
+        sure = np.zeros(len(rows), bool) if self._in_c is None else self._in_c.settles(target[rows])
+        for some, geometry in ((rows[sure], self._in_c and self._in_c.geometry), (rows[~sure], self.geometry)):
+            if len(some) and geometry:
+                close, off = near[some] if len(near) > 1 else near[0], None if rounding is None else rounding[some]
+                out.write(some, solve.answered(self.arm, self.task, geometry, target[some], close, False, True, 1, off))
 
     def _place(self, out: Results, target: Array) -> None:
         """Branches that C has found in the order and with the indices of the class that they are named after."""

@@ -71,9 +71,15 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
         parts += [_part("sizes"), solve, part("copies"), _choose(arm, branches), _part(gather), _part("batch")]
+        parts += [_part("rows")] if has_rows(task, geometry) else []
     text = program.filled("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
     return Library(text.replace("@content@", content), content, branches, level)
+
+
+def has_rows(task: Task, geometry: Geometry | None) -> bool:
+    """Whether the file has `arm_rows`: an elimination of the targets as they are given."""
+    return geometry is not None and geometry.pairs is None and task.orientation == "full"
 
 
 def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, str]:

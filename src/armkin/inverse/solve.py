@@ -95,12 +95,13 @@ def ik(
     if (turned := actual(arm)) is not arm:
         more: dict[str, Any] = {"examine": examine, "workers": workers, "rounding": rounding}
         return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near), **more))
-    return _answered(arm, task, values, near, single, examine, workers, rounding)
+    return answered(arm, *solver(arm, task), values, near, single, examine, workers, rounding)
 
 
-def _answered(
+def answered(
     arm: Arm,
-    task: str | None,
+    definition: Task,
+    geometry: Geometry,
     values: Array,
     near: ArrayLike | None,
     single: bool,
@@ -108,8 +109,8 @@ def _answered(
     workers: int,
     rounding: ArrayLike | None,
 ) -> Solutions:
-    """`ik` of an arm whose joints move as they are commanded; single: whether the targets were given in float32."""
-    definition, geometry = solver(arm, task)
+    """`ik` by a solver, of an arm whose joints move as they are commanded; single: whether the targets were given in
+    float32."""
     given, lead = shaped(definition, values)
     close = read_near(arm, near, lead)
     many = close.ndim == 1 and len(given) != 1

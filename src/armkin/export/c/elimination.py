@@ -37,8 +37,8 @@ _METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "equal_root
 _NAMED = {  # numbers that the method reads, by the names that they have in Python
     name: getattr(tolerances, name)
     for name in (
-        "ALONE", "BLURRED_ROOT", "CLOSE_RESIDUAL", "ELIMINATED", "EQUAL_ROOTS", "EXAMINED", "GRAZING", "INFINITE",
-        "NO_PRODUCT", "OWN_ROOT", "PAIRED", "SAME_KEY", "SAME_ROOT", "STRAY", "TWIN_ROOTS", "UPRIGHT",
+        "ALONE", "BLURRED_ROOT", "CLOSE_RESIDUAL", "DOUBLE", "ELIMINATED", "EQUAL_ROOTS", "EXAMINED", "GRAZING", "ILL",
+        "INFINITE", "NO_PRODUCT", "OWN_ROOT", "PAIRED", "SAME_KEY", "SAME_ROOT", "STRAY", "TWIN_ROOTS", "UPRIGHT",
     )
 }  # fmt: skip
 BRANCHES = MOST

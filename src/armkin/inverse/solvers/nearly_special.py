@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -117,31 +118,40 @@ def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geome
         return None
     if method.left_open(general_.elimination) > SICK:
         return None
-    solve, named = general_.rows, math.prod(2 if label else 1 for label in alike.labels)
 
     def places(q: Array, target: Array) -> NDArray[np.intp]:
         starts = range(0, max(len(target), 1), NAMED_AT_ONCE)
         parts = [slice(k, k + NAMED_AT_ONCE) for k in starts]
         return np.concatenate([_places(arm, task, alike, off, q[some], target[some]) for some in parts])
 
+    geometry = Geometry(
+        general_.name,
+        f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class",
+        True,
+        labels=alike.labels,
+        ordered=alike.ordered,
+        branches=math.prod(2 if label else 1 for label in alike.labels) if alike.labels else None,
+        places=places,
+    )
+    return replace(geometry, rows=named(general_.rows, geometry))
+
+
+def named(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array], Rows]:
+    """The rows of an elimination, branches in the columns of the class that `geometry` names them after."""
+    places = geometry.places
+    assert places is not None
+
     def rows(target: Array) -> Rows:
         found = solve(target)
         numbers = places(found.q, target)
         row, column = np.nonzero(numbers >= 0)
-        q = np.full((len(target), max(int(numbers.max(initial=-1)) + 1, named), arm.n), np.nan)
+        q = np.full(
+            (len(target), max(int(numbers.max(initial=-1)) + 1, geometry.branches or 1), found.q.shape[2]), np.nan
+        )
         q[row, numbers[row, column]] = found.q[row, column]
         return found._replace(q=q)
 
-    return Geometry(
-        general_.name,
-        f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class",
-        True,
-        rows=rows,
-        labels=alike.labels,
-        ordered=alike.ordered,
-        branches=named if alike.labels else None,
-        places=places,
-    )
+    return rows
 
 
 def _places(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target: Array) -> NDArray[np.intp]:

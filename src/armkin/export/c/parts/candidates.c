@@ -1,5 +1,6 @@
-/* As of a closed form, for up to ARM_LANES poses. goal: twelve numbers, columns x, y, z and the position [mm]. doubt: an answer
-   near a singularity, merged answers, touching roots, or a pose that no pass has settled. */
+/* As of a closed form, for up to ARM_LANES poses. goal: twelve numbers, columns x, y, z and the position [mm]. doubt: 1 for
+   an answer near a singularity, merged answers or touching roots; 2 (or 3) for a double root, no exact answer, or a pose
+   that no pass has settled. */
 static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RESTRICT near, double *ARM_RESTRICT q,
     double *ARM_RESTRICT miss, int *ARM_RESTRICT doubt, int count)
 {
@@ -31,9 +32,9 @@ static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RE
             if (!exact || found[i].residual < ARM_ELIMINATED)
                 found[number++] = found[i];
         number = arm_merge(one->goal, found, number, &one->edge);
+        doubt[lane] = one->open || number > ARM_BRANCHES || (number && !exact) ? 2 : one->edge;
         for (i = 0; i < number; i++)
-            one->edge |= !(found[i].weakness <= 1e4);
-        doubt[lane] = one->edge || one->open || number > ARM_BRANCHES;
+            doubt[lane] |= !(found[i].weakness <= ARM_ILL) + 2 * !(found[i].weakness * ARM_DOUBLE <= 1);
         for (i = 0; i < ARM_BRANCHES; i++) {
             for (j = 0; j < ARM_JOINTS; j++) {
                 k = (i * ARM_JOINTS + j) * ARM_LANES + lane;

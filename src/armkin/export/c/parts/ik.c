@@ -91,6 +91,7 @@ int arm_ik(const arm_real *target, const arm_real *near, arm_solution *out, int 
 @actual_near@    arm_candidates(goal, near, q, miss, edge, 1);
     for (b = 0; b < ARM_BRANCHES; b++)
         *edge |= !(miss[b] <= ARM_ACCEPTED) & !(miss[b] > ARM_NEARBY);
+    *edge = *edge != 0;
 @elsewhere@    for (b = 0; b < ARM_BRANCHES; b++) {
         arm_solution *one = &out[count];
         int inside = 1, again = 0;
