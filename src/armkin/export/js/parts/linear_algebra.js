@@ -1,28 +1,33 @@
 const MOST_COLUMNS = 64; // of a matrix that is decomposed: six joints, or as many ways out of a posture
 const ORTHOGONAL = 1e-15; // the cosine between columns that rounding leaves
-const wholeColumns = new Float64Array(MOST_COLUMNS * 2 * MOST_COLUMNS);
+const columns = new Float64Array(MOST_COLUMNS * 2 * MOST_COLUMNS); // of U S, and below them those of V
 const squares = new Float64Array(MOST_COLUMNS);
+const sizes = new Float64Array(MOST_COLUMNS); // singular values, as the columns stand
+/** @type {number[]} */
+const bySize = []; // the columns, that of the largest singular value first
 
 /**
- * Singular value decomposition A = U S V' of a small matrix by rotations of its columns (Hestenes 1958).
- * @param {number[][]} A m rows of n
- * @returns {{U: number[][], S: number[], V: number[][]}} columns of U and V, largest singular value first
+ * Singular value decomposition A = U S V' of a small matrix by rotations of its columns (Hestenes 1958): `columns`, `sizes`
+ * and `bySize`, until the next one.
+ * @param {number[][]} A m rows of n @returns {number} m + n, the length of the columns
  */
-function decompose(A) {
+function rotate(A) {
   const m = A.length;
   const n = A[0].length;
-  const all = m + n; // columns of A V, and below them those of V
-  const W = wholeColumns;
+  const all = m + n;
+  const W = columns;
   const square = squares;
-  for (let j = 0; j < n; j++) {
-    for (let i = 0; i < m; i++) W[all * j + i] = A[i][j];
-    for (let i = 0; i < n; i++) W[all * j + m + i] = i === j ? 1 : 0;
+  for (let i = 0; i < m; i++) {
+    const row = A[i];
+    for (let j = 0; j < n; j++) W[all * j + i] = row[j];
   }
+  for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) W[all * j + m + i] = i === j ? 1 : 0;
   for (let sweep = 0, rotated = true; rotated && sweep < 40; sweep++) {
     rotated = false;
     for (let j = 0; j < n; j++) {
-      square[j] = 0;
-      for (let i = all * j; i < all * j + m; i++) square[j] += W[i] * W[i];
+      let sum = 0;
+      for (let i = all * j; i < all * j + m; i++) sum += W[i] * W[i];
+      square[j] = sum;
     }
     for (let j = 0; j < n; j++)
       for (let k = j + 1; k < n; k++) {
@@ -30,7 +35,7 @@ function decompose(A) {
         const b = square[k];
         let c = 0;
         for (let i = 0; i < m; i++) c += W[all * j + i] * W[all * k + i];
-        if (Math.abs(c) <= ORTHOGONAL * Math.sqrt(a * b) || c * c < 1e-300) continue;
+        if (c * c <= ORTHOGONAL * ORTHOGONAL * a * b || c * c < 1e-300) continue;
         rotated = true;
         const z = (b - a) / (2 * c);
         const t = (z < 0 ? -1 : 1) / (Math.abs(z) + Math.sqrt(1 + z * z));
@@ -46,34 +51,36 @@ function decompose(A) {
         square[k] = b + t * c;
       }
   }
-  /** @type {number[][]} */
-  const U = [];
-  /** @type {number[]} */
-  const S = [];
-  /** @type {number[][]} */
-  const V = [];
+  bySize.length = n;
   for (let j = 0; j < n; j++) {
-    let size = 0;
-    for (let i = all * j; i < all * j + m; i++) size += W[i] * W[i];
-    size = Math.sqrt(size);
-    const over = size > 0 ? size : 1;
-    /** @type {number[]} */
-    const u = [];
-    /** @type {number[]} */
-    const v = [];
-    for (let i = all * j; i < all * j + m; i++) u.push(W[i] / over);
-    for (let i = all * j + m; i < all * (j + 1); i++) v.push(W[i]);
+    let sum = 0;
+    for (let i = all * j; i < all * j + m; i++) sum += W[i] * W[i];
+    const size = Math.sqrt(sum);
+    sizes[j] = size;
     let at = j;
-    for (; at > 0 && S[at - 1] < size; at--) {
-      S[at] = S[at - 1];
-      U[at] = U[at - 1];
-      V[at] = V[at - 1];
-    }
-    S[at] = size;
-    U[at] = u;
-    V[at] = v;
+    for (; at > 0 && sizes[bySize[at - 1]] < size; at--) bySize[at] = bySize[at - 1];
+    bySize[at] = j;
   }
-  return { U, S, V };
+  return all;
+}
+
+/** Numbers of a column as an array, over a divisor: faster than `subarray`. @param {number} from @param {number} to @param {number} over */
+function column(from, to, over) {
+  const out = new Array(to - from);
+  for (let i = from; i < to; i++) out[i - from] = columns[i] / over;
+  return out;
+}
+
+/** The same as arrays.
+ * @param {number[][]} A @returns {{U: number[][], S: number[], V: number[][]}} columns of U and V, largest singular value first */
+function decompose(A) {
+  const m = A.length;
+  const all = rotate(A);
+  return {
+    U: bySize.map((j) => column(all * j, all * j + m, sizes[j] || 1)),
+    S: bySize.map((j) => sizes[j]),
+    V: bySize.map((j) => column(all * j + m, all * j + all, 1)),
+  };
 }
 
 /** @param {Numbers} a @param {Numbers} b */

@@ -1,38 +1,41 @@
 const REGULAR = 1e-5; // singular value from which on a Jacobian is inverted
 
+/** @type {number[]} */
+const left = []; // as `residual` leaves it, until the next one
+
 /**
- * What joint values miss of a target: lengths in reaches, angles in rad.
+ * What joint values miss of a target: lengths in reaches, angles in rad. The array is the same each time.
  * @param {Numbers} q @param {Numbers} goal @returns {number[]}
  */
 function residual(q, goal) {
   poseOf(q, pose16);
   const T = pose16;
-  const out = [];
+  const out = left;
+  out.length = 0;
   const first = ARM.orientation === 'full' ? 9 : 0;
   for (let i = 0; i < ARM.position; i++) out.push((goal[first + i] - T[4 * i + 3]) / ARM.reach);
-  ARM.sums.forEach((row, k) => {
-    const off = goal[ARM.position + k] - dot(row, q) - ARM.offsets[k];
+  for (let k = 0; k < ARM.sums.length; k++) {
+    const off = goal[ARM.position + k] - dot(ARM.sums[k], q) - ARM.offsets[k];
     out.push(off - TURN * rint(off / TURN));
-  });
+  }
   if (ARM.orientation === 'full') {
-    let trace = 0;
-    const w = [0, 0, 0];
-    for (let k = 0; k < 3; k++)
-      for (let i = 0; i < 3; i++) {
-        const [x, y] = [(i + 1) % 3, (i + 2) % 3];
-        w[i] += 0.5 * (T[4 * x + k] * goal[3 * k + y] - T[4 * y + k] * goal[3 * k + x]);
-        trace += T[4 * i + k] * goal[3 * k + i];
-      }
-    const sine = Math.hypot(w[0], w[1], w[2]);
-    const scale = trace < 3 - 1e-8 && sine > 1e-12 ? Math.atan2(sine, (trace - 1) / 2) / sine : 1;
+    let [a, b, c, trace] = [0, 0, 0, 0];
+    for (let k = 0; k < 3; k++) {
+      const [x, y, z] = [goal[3 * k], goal[3 * k + 1], goal[3 * k + 2]];
+      a += T[4 + k] * z - T[8 + k] * y;
+      b += T[8 + k] * x - T[k] * z;
+      c += T[k] * y - T[4 + k] * x;
+      trace += T[k] * x + T[4 + k] * y + T[8 + k] * z;
+    }
+    const sine = 0.5 * Math.sqrt(a * a + b * b + c * c);
+    const scale = 0.5 * (trace < 3 - 1e-8 && sine > 1e-12 ? Math.atan2(sine, (trace - 1) / 2) / sine : 1);
     // half a turn off has no axis to turn about: any will do
-    if (trace < 0 && sine <= 1e-12) w[0] = Math.PI;
-    out.push(w[0] * scale, w[1] * scale, w[2] * scale);
+    out.push(trace < 0 && sine <= 1e-12 ? Math.PI : a * scale, b * scale, c * scale);
   }
   if (ARM.orientation === 'axis') {
     const z = [T[2], T[6], T[10]];
     const w = cross(z, [goal[3], goal[4], goal[5]]);
-    const sine = Math.hypot(w[0], w[1], w[2]);
+    const sine = norm(w);
     const cosine = z[0] * goal[3] + z[1] * goal[4] + z[2] * goal[5];
     if (sine > 1e-12) out.push(...w.map((x) => (x * Math.atan2(sine, cosine)) / sine));
     else out.push(...(cosine < 0 ? [Math.PI * T[0], Math.PI * T[4], Math.PI * T[8]] : w));
@@ -82,29 +85,29 @@ function apartFrom(T, q, goal) {
   off2[1] = trace > 2 ? sine : Math.atan2(sine, (trace - 1) / 2); // half a turn has no sine
 }
 
-/** The rows of the residual's Jacobian, joints in rad and reaches. @param {Numbers} q @returns {number[][]} */
+/** The rows that `slope` leaves, until the next one. @type {number[][]} */
+const slopeRows = Array.from({ length: ARM.position + ARM.sums.length + (ARM.orientation === 'none' ? 0 : 3) }, () => new Array(ARM.joints).fill(0));
+
+/** The rows of the residual's Jacobian, joints in rad and reaches. The arrays are the same each time.
+ * @param {Numbers} q @returns {number[][]} */
 function slope(q) {
   slopeOf(q, slopes);
   const n = ARM.joints;
-  const row = (/** @type {number} */ i, /** @type {number} */ scale) => {
-    const out = new Array(n);
-    for (let j = 0; j < n; j++) out[j] = slopes[n * i + j] * ARM.unit[j] * scale;
-    return out;
-  };
-  const rows = [];
-  for (let i = 0; i < ARM.position; i++) rows.push(row(i, 1 / ARM.reach));
-  for (const sum of ARM.sums) rows.push(sum.map((x, j) => x * ARM.unit[j]));
-  if (ARM.orientation === 'none') return rows;
-  const turns = [row(3, 1), row(4, 1), row(5, 1)];
+  const rows = slopeRows;
+  const [p, turns] = [ARM.position, ARM.position + ARM.sums.length];
+  for (let i = 0; i < p; i++) for (let j = 0; j < n; j++) rows[i][j] = (slopes[n * i + j] * ARM.unit[j]) / ARM.reach;
+  for (let i = p; i < turns; i++) for (let j = 0; j < n; j++) rows[i][j] = ARM.sums[i - p][j] * ARM.unit[j];
+  if (ARM.orientation !== 'none')
+    for (let i = 0; i < 3; i++) for (let j = 0; j < n; j++) rows[turns + i][j] = slopes[n * (3 + i) + j] * ARM.unit[j];
   if (ARM.orientation === 'axis') {
     poseOf(q, pose16); // a turn about the tool's z axis is none of the target's
-    const z = [pose16[2], pose16[6], pose16[10]];
     for (let j = 0; j < n; j++) {
-      const along = z[0] * turns[0][j] + z[1] * turns[1][j] + z[2] * turns[2][j];
-      for (let i = 0; i < 3; i++) turns[i][j] -= z[i] * along;
+      let along = 0;
+      for (let i = 0; i < 3; i++) along += pose16[4 * i + 2] * rows[turns + i][j];
+      for (let i = 0; i < 3; i++) rows[turns + i][j] -= pose16[4 * i + 2] * along;
     }
   }
-  return [...rows, ...turns];
+  return rows;
 }
 
 /** How far joint values miss a target: the norm of the residual. @param {Numbers} q @param {Numbers} goal */
@@ -116,8 +119,8 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 const stepSystem = new Float64Array(ARM.joints * (2 * ARM.joints + 1));
 
 /** The step that takes a residual away, where the Jacobian's inverse says that no direction is weak; else null.
- * @param {number[][]} J @param {number[]} r @param {number} weakest */
-function regularStep(J, r, weakest) {
+ * @param {number[][]} J @param {number[]} r */
+function regularStep(J, r) {
   const n = ARM.joints;
   const wide = 2 * n + 1;
   if (r.length !== n) return null;
@@ -126,7 +129,7 @@ function regularStep(J, r, weakest) {
   if (!reduce(stepSystem, n, n, wide)) return null;
   let square = 0;
   for (let i = 0; i < n; i++) for (let j = n + 1; j < wide; j++) square += stepSystem[wide * i + j] ** 2;
-  if (!(square * Math.max(weakest, REGULAR) ** 2 < 1)) return null; // its norm is no less than one over the weakest singular value
+  if (!(square * REGULAR ** 2 < 1)) return null; // its norm is no less than one over the weakest singular value
   const move = new Array(n);
   for (let j = 0; j < n; j++) move[j] = stepSystem[wide * j + n];
   return move;
@@ -134,12 +137,17 @@ function regularStep(J, r, weakest) {
 
 /** The least step that takes a residual away, but along weak directions. @param {number[][]} J @param {number[]} r @param {number} weakest */
 function weakStep(J, r, weakest) {
-  const { U, S, V } = decompose(J);
-  const move = new Array(ARM.joints).fill(0);
-  for (let k = 0; k < S.length; k++) {
-    if (!(S[k] > weakest)) continue;
-    const along = dot(U[k], r) / S[k];
-    for (let j = 0; j < move.length; j++) move[j] += along * V[k][j];
+  const n = ARM.joints;
+  const m = r.length;
+  const all = rotate(J);
+  const move = new Array(n).fill(0);
+  for (let k = 0; k < n; k++) {
+    const size = sizes[k];
+    if (!(size > weakest)) continue;
+    let along = 0;
+    for (let i = 0; i < m; i++) along += columns[all * k + i] * r[i];
+    along /= size * size;
+    for (let j = 0; j < n; j++) move[j] += along * columns[all * k + m + j];
   }
   return move;
 }
@@ -151,6 +159,7 @@ function weakStep(J, r, weakest) {
  * @returns {{q: number[], missed: number}}
  */
 function newton(start, goal, steps, weakest = 1e-10) {
+  const n = ARM.joints;
   let q = Array.from(start);
   let best = { q, missed: Infinity };
   for (let step = 0; step <= steps; step++) {
@@ -159,11 +168,10 @@ function newton(start, goal, steps, weakest = 1e-10) {
     if (size < best.missed) best = { q, missed: size };
     if (size < 1e-15 || step === steps) break;
     const J = slope(q);
-    const move = regularStep(J, r, weakest) ?? weakStep(J, r, weakest);
+    const move = (weakest < REGULAR && regularStep(J, r)) || weakStep(J, r, weakest); // on a self-motion one is weak
     let longest = 0;
-    for (let j = 0; j < move.length; j++) longest = Math.max(longest, Math.abs(move[j]));
-    const scale = longest > 0.3 ? 0.3 / longest : 1;
-    q = q.map((x, j) => x + scale * move[j] * ARM.unit[j]);
+    for (let j = 0; j < n; j++) longest = Math.max(longest, Math.abs(move[j]));
+    q = stepped(q, move, longest > 0.3 ? 0.3 / longest : 1);
   }
   return best;
 }

@@ -9,17 +9,28 @@ const MOVED = 1e-3; // of the way: a joint that moves less along a self-motion d
 const FREE = 1e-5; // joints that a self-motion holds move by less
 
 /** @param {Numbers} q @param {Numbers} v @param {number} by [rad, reaches] */
-const stepped = (q, v, by) => Array.from(q, (x, j) => x + by * v[j] * ARM.unit[j]);
+function stepped(q, v, by) {
+  const out = new Array(ARM.joints);
+  for (let j = 0; j < ARM.joints; j++) out[j] = q[j] + by * v[j] * ARM.unit[j];
+  return out;
+}
 
 /** @param {Numbers} a @param {Numbers} b @returns {number[]} from b to a [rad, reaches] */
-const between = (a, b) => Array.from(a, (x, j) => less(x, b[j], ARM.slides[j]) / ARM.unit[j]);
+function between(a, b) {
+  const out = new Array(ARM.joints);
+  for (let j = 0; j < ARM.joints; j++) out[j] = less(a[j], b[j], ARM.slides[j]) / ARM.unit[j];
+  return out;
+}
 
 /** The directions that the Jacobian loses at q, or nearly. @param {Numbers} q @param {number} most */
 function lost(q, most) {
-  const { U, S, V } = decompose(slope(q));
-  const rank = S.findIndex((s, k) => !(s > most) || k >= U[k].length);
-  const from = rank < 0 ? S.length : rank;
-  return { V: V.slice(from), S: S.slice(from) };
+  const J = slope(q);
+  const [m, n] = [J.length, ARM.joints];
+  const all = rotate(J);
+  let from = 0;
+  while (from < Math.min(m, n) && sizes[bySize[from]] > most) from++;
+  const weak = bySize.slice(from);
+  return { V: weak.map((j) => column(all * j + m, all * j + all, 1)), S: weak.map((j) => sizes[j]) };
 }
 
 /**
