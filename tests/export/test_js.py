@@ -110,6 +110,7 @@ def test_roots_that_solutions_share_are_taken_apart(tmp_path: Path) -> None:
         ("thor", [90, 180, 180, 90, 0, 0]),  # and with the wrist straight: a surface of them
         ("fanuc_crx10ia", [135, -135, -90, 0, -45, 0]),  # four self-motions, two of which cross at a corner
         ("fanuc_crx10ia", [-90, 90, -90, 90, -180, -45]),  # two self-motions of double roots that never meet
+        ("fanuc_crx10ia", [-90, 90, -90, -90, 0, 180]),  # six self-motions; two have a small basin of Newton's method
         ("wx250s", [-90, 90, 90, -90, -90, 0]),  # rings of four self-motions, each of which crosses two others
         ("thor", [-90, 0, 0, 0, 0, -90]),  # home is half a turn off, which has no sine: it is no solution
         ("puma560", [0, 0, 0, 0, -180, 90]),

@@ -3,7 +3,7 @@ const NEARBY = 1e-12; // and of one that is worth correcting
 const LARGEST = 1e15; // mm, rad: of a target; its powers in polynomials stay finite
 const ROUNDED = 1e-14; // distance from orthonormal columns that needs no correction
 const DECIMAL = 4e-16; // relative distance of a number from a decimal one that it is printed as
-const STARTS = 96; // postures from which self-motions are searched for
+const STARTS = 256; // postures from which self-motions are searched for
 const DEGREES = 180 / Math.PI;
 
 // of the target that `ik` is asked for; new typed arrays of more than eight numbers cost a microsecond
