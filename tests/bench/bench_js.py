@@ -94,12 +94,9 @@ def speed(arm: armkin.Arm, folder: Path) -> str:
     turn = np.where(arm.prismatic, arm.reach, np.pi)
     low, high = np.maximum(arm.lower, -turn), np.minimum(arm.upper, turn)
     q = np.random.default_rng(1).uniform(low, high, (200 if general else 2000, arm.n))
-    if spare := redundancy(actual(arm), None):  # C has the arm whose joint to spare is held at home
+    if spare := redundancy(actual(arm), None):  # both hold the joint to spare where `near` has it
         q[:, spare.joint] = arm.home[spare.joint]
-        goals = armkin.fk(arm, q)
-        arm = armkin.lock(arm, {arm.joint_names[spare.joint]: arm.home[spare.joint]})
-    else:
-        goals = goals_of(arm, q)
+    goals = armkin.fk(arm, q) if spare else goals_of(arm, q)
     texts = program(arm, "arm.c")
     (folder / "arm.c").write_text(texts.source)
     (folder / "arm.h").write_text(texts.header)

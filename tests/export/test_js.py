@@ -217,6 +217,7 @@ def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
     q = rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (count, arm.n))
     targets = targets_of(spare.task, armkin.fk(arm, q), q)
     told = ask(arm, tmp_path, q, near=q, targets=targets, task=task)
+    assert ask(arm, tmp_path, q, near=q, targets=targets.reshape(count, -1), task=task)["ik"] == told["ik"]
     assert np.abs(np.array(told["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
     assert np.abs(np.array(told["target"]) - targets).max() < 1e-9
     j, joint = spare.joint, arm.joint_names[spare.joint]

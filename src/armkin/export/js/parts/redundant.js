@@ -1,4 +1,7 @@
-const shifted = new Float64Array(16);
+const way = new Float64Array(16); // what undoes the redundant joint's motion, where it was held last
+let wayAt = NaN;
+const givenPose = new Float64Array(16);
+const movedPose = new Float64Array(16);
 
 /** Products of frames, 16 numbers each. @param {Numbers} a @param {Numbers} b @param {Float64Array} out another than both */
 function product(a, b, out) {
@@ -6,24 +9,36 @@ function product(a, b, out) {
     for (let j = 0; j < 4; j++) out[i + j] = a[i] * b[j] + a[i + 1] * b[4 + j] + a[i + 2] * b[8 + j] + a[i + 3] * b[12 + j];
 }
 
+/** Leaves in `way` what undoes the joint's motion. @param {number} t its actual value */
+function undo(t) {
+  if (t === wayAt) return;
+  const [c, s] = [Math.cos(t), Math.sin(t)];
+  product(REDUNDANT.before, [c, s, 0, 0, -s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], movedPose);
+  product(movedPose, REDUNDANT.after, way);
+  wayAt = t;
+}
+
 /**
  * A target as that of the other joints: the redundant joint is the last or the first one, its motion is undone.
- * @param {Target} target @param {number} t its actual value @returns {Target}
+ * @param {Target} target @param {number} t its actual value @returns {ArrayLike<number> | Target} of a pose 16 numbers
  */
 function moved(target, t) {
-  const given = target.flatMap((/** @type {number | number[]} */ row) => row);
   const full = ARM.orientation === 'full';
   if (REDUNDANT.joint && !full) return target; // it turns about the tool's axis, which alone is asked for
-  if (given.length !== (full ? 16 : ARM.labels.length)) return target; // refused with its own words
-  const [c, s] = [Math.cos(t), Math.sin(t)];
-  const back = [c, s, 0, 0, -s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-  const [out, way] = [new Float64Array(16), new Float64Array(16)];
-  product(REDUNDANT.before, back, shifted);
-  product(shifted, REDUNDANT.after, way);
+  const given = givenPose;
+  const wanted = full ? 16 : ARM.labels.length;
+  let count = 0;
+  for (let i = 0; i < target.length; i++) {
+    const row = target[i];
+    if (typeof row === 'number') given[count++] = row;
+    else for (let k = 0; k < row.length; k++) given[count++] = row[k]; // an array of 16 keeps no more
+  }
+  if (count !== wanted) return target; // refused with its own words
+  undo(t);
   if (full) {
-    if (REDUNDANT.joint) product(given, way, out);
-    else product(way, given, out);
-    return [0, 4, 8, 12].map((k) => Array.from(out.subarray(k, k + 4)));
+    if (REDUNDANT.joint) product(given, way, movedPose);
+    else product(way, given, movedPose);
+    return movedPose;
   }
   const turned = (/** @type {number} */ first, /** @type {number} */ count, /** @type {number} */ shift) =>
     Array.from({ length: count }, (_, i) => {
@@ -36,6 +51,12 @@ function moved(target, t) {
   return [...turned(0, p, 1), ...sums, ...(ARM.orientation === 'axis' ? turned(3, 3, 0) : [])];
 }
 
+const others = new Float64Array(ARM.joints - 1); // of `near` all but the redundant joint
+
+/** Joint values with the redundant one, the last or the first, among them.
+ * @param {number[]} q of the others @param {number} held @returns {number[]} */
+const whole = (q, held) => (REDUNDANT.joint ? [...q, held] : [held, ...q]);
+
 /**
  * All branches that reach a target while the redundant joint is held.
  * @param {Target} target @TARGET@
@@ -45,30 +66,31 @@ function moved(target, t) {
  */
 export function ik(target, near = home, held = near[REDUNDANT.joint]) {
   const j = REDUNDANT.joint;
-  actual(near); // as many as joints
+  if (near.length !== ARM.joints) actual(near); // refused with its own words
   if (!Number.isFinite(held)) throw new RangeError(`${names[j]} cannot be held at ${held}: give one finite number`);
-  const whole = (/** @type {number[]} */ q) => [...q.slice(0, j), held, ...q.slice(j)];
-  const others = Array.from(near).filter((_, k) => k !== j);
-  const { closest, branches, ...found } = OTHERS.ik(moved(target, held * ARM.ratio[j]), others);
+  for (let k = 0; k < others.length; k++) others[k] = near[k < j ? k : k + 1];
+  const answer = OTHERS.ik(moved(target, held * ARM.ratio[j]), others);
+  const rows = answer.branches;
   const [low, high] = limits[j] ?? [null, null];
   const within = held >= (low ?? -Infinity) - 1e-9 && held <= (high ?? Infinity) + 1e-9;
-  const rows = branches.map((/** @type {Branch} */ row) => {
-    const joints = whole(row.joints);
-    return {
-      ...row,
-      joints,
-      within_limits: row.within_limits && within,
-      violations: within ? row.violations : [...row.violations, { joint: names[j], value: held, lower: low, upper: high }],
-      motion: row.motion + Math.abs(held - near[j]),
-      ...hitsOf(actual(joints)),
-    };
-  });
+  for (const row of rows) {
+    row.joints = whole(row.joints, held);
+    row.motion += Math.abs(held - near[j]);
+    if (!within) {
+      row.within_limits = false;
+      row.violations.push({ joint: names[j], value: held, lower: low, upper: high });
+    }
+    if (KEEPS_OUT) Object.assign(row, hitsOf(actual(row.joints)));
+  }
   const rank = (/** @type {Branch} */ row) => (row.within_limits ? (row.hits?.length ? 1 : 0) : 2);
-  rows.sort((/** @type {Branch} */ a, /** @type {Branch} */ b) => rank(a) - rank(b)); // of equal ones the order stays
-  const legal = rows.some((/** @type {Branch} */ row) => row.within_limits);
-  const joints = closest && whole(closest.joints);
-  const nearest = joints && { ...closest, joints, position_mm: fk(joints).slice(0, 3).map((row) => row[3]) };
-  return { ...found, best: rows.length && rank(rows[0]) === 0 ? 0 : null, closest: legal ? null : nearest, branches: rows };
+  if (KEEPS_OUT) rows.sort((/** @type {Branch} */ a, /** @type {Branch} */ b) => rank(a) - rank(b)); // of equal ones the order stays
+  answer.best = rows.length && rank(rows[0]) === 0 ? 0 : null;
+  if (rows.some((/** @type {Branch} */ row) => row.within_limits)) answer.closest = null;
+  if (answer.closest) {
+    const joints = whole(answer.closest.joints, held);
+    answer.closest = { ...answer.closest, joints, position_mm: fk(joints).slice(0, 3).map((row) => row[3]) };
+  }
+  return answer;
 }
 
 /** Names of all branches that a target may have. */
