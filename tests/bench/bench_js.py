@@ -3,10 +3,10 @@
     python tests/bench/bench_js.py [ROBOT...]                  # microseconds a target, of the processor
     python tests/bench/bench_js.py --agree SEED [ROBOT...]     # 200 random and 100 typed poses: lists that differ
 
-A joint to spare is held at home; for lists at five more values, too. For speed: random postures within limits (for others the
-module looks for the nearest legal pose, which C does not), but for those that C leaves, at an edge: 0 to 5 of 1,000,
-which take the module up to a millisecond. Both programs answer the same targets in the same order, in turn, the best
-round counts. The bars: 3 times C's time for closed forms, 3 ms for the general arms; no list that differs.
+A joint to spare is held at home; for lists at five more values, too. For speed: random postures within limits (for
+others the module looks for the nearest legal pose, which C does not), but for those that C leaves, at an edge: 0 to 5
+of 1,000, which take the module up to a millisecond. Both programs answer the same targets in the same order, in turn,
+the best round counts. The bars: 3 times C's time for closed forms, 3 ms for the general arms; no list that differs.
 """
 
 from __future__ import annotations
