@@ -60,7 +60,7 @@ def solve(
     near: (N, n), one: (n,) if it serves all; workers: threads.
     """
     runner, N = recorded(arm, task, geometry), len(given)
-    step = runner.code.at_once() if N > 1 else 1
+    step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts: one set of buffers serves all
     out = empty(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(given), np.zeros(N)
     tip = None if one is None else position(arm, one)
@@ -78,9 +78,9 @@ def solve(
             if len(goal) == 1:
                 found = runner.in_numbers(goal)
             else:
-                if not workspace or workspace[-1].shape[-1] != len(goal):
-                    workspace = runner.code.workspace(len(goal))
-                found = list(runner.code.run(entries(task, goal) if columns is None else columns, workspace))
+                workspace = workspace or runner.code.workspace(len(goal))
+                room = [buffer[..., : len(goal)] for buffer in workspace]
+                found = list(runner.code.run(entries(task, goal) if columns is None else columns, room))
             there = None
             if examine:
                 first = goal[:, 0] if columns is None else cast("Array", columns[9])
