@@ -168,6 +168,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_two_runs_do_not_share_a_folder",
     ),
     "compiled/test_compiled.py": (),
+    "compiled/test_folds.py": (),
     "compiled/test_lanes.py": (),
     "engines/test_cluster.py": (
         "test_a_batch_is_the_same_bytes_on_a_cluster",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-LEFT = 2  # what `arm_single` returns for a target that it leaves to Python
+LEFT = 4  # what `arm_single` returns for a target that it leaves to Python
 _FLAGS, _SMALL = np.dtype(np.bool_), np.dtype(np.int8)
 
 
@@ -26,7 +26,7 @@ def _fixed(value: object) -> NDArray[Any]:
     return out
 
 
-_STATUS = tuple(_fixed(np.int8(status)) for status in (Status.EXACT, Status.UNREACHABLE))
+_STATUS = tuple(_fixed(np.int8(status)) for status in sorted(Status))
 
 
 class Single:

@@ -10,7 +10,24 @@ from typing import TYPE_CHECKING, NamedTuple
 from armkin.export.c import elimination, formulas, keep_outs, kernel, program
 from armkin.export.c.text import part
 from armkin.formula.c_and_js_code import number
-from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, THERE
+from armkin.inverse.numeric.tolerances import (
+    ACCEPTED,
+    ARRIVED,
+    CLOSE_BY,
+    CLOSED,
+    FAR,
+    FOLD_WAY,
+    FOLDED,
+    HIGH,
+    REACH,
+    SEED,
+    SMOOTH,
+    SOLUTION,
+    THERE,
+    TINY,
+    WEAK,
+)
+from armkin.inverse.singular import local_structure
 from armkin.inverse.singular.near_itself import ROOM
 from armkin.inverse.tasks.task import LARGEST
 from armkin.model.limits import SLACK
@@ -70,7 +87,13 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
-        parts += [_part("sizes"), solve, part("copies"), _choose(arm, branches), _part(gather), _part("batch")]
+        folds = _part("no_folds")
+        if geometry is not None and _judges(arm, task, geometry) and branches <= LANES:
+            parts.append(kernel.jacobian(arm))
+            folds = program.filled(
+                _part("folds").replace("@followed@", _part("followed") + "\n"), _of_folds(arm, task) | fields
+            )
+        parts += [_part("sizes"), solve, part("copies"), _choose(arm, branches), _part(gather), folds, _part("batch")]
         parts += [_part("rows")] if has_rows(task, geometry) else []
     text = program.filled("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
@@ -103,6 +126,33 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
         "most": ", ".join(most),
         "axis": str(int(task.orientation == "axis")),
     }
+
+
+def _judges(arm: Arm, task: Task, geometry: Geometry) -> bool:
+    """Whether parts/folds.c can tell what branches on an edge are: of closed forms that list all of them, as many
+    numbers as joints."""
+    rows = 6 if task.orientation == "full" else task.position
+    plain = task.orientation != "axis" and not len(task.sums) and rows == arm.n > 1
+    return plain and geometry.pairs is not None and not geometry.ends and geometry.doubts is None
+
+
+def _of_folds(arm: Arm, task: Task) -> dict[str, str]:
+    """What parts/folds.c is filled in with."""
+    values = {
+        "reach": arm.reach, "solution": SOLUTION, "closed": CLOSED, "folded": FOLDED, "lost": WEAK, "seed": SEED,
+        "close_by": CLOSE_BY, "smooth": SMOOTH, "wide": REACH, "way": FOLD_WAY,
+        "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "high": HIGH,
+        "shrink": local_structure.SHRINK,
+    }  # fmt: skip
+    named = {name: number(value) for name, value in values.items()}
+    named |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
+    named |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
+    named |= {"fine": str(local_structure.FINE), "points_count": str(len(local_structure.POINTS))}
+    tables = {"nodes": local_structure.NODE, "points": local_structure.POINTS}
+    tables |= {"fit": local_structure.TO_POWERS, "last": local_structure.TO_LAST}
+    named |= {name: ", ".join(number(float(v)) for v in table.ravel()) for name, table in tables.items()}
+    named["nodes_count"] = str(local_structure.NODES)
+    return named | {"unit": ", ".join(number(unit) for unit in radian_or_reach(arm).tolist())}
 
 
 def _farthest(arm: Arm) -> float:

@@ -72,6 +72,7 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
     double point[3 * ARM_POINTS], kept[ARM_BRANCHES * ARM_JOINTS];
     const int far = n * (int64_t)sizeof kept > ARM_CACHES && (uintptr_t)out_q % 16 == 0 && sizeof kept % 16 == 0;
     int inside[ARM_BRANCHES * ARM_LANES], doubt[ARM_LANES], unread[ARM_LANES], wild[ARM_POINTS], at_near[ARM_LANES];
+    int meets[ARM_LANES];
     int64_t start, left = 0;
     int i, j, b;
     for (i = 0; i < ARM_LANES; i++)
@@ -92,12 +93,17 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
         arm_choose(close, q, inside, count);
         for (b = 0; b < ARM_BRANCHES; b++)
             for (i = 0; i < count; i++)
-                doubt[i] |= !(miss[b * ARM_LANES + i] <= @accepted@) & !(miss[b * ARM_LANES + i] > ARM_NEARBY);
+                doubt[i] |= 2 * (!(miss[b * ARM_LANES + i] <= @accepted@) & !(miss[b * ARM_LANES + i] > ARM_NEARBY));
         for (i = 0; i < count; i++) {
             at_near[i] = 1;
             for (j = 0; j < @position@; j++) /* where the tool is elsewhere, `near` is no solution */
                 at_near[i] &= fabs(goal[(@first@ + j) * ARM_LANES + i] - point[j * ARM_POINTS + i]) <= @room@;
-            doubt[i] |= wild[i];
+            doubt[i] |= 2 * wild[i];
+            meets[i] = 0;
+            if (doubt[i] == 1 && !at_near[i] && (read || !unread[i])) {
+                meets[i] = arm_folds(goal + i, q + i, miss + i);
+                doubt[i] = meets[i] < 0;
+            }
         }
         for (i = 0; i < count; i++)
             if (at_near[i] && !doubt[i]) {
@@ -129,7 +135,7 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
                 index[place] = (int8_t)@index@;
                 place++;
             }
-            status[at] = place ? 0 : 3;
+            status[at] = (int8_t)(place ? meets[i] : 3);
             for (; place < ARM_BRANCHES; place++) {
                 for (j = 0; j < ARM_JOINTS; j++)
                     row[place * ARM_JOINTS + j] = NAN;
@@ -148,7 +154,8 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
 }
 
 /* One target. block: target, near; then the results: q, and as bytes valid, within, branch, free (left alone), status,
-   state. Returns 0 if it is solved, 1 if it is and no branch reaches it, 2 if it is left to Python. */
+   state. Returns its status, or ARM_LEFT if it is left to Python. */
+enum { ARM_LEFT = 4 };
 int64_t arm_single(double *block)
 {
     const double *near = block + ARM_TARGET;
@@ -158,8 +165,8 @@ int64_t arm_single(double *block)
     int j;
     for (j = 0; j < ARM_JOINTS; j++)
         if (!(fabs(near[j]) <= ARM_LARGEST))
-            return 2;
+            return ARM_LEFT;
     arm_batch(1, block, near, 0, 0, q, bytes, bytes + ARM_BRANCHES, (int8_t *)bytes + 2 * ARM_BRANCHES, (int8_t *)rest,
         rest + 1);
-    return rest[1] != ARM_DONE ? 2 : rest[0] != 0;
+    return rest[1] != ARM_DONE ? ARM_LEFT : rest[0];
 }

@@ -7,6 +7,7 @@
 #define ARM_LANES 16
 #define ARM_INLINE static inline __attribute__((always_inline))
 #define ARM_RESTRICT restrict
+#define ARM_SELDOM __attribute__((cold, noinline)) /* small rather than fast: optimising it would take seconds */
 #if defined __AVX512F__
 #define ARM_MANY 8 /* numbers that one instruction takes, where compilers (GCC, Clang) have vectors as types */
 #elif defined __AVX2__ || defined __clang__

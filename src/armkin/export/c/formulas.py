@@ -29,7 +29,8 @@ def candidates(
     """A closed form's candidates: joint values, their squared residual, doubt.
 
     `measured`: before the doubt the residual's two parts, of lengths and of angles. Inputs: the target's numbers; with
-    `prefer` also what a free joint is given: a cosine and a sine for each joint, or the value of a slide.
+    `prefer` also what a free joint is given: a cosine and a sine for each joint, or the value of a slide; without it,
+    last, whether a joint is free.
     """
     recorded, n, entries = Recorded(arm, task, geometry), arm.n, goal_size(task)
 
@@ -41,7 +42,8 @@ def candidates(
                 held[j] = Pair(inputs[at], None) if arm.prismatic[j] else Pair(inputs[at], inputs[at + 1])
                 at += 1 if arm.prismatic[j] else 2
         of = recorded.measured if measured else recorded.candidates
-        return of(inputs[:entries], held)[:-1]  # which joints are free is of no use here
+        found = of(inputs[:entries], held)
+        return found[:-1] if prefer else found
 
     return recording.record(formula, entries + (sum(1 if p else 2 for p in arm.prismatic) if prefer else 0))
 

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:
     """`arm_candidates` of a closed form, and how many branches it has.
 
-    prefer: joints that a target leaves free take their value from `near`; without, such a target is only in doubt.
+    prefer: joints that a target leaves free take their value from `near`; without, such a target is only in doubt, 3
+    in place of 1.
     """
     n, entries = arm.n, formulas.goal_size(task)
     declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(entries)]
@@ -36,11 +37,15 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     with recorded_for(SINGLE if single else DOUBLE):
         recorded = formulas.candidates(arm, task, geometry, prefer)
     code = c_and_js_code.write(recorded, [name for name, _ in declared], _language(single))
-    *values, miss, _ = formulas.by_branch(recorded, code)
+    outputs = formulas.by_branch(recorded, code)
+    values, miss = outputs[:n], outputs[n]
     stores = [f"q[{b * n + j} * ARM_LANES + i] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
     stores += [f"miss[{b} * ARM_LANES + i] = {miss[b]};" for b in range(len(miss))]
-    doubts = dict.fromkeys(text for text in code.outputs[-1] if not text.startswith("0.0"))
-    stores.append(f"doubt[i] = {' | '.join(doubts) or 0};")
+    edge, *free = (
+        " | ".join(dict.fromkeys(text for text in texts if not text.startswith("0.0")))
+        for texts in code.outputs[n + 1 :]
+    )
+    stores.append(f"doubt[i] = {edge or 0};" if not free or not free[0] else f"doubt[i] = ({edge}) | ({free[0]}) * 2;")
     head = (
         "static void arm_candidates(const arm_real *ARM_RESTRICT goal, const arm_real *ARM_RESTRICT near,\n"
         "    arm_real *ARM_RESTRICT q, arm_real *ARM_RESTRICT miss, int *ARM_RESTRICT doubt, int count)"

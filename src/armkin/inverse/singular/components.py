@@ -203,7 +203,7 @@ class _Groups:
         """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries
         that are alone on their components or two, and self-motions that were known where nothing else may be on them.
         """
-        valid, sigma, size, M = self.open, self.lost.sigma, self.at.size, self.open.shape[1]
+        valid, sigma, M = self.open, self.lost.sigma, self.open.shape[1]
         on: Bool = np.asarray(self.at.sure.any(axis=2))
         mine, others = valid & ~on, ~np.eye(M, dtype=bool)
         close = np.zeros((len(valid), M, M), bool)
@@ -222,11 +222,11 @@ class _Groups:
             mine &= (one == one.swapaxes(1, 2)).all(axis=2) & ~(close[some] & ~mine[:, None]).any(axis=2)
             mine &= (one.sum(axis=2) < 2) & ~one[:, :, 0]
             mine &= (~one | mine[:, None]).all(axis=2)
-            # the most exact of each, the first of several
-            rank, lead = (np.argsort(np.argsort(x[some], axis=1, kind="stable"), axis=1) for x in (size, self.rank))
-            self.chosen[some] |= mine & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
-            first = ~(one & (lead[:, None] < lead[:, :, None])).any(axis=2)
-            self.double[some] |= (mine & self.edge[some] & first).any(axis=1)
+            # the most exact of each, the first of those that need no correction: the same in all arithmetics
+            rank = np.argsort(np.argsort(np.maximum(self.at.size[some], CLOSED), axis=1, kind="stable"), axis=1)
+            leads = mine & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
+            self.chosen[some] |= leads
+            self.double[some] |= (leads & self.edge[some]).any(axis=1)
             told[some] = mine
         self.chosen |= alone
         self.open &= ~(alone | told)
@@ -262,6 +262,7 @@ class _Groups:
         self._ask(k, b)
         arm, near, sigma = self.goals.arm, self.goals.near, self.lost.sigma
         q, label, size = self.at.q, self.at.label, self.at.size
+        exact = np.maximum(size[k], CLOSED)  # as in `_plain`
         moving, joints, sure = self.moves[k, b], self.which[k, b], self.known[k, b]
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
         one: Bool = np.asarray(self.component[self.place[k, b]])
@@ -280,7 +281,7 @@ class _Groups:
         self.free[k] |= joints & moving[:, None]
         # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
         motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
-        pick = np.where(moving[:, None], np.where(on, motion, np.inf), np.where(mine, size[k], np.inf)).argmin(axis=1)
+        pick = np.where(moving[:, None], np.where(on, motion, np.inf), np.where(mine, exact, np.inf)).argmin(axis=1)
         own = np.flatnonzero(label[k, b] == OWN)
         pick[own] = b[own]
         self.chosen[k, pick] = True

@@ -274,6 +274,7 @@ _FIT = np.linalg.inv(np.polynomial.chebyshev.chebvander(NODE, NODES - 1))
 _POWERS = np.array([
     np.pad(np.polynomial.chebyshev.cheb2poly([0.0] * k + [1.0]), (0, NODES))[:NODES] for k in range(NODES)
 ]).T  # fmt: skip
+TO_POWERS, TO_LAST = _POWERS @ _FIT, _FIT[-2:]  # from values at the nodes at once: for machine code
 
 
 def _values(coefficients: Array, s: Array) -> Array:

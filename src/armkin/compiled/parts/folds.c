@@ -1,0 +1,263 @@
+/* Targets on an edge whose branches stand alone, or meet in pairs: armkin.inverse.singular.local_structure, for one target,
+   where one direction is lost and no joint is free. All others are left to Python. */
+enum { ARM_NODES = @nodes_count@ };
+
+/* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. */
+typedef struct {
+    double v[ARM_JOINTS], w[ARM_JOINTS], x[ARM_NODES][ARM_JOINTS], low, high, span, second, miss;
+    int weak, turns;
+} arm_branch;
+
+/* What a pose (16 numbers) misses of a target: lengths in reaches, then the rotation vector [rad]. */
+ARM_SELDOM static void arm_residual(const double *T, const double *goal, double *r)
+{
+    int k;
+    for (k = 0; k < @position@; k++)
+        r[k] = (goal[(@first@ + k) * ARM_LANES] - T[(4 * k + 3) * ARM_POINTS]) / @reach@;
+#if @full@
+    {
+        double C[3][3], sine = 0.0, cosine;
+        int i, j;
+        for (i = 0; i < 3; i++)
+            for (j = 0; j < 3; j++)
+                for (C[i][j] = 0.0, k = 0; k < 3; k++)
+                    C[i][j] += T[(4 * i + k) * ARM_POINTS] * goal[(3 * k + j) * ARM_LANES];
+        for (k = 0; k < 3; k++) {
+            i = (k + 1) % 3, j = (k + 2) % 3;
+            r[3 + k] = 0.5 * (C[i][j] - C[j][i]);
+            sine += r[3 + k] * r[3 + k];
+        }
+        sine = sqrt(sine), cosine = 0.5 * (C[0][0] + C[1][1] + C[2][2] - 1.0);
+        if (sine > 1e-8) /* below, the angle is its sine to the last digit */
+            for (k = 3; k < 6; k++)
+                r[k] *= atan2(sine, cosine) / sine;
+    }
+#endif
+}
+
+/* One-sided Jacobi rotations (Hestenes 1958): the columns of A become those of U S, V those of the right vectors. */
+ARM_SELDOM static void arm_singular_values(double A[ARM_JOINTS][ARM_JOINTS], double V[ARM_JOINTS][ARM_JOINTS], double *S)
+{
+    int a, b, k, sweep, turned = 1;
+    for (a = 0; a < ARM_JOINTS; a++)
+        for (b = 0; b < ARM_JOINTS; b++)
+            V[a][b] = a == b;
+    for (sweep = 0; turned && sweep < 40; sweep++)
+        for (turned = 0, a = 0; a < ARM_JOINTS; a++)
+            for (b = a + 1; b < ARM_JOINTS; b++) {
+                double x = 0.0, y = 0.0, xy = 0.0, t, c, s;
+                for (k = 0; k < ARM_JOINTS; k++)
+                    x += A[a][k] * A[a][k], y += A[b][k] * A[b][k], xy += A[a][k] * A[b][k];
+                if (!(fabs(xy) > 1e-15 * sqrt(x * y)))
+                    continue;
+                turned = 1;
+                t = (y - x) / (2.0 * xy);
+                t = (t < 0.0 ? -1.0 : 1.0) / (fabs(t) + sqrt(1.0 + t * t));
+                c = 1.0 / sqrt(1.0 + t * t), s = c * t;
+                for (k = 0; k < ARM_JOINTS; k++) {
+                    const double p = A[a][k], q = A[b][k], e = V[a][k], f = V[b][k];
+                    A[a][k] = c * p - s * q, A[b][k] = s * p + c * q;
+                    V[a][k] = c * e - s * f, V[b][k] = s * e + c * f;
+                }
+            }
+    for (a = 0; a < ARM_JOINTS; a++) {
+        for (S[a] = 0.0, k = 0; k < ARM_JOINTS; k++)
+            S[a] += A[a][k] * A[a][k];
+        S[a] = sqrt(S[a]);
+    }
+}
+
+/* A posture's way f = r - r(q + away), both ways, along the columns of U. */
+ARM_SELDOM static void arm_both_ways(const double *q, const double *goal, const double *r, double U[ARM_JOINTS][ARM_JOINTS],
+    double away[2][ARM_JOINTS], double f[2][ARM_JOINTS])
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+    double at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], missed[ARM_JOINTS];
+    int i, j, k;
+    for (i = 0; i < 2; i++)
+        for (j = 0; j < ARM_JOINTS; j++)
+            at[j * ARM_POINTS + i] = q[j * ARM_LANES] + away[i][j] * unit[j];
+    arm_pose(at, T, 2);
+    for (i = 0; i < 2; i++) {
+        arm_residual(T + i, goal, missed);
+        for (j = 0; j < ARM_JOINTS; j++)
+            for (f[i][j] = 0.0, k = 0; k < ARM_JOINTS; k++)
+                f[i][j] += (r[k] - missed[k]) * U[j][k];
+    }
+}
+
+/* Whether the curvature tells what a weak posture is; `_second_order` has the same names. U, S, V: the last is the lost. */
+ARM_SELDOM static int arm_second_order(const double *q, const double *goal, const double *r, double U[ARM_JOINTS][ARM_JOINTS],
+    double V[ARM_JOINTS][ARM_JOINTS], const double *S, arm_branch *out)
+{
+    const int last = ARM_JOINTS - 1;
+    const double sigma = S[last], second = S[last - 1];
+    double away[2][ARM_JOINTS], f[2][ARM_JOINTS], more[2][ARM_JOINTS] = {{0.0}}, along[ARM_JOINTS], most = 0.0;
+    double b, size, far, near, h, bend = 0.0, ahead, root;
+    int i, j, k, step, told = 0;
+    for (j = 0; j < ARM_JOINTS; j++) {
+        out->v[j] = V[last][j];
+        most = fmax(most, fabs(out->v[j]));
+        away[0][j] = @way@ * out->v[j], away[1][j] = -away[0][j];
+    }
+    memset(out->x, 0, sizeof out->x);
+    out->span = 1.2 * @wide@ / most;
+    arm_both_ways(q, goal, r, U, away, f);
+    for (k = 0; k < ARM_JOINTS; k++)
+        along[k] = (f[0][k] + f[1][k]) / (@way@ * @way@);
+    for (j = 0; j < ARM_JOINTS; j++) {
+        for (out->w[j] = 0.0, k = 0; k < last; k++)
+            out->w[j] -= V[k][j] * along[k] / S[k];
+        bend += out->w[j] * out->w[j];
+    }
+    b = along[last], size = fmax(fabs(b), @tiny@);
+    far = 4.0 * sqrt(@solution@ / size), near = 2.0 * @solution@ / sigma;
+    h = fmin(fmax(fmin(far, near), @series@), 4.0 * @series@);
+    /* where |g| is SOLUTION first: with the sign of b; and against it, or beyond the turn */
+    ahead = 2.0 * @solution@ / (sigma + sqrt(sigma * sigma + 2.0 * @solution@ * size));
+    root = sqrt(fmax(sigma * sigma - 2.0 * @solution@ * size, 0.0));
+    root = sigma * sigma < 2.0 * @solution@ * size ? ahead + 2.0 * sigma / size : 2.0 * @solution@ / (sigma + root);
+    out->low = b > 0.0 ? -root : -ahead, out->high = b > 0.0 ? ahead : root;
+    for (step = 0; !told && step < @back@; step++) {
+        double rest[2] = {0.0, 0.0}, pushed[2] = {0.0, 0.0}, off, cubic, quartic, third;
+        for (i = 0; i < 2; i++)
+            for (j = 0; j < ARM_JOINTS; j++) {
+                away[i][j] = 0.5 * h * h * out->w[j] + (i ? -h : h) * out->v[j] + more[i][j];
+                pushed[i] += more[i][j] * more[i][j];
+            }
+        arm_both_ways(q, goal, r, U, away, f);
+        for (i = 0; i < 2; i++)
+            for (k = 0; k < last; k++)
+                rest[i] += f[i][k] * f[i][k];
+        off = sqrt(fmax(rest[0], rest[1])) / second;
+        cubic = fabs(0.5 * (f[0][last] - f[1][last]) - sigma * h);
+        quartic = fabs(0.5 * (f[0][last] + f[1][last]) - 0.5 * b * h * h) + ARM_JOINTS * h * off;
+        third = (6.0 * cubic + 12.0 * quartic) / (h * h * h);
+        if (0.5 * h * h * sqrt(bend) + sqrt(fmax(pushed[0], pushed[1])) + off < 0.1 * h) {
+            out->turns = far <= h && third * far < 0.2 * size && sigma * sigma < 2.0 * @solution@ * (size - third * far);
+            told = out->turns || (near <= h && sigma * sigma > 2.0 * @solution@ * (size + third * near));
+        }
+        for (i = 0; i < 2; i++)
+            for (j = 0; j < ARM_JOINTS; j++)
+                for (k = 0; k < last; k++)
+                    more[i][j] -= V[k][j] * f[i][k] / S[k];
+    }
+    for (j = 0; j < ARM_JOINTS; j++)
+        out->x[1][j] = out->v[j] * out->span, out->x[2][j] = 0.5 * out->w[j] * out->span * out->span;
+    return told;
+}
+
+@followed@/* Whether a branch is told; slope: its `arm_slope`, T: its pose. */
+ARM_SELDOM static int arm_told(const double *q, const double *goal, const double *T, const double *slope, arm_branch *out)
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+    double A[ARM_JOINTS][ARM_JOINTS], V[ARM_JOINTS][ARM_JOINTS], S[ARM_JOINTS], r[ARM_JOINTS], swap;
+    int a, k, j, place, last = ARM_JOINTS - 1;
+    arm_residual(T, goal, r);
+    for (out->miss = 0.0, k = 0; k < ARM_JOINTS; k++) {
+        out->miss += r[k] * r[k];
+        for (j = 0; j < ARM_JOINTS; j++)
+            A[j][k] = slope[(k * ARM_JOINTS + j) * ARM_POINTS] * unit[j] / (k < @position@ ? @reach@ : 1.0);
+    }
+    out->miss = sqrt(out->miss);
+    if (!(out->miss < @closed@)) /* a branch that misses by more wants a correction */
+        return 0;
+    arm_singular_values(A, V, S);
+    for (place = last; place >= last - 1; place--) { /* the two smallest last */
+        for (a = 0, k = 1; k <= place; k++)
+            a = S[k] < S[a] ? k : a;
+        swap = S[a], S[a] = S[place], S[place] = swap;
+        for (k = 0; k < ARM_JOINTS; k++) {
+            swap = A[a][k], A[a][k] = A[place][k], A[place][k] = swap;
+            swap = V[a][k], V[a][k] = V[place][k], V[place][k] = swap;
+        }
+    }
+    out->weak = S[last] < @folded@, out->turns = 0, out->second = S[last - 1];
+    if (!out->weak)
+        return 1;
+    if (!(S[last] > @solution@) || !(S[last - 1] > @lost@)) /* rounding has turned the lost direction, or there are two */
+        return 0;
+    for (a = 0; a < ARM_JOINTS; a++)
+        for (k = 0; k < ARM_JOINTS; k++)
+            A[a][k] /= S[a];
+    return arm_second_order(q, goal, r, A, V, S, out) || arm_followed(q, goal, A[last], out);
+}
+
+/* Whether a posture that far away [rad, reaches] lies on a weak branch's component: `members` in Python. */
+static int arm_member(const arm_branch *one, const double *way)
+{
+    const double slack = 4.0 * @solution@ / one->second;
+    double t = 0.0, s;
+    int j, k;
+    for (j = 0; j < ARM_JOINTS; j++)
+        t += way[j] * one->v[j];
+    if (!(t >= one->low - slack && t <= one->high + slack))
+        return 0;
+    s = fmax(fmin(t / one->span, 1.0), -1.0);
+    for (j = 0; j < ARM_JOINTS; j++) {
+        double x = 0.0;
+        for (k = ARM_NODES - 1; k >= 0; k--)
+            x = x * s + one->x[k][j];
+        if (!(fabs(way[j] - x) <= 4.0 * @smooth@ * one->span + slack))
+            return 0;
+    }
+    return 1;
+}
+
+/* A target on an edge: 0 if all of its branches are isolated, 1 if some meet, -1 if that is left open. miss: infinite of
+   what is one with a branch that is kept. */
+ARM_SELDOM static int arm_folds(const double *goal, const double *q, double *miss)
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+    static const int slides[ARM_JOINTS] = {@slides@};
+    double at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS], way[ARM_JOINTS];
+    arm_branch one[ARM_BRANCHES];
+    int which[ARM_BRANCHES], twin[ARM_BRANCHES], count = 0, meets = 0, a, b, j;
+    for (b = 0; b < ARM_BRANCHES; b++) {
+        const double off = miss[b * ARM_LANES];
+        if (!(off <= @accepted@) && !(off >= @seed@ * @seed@)) /* a correction may make a branch of it */
+            return -1;
+        if (off <= @accepted@) {
+            for (j = 0; j < ARM_JOINTS; j++)
+                at[j * ARM_POINTS + count] = q[(b * ARM_JOINTS + j) * ARM_LANES];
+            which[count++] = b;
+        }
+    }
+    if (!count)
+        return -1;
+    arm_pose(at, T, count);
+    arm_slope(at, slope, count);
+    for (a = 0; a < count; a++)
+        if (!arm_told(q + which[a] * ARM_JOINTS * ARM_LANES, goal, T + a, slope + a, one + a))
+            return -1;
+    for (a = 0; a < count; a++)
+        for (twin[a] = -1, b = 0; b < count; b++) {
+            double away = 0.0;
+            for (j = 0; j < ARM_JOINTS; j++) {
+                way[j] = at[j * ARM_POINTS + b] - at[j * ARM_POINTS + a];
+                way[j] = slides[j] ? way[j] / unit[j] : way[j] - ARM_TURN * rint(way[j] / ARM_TURN);
+                away = fmax(away, fabs(way[j]));
+            }
+            if (a == b || !(away < @close_by@))
+                continue;
+            if (!one[a].weak || !one[b].weak)
+                return -1;
+            if (arm_member(one + a, way)) {
+                if (twin[a] >= 0)
+                    return -1;
+                twin[a] = b;
+            }
+        }
+    for (a = 0; a < count; a++) {
+        if ((b = twin[a]) < 0) {
+            meets |= one[a].turns;
+            continue;
+        }
+        if (twin[b] != a || one[a].turns != one[b].turns)
+            return -1;
+        meets |= one[a].turns;
+        if (b < a)
+            miss[which[a] * ARM_LANES] = INFINITY;
+    }
+    return meets;
+}
