@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 SMALL = 256  # poses: buffers of batches up to this are kept, as making them costs more than filling them
 UNCOPIED = 512  # elements of numpy's buffers: it copies operands that are repeated on a branch axis if two rows fit
-CACHE = 4_000_000  # [bytes] that buffers take: 2 to 6 MB cost the same with 1 MB a core, 9 MB a tenth more
+CACHE = 4_000_000  # [bytes] that buffers take: 4 to 6 MB cost the same with 1 MB a core, 9 MB more
 LENGTHS = 16  # of batches, for which a thread keeps buffers
 
 

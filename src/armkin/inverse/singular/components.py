@@ -192,8 +192,7 @@ class _Groups:
         self.open: Bool = self.valid & ~at.simple  # those of no group yet
         lost.sigma[on] = 0.0
         self.asked: Bool = ~(self.open & (lost.sigma < FOLDED) & ~on)
-        self.known: Bool = on.copy()
-        self.moves: Bool = on.copy()
+        self.known, self.moves = on.copy(), on.copy()
         self.which, self.edge, self.ended = at.sure.copy(), np.zeros((K, M), bool), np.zeros((K, M), bool)
         self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
         self.chosen, self.curve = at.simple.copy(), np.zeros((K, M, n), bool)
@@ -262,8 +261,8 @@ class _Groups:
         self._ask(k, b)
         arm, near, sigma = self.goals.arm, self.goals.near, self.lost.sigma
         q, label, size = self.at.q, self.at.label, self.at.size
-        exact = np.maximum(size[k], CLOSED)  # as in `_plain`
         moving, joints, sure = self.moves[k, b], self.which[k, b], self.known[k, b]
+        exact = np.where(sure[:, None], np.maximum(size[k], CLOSED), size[k])  # of known components as in `_plain`
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
         one: Bool = np.asarray(self.component[self.place[k, b]])
         some = np.flatnonzero(~sure)
