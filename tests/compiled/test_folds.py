@@ -31,13 +31,13 @@ def test_merging_branches_are_told_without_python(name: str, monkeypatch: pytest
     fast, target = armkin.compile(arm), beside_folds(arm)
     expected = armkin.ik(arm, target)
     left: list[int] = []
-    whole = solve.ik
+    whole = solve.answered
 
-    def counted(arm: armkin.Arm, targets: Any, *rest: Any, **more: Any) -> armkin.Solutions:
+    def counted(arm: armkin.Arm, task: Any, geometry: Any, targets: Any, *rest: Any) -> armkin.Solutions:
         left.append(len(targets))
-        return whole(arm, targets, *rest, **more)
+        return whole(arm, task, geometry, targets, *rest)
 
-    monkeypatch.setattr(solve, "ik", counted)
+    monkeypatch.setattr(solve, "answered", counted)
     found = fast.ik(target)
     assert sum(left) < COUNT / 4
     assert {0, 1} <= set(found.status.tolist())
