@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.closed.wrist import foot, meeting_point
-from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, PARALLEL, SAME_END
+from armkin.inverse.numeric.tolerances import BESIDE_END, EXACT, NO_LENGTH, PARALLEL, SAME_END
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
 from armkin.model.chain import is_parallel
 from armkin.model.rotation import inverse, rotation_about
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 DEGREE = 8
-BESIDE = 0.001  # [rad] from a root, where samples tell what is on its sides; less where two are closer
 Z = np.array([0.0, 0.0, 1.0])
 Complex = NDArray[np.complex128]
 
@@ -220,5 +219,7 @@ def beside(at: Array) -> Array:
     before = some - np.concatenate([last[:, None], some[:, :-1]], axis=1)
     following = np.concatenate([some[:, 1:], first], axis=1)
     behind = np.where(np.arange(at.shape[1]) == count[:, None] - 1, first, following) - some
-    both = np.concatenate([some - np.minimum(before / 3, BESIDE), some + np.minimum(behind / 3, BESIDE)], axis=1)
+    both = np.concatenate(
+        [some - np.minimum(before / 3, BESIDE_END), some + np.minimum(behind / 3, BESIDE_END)], axis=1
+    )
     return np.where(np.tile(real, 2), np.remainder(both + np.pi, 2 * np.pi) - np.pi, np.inf)
