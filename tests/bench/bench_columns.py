@@ -24,7 +24,7 @@ import numpy as np
 import armkin
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.model import units
+from armkin.model.targets import targets_out
 
 LABELS = ("x", "y", "z", "roll", "pitch", "yaw")
 BARS = {"csv": 6.0, "npz": 3.0, "parquet": 3.0, "all branches": 20.0}  # [us] a row
@@ -49,7 +49,7 @@ def poses(count: int) -> np.ndarray:
 
 def typed(arm: Any, q: np.ndarray) -> np.ndarray:
     """Targets (N, 6) [mm, deg] of joint values as people write them."""
-    return np.round(units.targets_out(LABELS, targets_of(task_for(arm, None), armkin.fk(arm, q), q)), 3)
+    return np.round(targets_out(LABELS, targets_of(task_for(arm, None), armkin.fk(arm, q), q)), 3)
 
 
 def write(values: np.ndarray, folder: Path, name: str) -> dict[str, Path]:

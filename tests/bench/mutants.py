@@ -56,7 +56,7 @@ MUTANTS = [
     Mutant("reachability/cells.py", "(3.0 - math.sqrt(5.0))", "(2.0 - math.sqrt(5.0))", "reachability"),
     Mutant("columns/cells.py", "'\"' + text.replace('\"', '\"\"') + '\"'", "'\"' + text + '\"'",
            "columns test_doctests.py cli"),
-    Mutant("calibration/fit.py", "np.asarray((1.0 + u2 / K**2) ** -2)", "np.ones_like(u2)", "calibration"),
+    Mutant("calibration/robust_fit.py", "np.asarray((1.0 + u2 / K**2) ** -2)", "np.ones_like(u2)", "calibration"),
     Mutant("compiled/toolchain.py", "return owner and not", "return not", "compiled"),
     Mutant("cli/exit_codes.py", "LINK = 1, 2, 3, 4, 5", "LINK = 1, 2, 4, 3, 5",
            "cli/test_cli_errors.py cli/test_cli_commands.py"),

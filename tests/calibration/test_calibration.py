@@ -13,7 +13,7 @@ from workshop import built, commands, measured, rms
 
 import armkin
 from armkin import robot_file
-from armkin.calibration import fit
+from armkin.calibration import robust_fit as fit
 from armkin.calibration.chain import KINDS, model
 from armkin.calibration.procedure import next_poses
 from armkin.errors import UsageError

@@ -11,7 +11,7 @@ from armkin import Status
 from armkin.errors import UsageError
 from armkin.inverse.answers.rounding import printed
 from armkin.inverse.tasks.task import LABELS
-from armkin.model.units import targets_out
+from armkin.model.targets import targets_out
 from command_line import run
 
 DIGITS = ("6f", "8f", "12f", "7g", "float32")  # decimals, significant digits

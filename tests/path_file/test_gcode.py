@@ -12,7 +12,7 @@ import pytest
 import armkin
 from armkin.errors import PathFileError, UsageError
 from armkin.inverse.tasks.fitting import task_for
-from armkin.model import units
+from armkin.model.targets import targets_in
 from armkin.motion.tool_path.placing import placing
 from armkin.path_file import gcode, gcode_arcs
 from armkin.path_file.drawing import Placing, Wishes
@@ -211,7 +211,7 @@ def test_the_tool_points_against_the_drawing(robot: str) -> None:
     arm = armkin.load(robot)
     place = placing(arm, [300, 0, 50])
     definition = task_for(arm, None)
-    target = units.targets_in(definition.labels, [[*(0.25 * arm.reach, 0.0, 0.2 * arm.reach), *place.rest]])
+    target = targets_in(definition.labels, [[*(0.25 * arm.reach, 0.0, 0.2 * arm.reach), *place.rest]])
     found = armkin.ik(arm, target[0])
     assert found.valid.any()
     assert armkin.fk(arm, found.q[found.valid][0])[:3, 2] == pytest.approx([0, 0, -1], abs=1e-6)

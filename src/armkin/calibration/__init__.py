@@ -1,9 +1,9 @@
 """Measured tips in, a corrected robot file out.
 
 chain.py            an arm with small corrections at every link, its poses and their exact Jacobian
-fit.py              robust damped Gauss-Newton with a workshop prior
+robust_fit.py       damped Gauss-Newton with a workshop prior; rows that are far out lose their weight
 procedure.py        `calibrate`: checks, levels by cross-validation, what was seen, the corrected arm
 model_selection.py  which corrections the rows justify: levels from few to all
 observability.py    which corrections the rows show, and the next poses that would show most
-suspect_rows.py     rows that cannot be right: units, columns, joints that never move
+impossible_rows.py  what cannot be right is refused: units, columns, joints that never move
 """

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.calibration.chain import KINDS, Model
-from armkin.calibration.fit import Fit, Measured, fit, residuals
 from armkin.calibration.observability import left_open
+from armkin.calibration.robust_fit import Fit, Measured, fit, residuals
 from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")

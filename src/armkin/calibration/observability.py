@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.calibration.chain import Model
-from armkin.calibration.fit import FINEST, Fit
+from armkin.calibration.robust_fit import FINEST, Fit
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.calibration import observability
 from armkin.calibration.chain import KINDS, model
-from armkin.calibration.fit import Measured
+from armkin.calibration.impossible_rows import check
 from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
-from armkin.calibration.suspect_rows import check
+from armkin.calibration.robust_fit import Measured
 from armkin.errors import UsageError
 from armkin.export import tables
 from armkin.formula import arrays

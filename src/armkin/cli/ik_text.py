@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from armkin.cli import render
 from armkin.cli.render import fixed
-from armkin.model import units
+from armkin.model.targets import label_units
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Branch, Ik
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def text(arm: Arm, answer: Ik) -> str:
     headings = render.joint_headings(arm)
-    goal = render.labelled(answer["target_labels"], answer["target"], units.label_units(answer["target_labels"]))
+    goal = render.labelled(answer["target_labels"], answer["target"], label_units(answer["target_labels"]))
     rows = [["", "branch", *headings, "motion", ""]]
     for i, branch in enumerate(answer["branches"]):
         bad = ", ".join(violation["joint"] for violation in branch["violations"])

@@ -11,6 +11,7 @@ from armkin.cli.csv_rows import streamed_rows
 from armkin.cli.numbers import decimals
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
+from armkin.model.targets import label_units, targets_in
 
 if TYPE_CHECKING:
     from armkin.board.planner import Stream
@@ -51,10 +52,10 @@ def goals(
 
         what = task_for(arm, task)
         values = inputs.target_list(arm, what, target)
-        goal = units.targets_in(what.labels, np.array([values]))
+        goal = targets_in(what.labels, np.array([values]))
         close = None if near is None else inputs.joint_list(arm, near, "--near")
         shown = [[decimals(word) for word in target.split(",")]]
-        rounding = printed(units.label_units(what.labels), np.array([values]), arm.reach, shown)
+        rounding = printed(label_units(what.labels), np.array([values]), arm.reach, shown)
         return arm, Goals(None, [1], goal, what.name, branch, lock_and_sweep.locks(arm, lock), close, rounding)
     if batch == "-":
         from armkin.board.planner import Stream

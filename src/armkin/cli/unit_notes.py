@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from armkin.cli import output
-from armkin.model import units
+from armkin.model.targets import label_units
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -52,7 +52,7 @@ def target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> None:
     position = [value for label, value in zip(labels, values, strict=True) if label in "xyz"]
     if position and max(map(abs, position)) < _METRES and any(map(_has_digits, position)) and arm.reach > _BIG:
         output.note(f"targets are millimetres, and this looks like metres ({', '.join(f'{v:g}' for v in position)})")
-    angles = [v for v, unit in zip(values, units.label_units(labels), strict=True) if unit == "deg"]
+    angles = [v for v, unit in zip(values, label_units(labels), strict=True) if unit == "deg"]
     if angles and any(map(_has_digits, angles)) and any(abs(abs(v) - turn) < 1e-3 for v in angles for turn in _TURNS):
         output.note(f"angles are degrees, and these look like radians ({', '.join(f'{v:g}' for v in angles)})")
 

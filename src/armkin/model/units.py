@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 DEGREE = math.pi / 180
-_ANGLES = ("theta", "phi", "roll", "pitch", "yaw")
 
 
 def names(arm: Arm) -> list[str]:
@@ -87,38 +85,6 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def label_units(labels: Sequence[str]) -> list[str]:
-    """Unit of each of a target's numbers: "mm", "deg", or "" for a direction's components."""
-    return ["deg" if name in _ANGLES else "" if name in ("ax", "ay", "az") else "mm" for name in labels]
-
-
-def targets_in(labels: Sequence[str], values: ArrayLike) -> Array:
-    """Targets (..., m) of a task from [mm, deg] to what `armkin.ik` takes.
-
-    labels: the task's names of the numbers; a pose becomes (..., 4, 4), with
-    R = Rz(yaw) Ry(pitch) Rx(roll).
-    """
-    import numpy as np
-
-    numbers = np.asarray(values, dtype=float)
-    if list(labels[3:]) == ["roll", "pitch", "yaw"]:
-        from armkin.model.rotation import transforms
-
-        return transforms(numbers[..., :3], numbers[..., 3:])
-    return numbers * _label_scale(labels)
-
-
-def targets_out(labels: Sequence[str], targets: Array) -> list[list[float]]:
-    """Targets (N, m) or (N, 4, 4), as `armkin.ik` takes them, in the command line's numbers [mm, deg]."""
-    import numpy as np
-
-    if targets.ndim == 3:
-        from armkin.model.rotation import rpy
-
-        targets = np.concatenate([targets[:, :3, 3], rpy(targets[:, :3, :3])], axis=1)
-    return [list(row) for row in (targets / _label_scale(labels) + 0.0).tolist()]
-
-
 def scale(arm: Arm) -> Array:
     """What one unit of each joint, a degree or a millimetre, is in [rad | mm]: (n,)."""
     import numpy as np
@@ -134,8 +100,3 @@ def radian_or_reach(arm: Arm) -> Array:
     unit = np.where(arm.prismatic, arm.reach, 1.0)
     unit.flags.writeable = False
     return unit
-
-
-def _label_scale(labels: Sequence[str]) -> list[float]:
-    """What one unit of each of a target's numbers is in [mm, rad, 1]."""
-    return [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]

@@ -13,7 +13,7 @@ from armkin.inverse.numeric.newton import scaled
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import clearance
-from armkin.model import units
+from armkin.model.targets import targets_out
 from armkin.model.units import radian_or_reach
 from armkin.motion.joint_moves import check_rates
 from armkin.motion.path import path
@@ -61,7 +61,7 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
     count, why = _carried(arm, task, q, axis, frame, step, most)
     while count:
         target = _beside(arm, task, q, axis, frame, step * count)
-        [line] = units.targets_out(task.labels, target[None])
+        [line] = targets_out(task.labels, target[None])
         try:
             speed = {"speed": 100 * abs(share)} if turns else {"tool_speed": abs(share) * TOP}
             plan = path(arm, {"moves": [{"line": list(line)}], **speed}, start=q)

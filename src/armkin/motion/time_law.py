@@ -12,8 +12,9 @@ from armkin.formula.arrays import Array
 from armkin.forward import as_joints, position
 from armkin.motion.branches.branch_path import coupled
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.curve import Curve
 from armkin.motion.timing.hold_cap import hold_cap
+from armkin.motion.timing.limit_jerk import Smoothed, window
 from armkin.motion.timing.time_optimal import Bounds, finer, knots, optimal
 from armkin.motion.timing.trajectory import Trajectory
 
@@ -64,5 +65,5 @@ def time_law(
     curve = Curve(path, optimal(path, Bounds(arm.max_speed * speed, limits, cap), coupled(arm, accel)))
     made: Curve | Smoothed = curve
     if jerk is not None:
-        made = Smoothed(curve, float((2 * limits / np.asarray(jerk, dtype=float)).max()))
+        made = Smoothed(curve, window(limits, jerk))
     return Trajectory(arm, values[0], (made,))

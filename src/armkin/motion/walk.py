@@ -26,7 +26,8 @@ from armkin.motion.branches.grid import Missed, deviation, missed
 from armkin.motion.branches.windows import detoured
 from armkin.motion.joint_moves import approach, straight
 from armkin.motion.plan.path_plan import Marker, PathPlan
-from armkin.motion.timing.curve import Curve, Smoothed, way_of, ways_of
+from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.limit_jerk import Smoothed, way_of, ways_of
 from armkin.motion.timing.profile import at_rest
 from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import geometry, path_numbers

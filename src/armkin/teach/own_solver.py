@@ -10,6 +10,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.model import units
 from armkin.model.arm import actual
+from armkin.model.targets import label_units
 from armkin.motors import pulse_range
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def about(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
         "robot": Path(arm.path).stem if arm.path else arm.name,
         "task": task.name,
         "labels": list(task.labels),
-        "units": units.label_units(task.labels),
+        "units": label_units(task.labels),
         "held": arm.joint_names[spare.joint] if spare else "",
         "pulse_range": [[units.finite(end) for end in pair] for pair in pulse_range(arm).tolist()],
     }

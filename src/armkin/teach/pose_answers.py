@@ -21,6 +21,7 @@ from armkin.keep_out.clearance import said as hits_said
 from armkin.model import units
 from armkin.model.limits import outside, said
 from armkin.model.rotation import rpy
+from armkin.model.targets import label_units, targets_in, targets_out
 from armkin.motors import best_pulses, motor_names, outside_travel, pulses, rounding
 
 if TYPE_CHECKING:
@@ -104,19 +105,19 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
     kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
     if question.target is None:
         goal = targets_of(task, fk(arm, question.q)[None], question.q[None, kept])[0]
-        [values] = units.targets_out(task.labels, goal[None])
+        [values] = targets_out(task.labels, goal[None])
     else:
         values = list(question.target)
         if len(values) != len(task.labels):
             raise UsageError(f"target: task {task.name} takes {len(task.labels)} numbers: {' '.join(task.labels)}")
-        goal = units.targets_in(task.labels, [values])[0]
+        goal = targets_in(task.labels, [values])[0]
     request = replace(request, task=task.name)
     [found] = choose.solve(request, goal[None])
     branches = found.branches
     answer: dict[str, Any] = {
         "task": task.name,
         "labels": list(task.labels),
-        "units": units.label_units(task.labels),
+        "units": label_units(task.labels),
         "target": values,
         "status": found.status,
         "method": found.method,

@@ -12,6 +12,7 @@ from armkin.forward import fk
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
+from armkin.model.targets import targets_out
 from armkin.motion.tool_path.path_numbers import check_numbers
 from armkin.robot_file.writing import flow
 from armkin.teach import request_checks
@@ -192,7 +193,7 @@ class Program:
     def _target(self, values: Sequence[float]) -> list[float]:
         q = units.joints_in(self.arm, values)
         task = task_for(self.arm, self.head.get("task"))
-        [target] = units.targets_out(task.labels, targets_of(task, fk(self.arm, q)[None], q[None]))
+        [target] = targets_out(task.labels, targets_of(task, fk(self.arm, q)[None], q[None]))
         return _rounded(target)
 
     def _set_via(self, fields: Mapping[str, Any]) -> None:

@@ -9,6 +9,6 @@ resets_and_stops.py  why a motion ended early, and what the arm still knows
 homing.py          homing by limit switches
 jogging.py         one joint at a constant speed
 gripping.py        the gripper, whose counts are in gripper_counts.py
-resuming.py        resuming a motion after a feed hold
+resume_after_hold.py  a motion goes on after a feed hold
 board_status.py    what `status` tells besides the position, and why a board refused, in words
 """

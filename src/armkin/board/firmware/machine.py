@@ -40,7 +40,7 @@ class Machine(Backend):
     `stop` is asked all the time: when it says yes, the arm is held and StoppedError raised.
     """
 
-    resumable = False  # whether what was held is noted: `armkin.board.resuming`
+    resumable = False  # whether what was held is noted: `armkin.board.firmware.resume_after_hold`
 
     def __init__(
         self, port: Port, arm: Arm, configuration: Configuration, stop: Callable[[], bool] = lambda: False

@@ -1,6 +1,7 @@
 """What a motion ends with when its board resets, stops or refuses: why, where the arm stands, what is lost.
 
-A reset shows as an answer without a session: the session is opened anew, and the board says what it still knows.
+A reset shows as an answer without a session (`wire/session.py` raises it, `Machine.run` asks here): the session is
+opened anew, the board says what it still knows, and nothing of the motion is sent again.
 """
 
 from __future__ import annotations

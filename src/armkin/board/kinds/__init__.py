@@ -1,4 +1,8 @@
-"""The kinds of boards, one file a kind, found by its name: what stands behind `board: {kind: ...}`."""
+"""The kinds of boards, one file a kind, found by its name: what stands behind `board: {kind: ...}`.
+
+A module has KIND, its data (`armkin.board_kinds.ForeignBoard`), and BOARD, its class (`armkin.board.backend.board`);
+boards with armkin's own firmware are rows of `armkin.board_kinds.BOARDS`, and `firmware.py` serves them all.
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.board import Board, Gripped, LostSteps
-from armkin.board.firmware import gripping, homing, jogging, resuming
+from armkin.board.firmware import gripping, homing, jogging, resume_after_hold
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
@@ -131,15 +131,17 @@ class FirmwareBoard(Board):
 
     @contextmanager
     def under_way(
-        self, parts: Sequence[Planned], note: resuming.Note | None
+        self, parts: Sequence[Planned], note: resume_after_hold.Note | None
     ) -> Iterator[tuple[Sequence[Planned], int, Callable[[float], None]]]:
         """The parts to be carried out or, of a resumed motion, what is left of them."""
-        with resuming.under_way(self.machine, [part for part in parts if isinstance(part, Cut)], note) as found:
+        with resume_after_hold.under_way(
+            self.machine, [part for part in parts if isinstance(part, Cut)], note
+        ) as found:
             yield found
 
-    def recall(self) -> resuming.Note:
+    def recall(self) -> resume_after_hold.Note:
         """The note of the motion that was held on this board."""
-        return resuming.recall(self.machine)
+        return resume_after_hold.recall(self.machine)
 
     def ready_to_jog(self, joint: int, rate: float) -> float:
         """Have the motors on; while the position is lost a joint moves at an eighth of its max_speed at most."""

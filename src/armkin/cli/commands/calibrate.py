@@ -11,6 +11,7 @@ from armkin.cli.csv_rows import batch_rows
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
 from armkin.model import units
+from armkin.model.targets import targets_in
 
 if TYPE_CHECKING:
     from armkin.calibration.procedure import Calibration
@@ -74,7 +75,7 @@ def calibrate(
         )
     q, tips = units.joints_in(arm, rows[:, : arm.n]), rows[:, arm.n :]
     if poses:
-        tips = units.targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)
+        tips = targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)
     with output.progress("fits") as tick:
         found = armkin.calibrate(arm, q, tips, fix=kinds, tick=tick)
     if out is not None:

@@ -33,6 +33,7 @@ from armkin.cli.options import (
 from armkin.cli.rows import Chunk, one_row
 from armkin.errors import UsageError
 from armkin.model import units
+from armkin.model.targets import label_units, targets_in, targets_out
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Branch, Closest, Ik
@@ -137,7 +138,7 @@ def ik(
         return
     inputs.one_alone(workers, cluster, resume)
     values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
-    goal = units.targets_in(what.labels, values)
+    goal = targets_in(what.labels, values)
     words = None if reached is not None else [[decimals(word) for word in target or ()]]
     [found] = choose.solve(request, goal, _rounding(arm, what, values, words))
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
@@ -155,14 +156,14 @@ def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float
     from armkin.inverse.tasks.task import targets_of
 
     q = units.joints_in(arm, joints)
-    return units.targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
+    return targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
 
 
 def _rounding(arm: Arm, task: Task, values: Array, shown: list[list[int]] | None = None) -> Array:
     """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with; shown: how many."""
     from armkin.inverse.answers import rounding as target_rounding
 
-    return target_rounding.printed(units.label_units(task.labels), values, arm.reach, shown)
+    return target_rounding.printed(label_units(task.labels), values, arm.reach, shown)
 
 
 @dataclass
@@ -191,7 +192,7 @@ class Questions:
             return self._table_of_objects(chunk)
         from armkin.columns import branches
 
-        targets = units.targets_in(self.task.labels, chunk.values)
+        targets = targets_in(self.task.labels, chunk.values)
         rounding = _rounding(self.request.arm, self.task, chunk.values)
         quick = compiled_ik.nearest if self.request.ik is compiled_ik.ik else None
         numbers = chunk.numbered()
@@ -220,7 +221,7 @@ class Questions:
         most = choose.most_targets(self.request)
         for first in range(0, len(chunk.values), most):
             part = chunk.values[first : first + most]
-            targets = units.targets_in(self.task.labels, part)
+            targets = targets_in(self.task.labels, part)
             found = choose.solve(self.request, targets, _rounding(self.request.arm, self.task, part))
             each = choose.continued(self.request, found) if self.continuous else ((self.request, one) for one in found)
             alone = self.continuous or not with_closest  # each row's `near` is another one

@@ -8,6 +8,7 @@ from armkin.cli import inputs, output, render
 from armkin.cli.options import Json, Out, Robot, Scene, TaskName
 from armkin.errors import UsageError
 from armkin.model import units
+from armkin.model.targets import label_units
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Info, KeepOuts, Solving
@@ -113,7 +114,7 @@ def _task(arm: Arm, name: str | None) -> Solving:
     found: Solving = {
         "task": task.name,
         "target_labels": list(task.labels),
-        "target_units": units.label_units(task.labels),
+        "target_units": label_units(task.labels),
         "solver": None,
         "ik_refuses": None,
     }

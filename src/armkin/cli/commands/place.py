@@ -106,11 +106,11 @@ def _targets(arm: Arm, source: str) -> Array:
 
     from armkin.cli.csv_rows import batch_rows
     from armkin.inverse.tasks.fitting import task_for
-    from armkin.model import units
+    from armkin.model.targets import targets_in
 
     task = task_for(arm)
     rows = [chunk.values for chunk in batch_rows(source, task.labels, f"task {task.name} of {arm.name}")]
-    return units.targets_in(task.labels, np.concatenate(rows))
+    return targets_in(task.labels, np.concatenate(rows))
 
 
 def _answer(found: Place) -> PlacedRobot:

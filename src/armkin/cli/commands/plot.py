@@ -12,6 +12,7 @@ from armkin.cli.numbers import comma_separated
 from armkin.cli.options import Joints, Lock, RobotOrPipe, Scene, TaskName
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
+from armkin.model.targets import label_units, targets_in
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -145,8 +146,8 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
     what = task_for(arm, task)
     values = inputs.target_list(arm, what, text)
     request = choose.Request(arm=arm, task=what.name, held=lock_and_sweep.locks(arm, lock))
-    [answer] = choose.solve(request, units.targets_in(what.labels, [values]))
-    goal = render.labelled(what.labels, values, units.label_units(what.labels))
+    [answer] = choose.solve(request, targets_in(what.labels, [values]))
+    goal = render.labelled(what.labels, values, label_units(what.labels))
     if not answer.branches:
         raise NoSolutionError(f"{arm.name} cannot reach {goal}: there is no branch to draw")
     q = np.array([branch.q for branch in answer.branches])

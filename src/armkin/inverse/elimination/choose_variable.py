@@ -1,5 +1,6 @@
-"""Which pencils solve an arm's poses, one after the other: roles rated on poses of known joints.
+"""Which joint is the variable of the elimination, and which pencils solve an arm's poses, one after the other.
 
+A role says which joint is hidden, the variable, and in which order the others go; roles are rated on known poses.
 Most poses of an arm are alike, and one list of pencils serves them. Where axes 6 and 1 stand parallel or meet, tool up
 or down above all, the usual roles are singular or all but; these poses have a list of their own, with wide roles,
 prepared when the first such pose comes.

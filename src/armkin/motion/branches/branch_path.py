@@ -24,8 +24,9 @@ from armkin.motion.branches.linked_branches import ENDS, linked
 from armkin.motion.branches.windows import detoured
 from armkin.motion.branches.wrist_turn import ASIDE, through_wrists
 from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.curve import Curve
 from armkin.motion.timing.hold_cap import hold_cap
+from armkin.motion.timing.limit_jerk import Smoothed, window
 from armkin.motion.timing.time_optimal import Bounds, finer, optimal
 from armkin.motion.tool_path.route import Route
 from armkin.motors import motor_accel
@@ -207,16 +208,16 @@ def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | Smoo
     """The fastest law of time on a grid, from each rest to the next."""
     cap, fraction = _caps(arm, route, path, pace)
     accel = arm.max_accel * pace.accel
-    window = 0.0
+    mean = 0.0
     if pace.jerk is not None:
-        window = float((2 * accel / pace.jerk).max())
-        cap = np.minimum(cap, _narrow(arm, path, window, pace.tolerance))
+        mean = window(accel, pace.jerk)
+        cap = np.minimum(cap, _narrow(arm, path, mean, pace.tolerance))
     speed = fraction[:, None] * arm.max_speed
     x = optimal(path, Bounds(speed, accel, cap), coupled(arm, pace.accel))
     made: list[Curve | Smoothed] = []
     for a, b in pairwise([0, *(path.rests + 1).tolist(), len(x)]):
         curve = Curve(Knots(path.s[a:b], path.q[a:b], path.d[a:b]), x[a:b])
-        made.append(Smoothed(curve, window) if window else curve)
+        made.append(Smoothed(curve, mean) if mean else curve)
     return made
 
 
@@ -239,16 +240,16 @@ def coupled(arm: Arm, share: float) -> tuple[Array, Array] | None:
     return (np.asarray(arm.motor_gain[shared]), motor_accel(arm)[shared] * share) if len(shared) else None
 
 
-def _narrow(arm: Arm, path: Knots, window: float, tolerance: float) -> Array:
+def _narrow(arm: Arm, path: Knots, mean: float, tolerance: float) -> Array:
     """x at which the moving average shifts the tip by half the tolerance: (N,).
 
-    The average over T shifts q by T^2/24 (q'' x + q' u); the second part is along the path.
+    The average over T, `mean`, shifts q by T^2/24 (q'' x + q' u); the second part is along the path.
     """
     left, right = path.second()
     bend = np.concatenate([left[:1], (left[1:] + right[:-1]) / 2, right[-1:]])
     J = np.asarray(jacobian(arm, path.q)[:, :3])
     shift = np.linalg.norm((J @ bend[:, :, None])[..., 0], axis=1)
-    return np.asarray(12 * tolerance / window**2 / np.maximum(shift, 1e-12))
+    return np.asarray(12 * tolerance / mean**2 / np.maximum(shift, 1e-12))
 
 
 def _apart(s: Array, least: float) -> Array:

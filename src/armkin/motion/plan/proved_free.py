@@ -17,7 +17,8 @@ from armkin.keep_out.proof import hit_samples as find_hits
 from armkin.keep_out.way import Cubics, Way
 from armkin.model import units
 from armkin.model.lock import unlock
-from armkin.motion.timing.curve import Curve, Smoothed
+from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.limit_jerk import Smoothed
 from armkin.motion.timing.profile import trapezoid
 from armkin.motion.timing.trajectory import Straight, Stretch, Trajectory
 

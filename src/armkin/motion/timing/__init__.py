@@ -4,5 +4,5 @@ profile.py         of a straight move: speed up, cruise, slow down, with or with
 time_optimal.py    of a curved one, the fastest; speed_bounds.py: what bounds it; cubics.py: on a way of cubics
 scan.py            passes along it, forwards and backwards
 hold_cap.py        how fast it may be so that it can be held on its way
-trajectory.py      what boards take: stretches from rest to rest; curve.py: a curved one
+trajectory.py      what boards take: stretches from rest to rest; curve.py: a curved one; limit_jerk.py: made smooth
 """

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.model import units
+from armkin.model.targets import targets_in
 from armkin.motion.tool_path import path_numbers
 from armkin.motion.tool_path.b_spline import Int
 from armkin.motion.tool_path.chords import distinct, turns
@@ -101,7 +101,7 @@ class _Spots:
         full = np.flatnonzero([False, *(len(row) > task.position for row in rows)])
         p = np.array([first.p, *((row[: task.position] for row in rows) if len(full) else rows)], dtype=float)
         since = np.searchsorted(full, np.arange(N), side="right")  # 0: as at first
-        given = units.targets_in(labels, [list(rows[k - 1]) for k in full]) if len(full) else None
+        given = targets_in(labels, [list(rows[k - 1]) for k in full]) if len(full) else None
         k = len(task.sums)
         sums = np.zeros((len(full), k)) if given is None or not k else given[:, task.position : task.position + k]
         turned = None

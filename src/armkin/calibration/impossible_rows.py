@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.calibration.fit import Measured
+from armkin.calibration.robust_fit import Measured
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
