@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from left_to_python import left_to_python
 
 import armkin
 from armkin.compiled import toolchain
-from armkin.inverse import solve as solving
 from armkin.inverse.elimination import method
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
@@ -323,19 +323,6 @@ def test_workers_are_a_whole_number_for_one_target_too(workers: object) -> None:
         for goal in (target, np.tile(target, (40_000, 1))):
             with pytest.raises(armkin.UsageError, match="thread"):
                 solve(arm, goal, workers=workers)  # type: ignore[arg-type]
-
-
-def left_to_python(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many targets Python is asked, call by call, from now on."""
-    asked: list[int] = []
-    answered = solving.answered
-
-    def counted(arm: armkin.Arm, task: Any, geometry: Any, targets: np.ndarray, *more: Any) -> armkin.Solutions:
-        asked.append(len(targets))
-        return answered(arm, task, geometry, targets, *more)
-
-    monkeypatch.setattr(solving, "answered", counted)
-    return asked
 
 
 @pytest.mark.parametrize("robot", ["xarm6", "jaco_j2n6s300"])

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
+from left_to_python import left_to_python
 
 import armkin
-from armkin.inverse import solve
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 
@@ -30,14 +28,7 @@ def test_merging_branches_are_told_without_python(name: str, monkeypatch: pytest
     arm = armkin.load(name)
     fast, target = armkin.compile(arm), beside_folds(arm)
     expected = armkin.ik(arm, target)
-    left: list[int] = []
-    whole = solve.answered
-
-    def counted(arm: armkin.Arm, task: Any, geometry: Any, targets: Any, *rest: Any) -> armkin.Solutions:
-        left.append(len(targets))
-        return whole(arm, task, geometry, targets, *rest)
-
-    monkeypatch.setattr(solve, "answered", counted)
+    left = left_to_python(monkeypatch)
     found = fast.ik(target)
     assert sum(left) < COUNT / 4
     assert {0, 1} <= set(found.status.tolist())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 
@@ -107,10 +107,10 @@ def test_reach_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("more", [(), ("--compiled",)])
 def test_a_workspace_is_the_same_bytes_wherever_it_is_sampled(
-    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
+    address: str, tmp_path: Path, more: tuple[str, ...], sample: Callable[[int, int], int]
 ) -> None:
     one, two = tmp_path / "one.npz", tmp_path / "two.npz"
-    words = ("workspace", "three_dof", "--samples", 70_000, *more, "--json")
+    words = ("workspace", "three_dof", "--samples", sample(150_000, 70_000), *more, "--json")
     alone = run(*words, "--out", one).json
     spread = run(*words, "--out", two, "--cluster", address).json
     pool = run(*words, "--workers", 2).json if not more else alone

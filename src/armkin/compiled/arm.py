@@ -48,9 +48,9 @@ UNREAD = 2  # state of a target that must be read (made a rotation, refused) fir
 def compile(arm: Arm) -> CompiledArm:
     """An arm whose `fk` and `ik` run as machine code, built now by the system's C compiler and kept for later.
 
-    The results are those of `armkin.fk` and `armkin.ik`, to rounding; targets on an edge (singular postures,
-    merging branches) and classes without a form in C are solved by `armkin.ik` itself. Raises MissingExtraError
-    without a C compiler.
+    The results are those of `armkin.fk` and `armkin.ik`, to rounding; targets on an edge that C does not tell (singular
+    postures, roots in doubt) and classes without a form in C are solved by `armkin.ik` itself. Raises
+    MissingExtraError without a C compiler.
 
     >>> import armkin
     >>> fast = armkin.compile(armkin.load("robots/three_dof.yaml"))
@@ -300,7 +300,7 @@ class _CompiledTask:
         for some, geometry in ((rows[sure], self._in_c and self._in_c.geometry), (rows[~sure], self.geometry)):
             if len(some) and geometry:
                 close, off = near[some] if len(near) > 1 else near[0], None if rounding is None else rounding[some]
-                out.write(some, solve.answered(self.arm, self.task, geometry, target[some], close, False, True, 1, off))
+                out.write(some, solve.answered(self.arm, self.task, geometry, target[some], close, rounding=off))
 
     def _place(self, out: Results, target: Array) -> None:
         """Branches that C has found in the order and with the indices of the class that they are named after."""

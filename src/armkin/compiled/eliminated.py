@@ -19,9 +19,7 @@ from armkin.inverse.solvers.nearly_special import named
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
 
-SETTLED = (
-    2  # what `arm_rows` says of a target is below this where its branches are all, and isolated: parts/candidates.c
-)
+SETTLED = 2  # what `arm_rows` says is less where a target's branches are all, and isolated: export/c/parts/candidates.c
 
 
 class InC:

@@ -104,10 +104,10 @@ def answered(
     geometry: Geometry,
     values: Array,
     near: ArrayLike | None,
-    single: bool,
-    examine: bool,
-    workers: int,
-    rounding: ArrayLike | None,
+    single: bool = False,
+    examine: bool = True,
+    workers: int = 1,
+    rounding: ArrayLike | None = None,
 ) -> Solutions:
     """`ik` by a solver, of an arm whose joints move as they are commanded; single: whether the targets were given in
     float32."""

@@ -210,7 +210,7 @@ def places(of: Boundaries, target: Array) -> Places:
     return Places(out, np.asarray(found.decided.reshape(F, S).all(axis=0)))
 
 
-def beside(at: Array) -> Array:
+def on_both_sides(at: Array) -> Array:
     """Samples on both sides of places (S, V) of a turn: (S, 2 V), inf where there is none."""
     real = np.isfinite(at)
     count = real.sum(axis=1)

@@ -27,7 +27,7 @@ from armkin.inverse.redundant.arcs import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
 from armkin.inverse.redundant.followed import SAMPLES, Followed
-from armkin.inverse.redundant.follower import Follower, Ik, by_formula
+from armkin.inverse.redundant.follower import Follower, Ik
 from armkin.inverse.redundant.pieces import Curves, Pieces, golden_section, motion
 from armkin.inverse.redundant.traced import Traced
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
@@ -137,12 +137,11 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     if free.still:
         why = f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: "
         return f"families of {joint}", why + free.geometry.why, free.geometry.complete
-    true = actual(arm)
-    closed = bool(free.joint) and (arm_angle(true) is not None or (by_formula(free) and boundaries(true) is not None))
-    if closed and arm_angle(true) is not None:
-        how = "in closed form by the arm angle"
-    elif closed:
-        how = f"{free.geometry.name}, between all values of it where a limit or a merging may be"
+    true, complete = actual(arm), False
+    if free.joint and arm_angle(true) is not None:
+        how, complete = "in closed form by the arm angle", True
+    elif free.joint and free.by_formula and boundaries(true) is not None:
+        how, complete = f"{free.geometry.name}, between all values of it where a limit or a merging may be", True
     elif free.labelled:
         how = f"{free.geometry.name}, at {SAMPLES} values of it"
     else:
@@ -150,7 +149,7 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     return (
         f"families of {joint}",
         f"{joint} is redundant: ik lists the intervals of its values; the others: {how}",
-        closed,
+        complete,
     )
 
 

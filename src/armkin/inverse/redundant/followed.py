@@ -36,7 +36,7 @@ class Followed(NamedTuple):
         """Of some targets; in two ways: those of which all places are known where something changes, and others."""
         N = len(find.target)
         curves = cls(find, none(find.arm.n), np.zeros(N, bool), np.zeros(N, bool))
-        of = boundaries(find.arm) if find.by_formula and find.free.joint == find.arm.n - 1 else None
+        of = boundaries(find.arm) if find.free.by_formula and find.free.joint == find.arm.n - 1 else None
         left = np.ones(N, bool)
         if of is not None:
             at, known = places(of, find.target)
@@ -55,8 +55,7 @@ class Followed(NamedTuple):
 
     def _with(self, rows: Int, pieces: Pieces, number: Int, short: Bool, complete: bool) -> Followed:
         """Those of targets rows as well; number: of the pieces' targets, in rows."""
-        for out, value in ((self.short, short), (self.complete, complete)):
-            out[rows] = value
+        self.short[rows], self.complete[rows] = short, complete
         new = pieces._replace(row=rows[number[pieces.row]])
         both = Pieces(*(np.concatenate(pair) for pair in zip(self.pieces, new, strict=True)))
         return self._replace(pieces=both)

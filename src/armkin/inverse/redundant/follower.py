@@ -77,11 +77,6 @@ def over_a_turn(count: int) -> Array:
     return np.asarray(-np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count))
 
 
-def by_formula(free: Redundancy) -> bool:
-    """Whether the others have a closed form that needs no more than its recorded formula."""
-    return free.labelled and free.geometry.doubts is None
-
-
 class Follower(NamedTuple):
     """Answers of some targets (N, ...) at any value of the redundant joint; near: (N, n)."""
 
@@ -98,7 +93,7 @@ class Follower(NamedTuple):
     def found(self, rows: NDArray[np.intp], t: Array) -> Array:
         """Branches (M, B, n) of targets (M,) at values t (M,), each in the column of its index, nan where there is
         none."""
-        if self.by_formula:
+        if self.free.by_formula:
             q, missed = self._by_formula(rows, t)
             np.copyto(q, np.nan, where=~(missed <= ACCEPTED**2)[..., None])
             return q
@@ -110,11 +105,6 @@ class Follower(NamedTuple):
         place = np.arange(M)[:, None], np.where(number < 0, B, number)
         out[*place, :r], out[*place, r], out[*place, r + 1 :] = s.q[:, :, :r], t[:, None], s.q[:, :, r:]
         return out[:, : max(B, 1)]  # a column, where no target of them has an answer
-
-    @property
-    def by_formula(self) -> bool:
-        """As the function."""
-        return by_formula(self.free)
 
     def _by_formula(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
         """The candidates of a closed form (M, B, n), real or not, one joint after another in memory; what they miss,
@@ -154,7 +144,7 @@ class Follower(NamedTuple):
         """Some of the targets (S,) at all of t (K,) and, of a closed form, at more values (S, M), inf where there are
         fewer, or between those at which more may happen."""
         rows, values = np.repeat(some, len(t)), np.tile(t, len(some))
-        if not self.by_formula:
+        if not self.free.by_formula:
             q = self.found(rows, values)
             columns, missed = list(q.T), np.where(np.isnan(q[..., 0].T), np.inf, 0.0)
             return self._within(some, np.tile(t, (len(some), 1)), columns, missed, q.shape[1:2])
@@ -198,7 +188,7 @@ class Follower(NamedTuple):
 
     def own(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Array:
         """One branch each (M, n), as `found`."""
-        if not self.by_formula:
+        if not self.free.by_formula:
             return np.asarray(self.found(rows, t)[np.arange(len(rows)), branch])
         *columns, miss, _ = self._candidates(rows, t, [])
         place = np.unravel_index(branch, _recorded(self.arm, self.free)[1])

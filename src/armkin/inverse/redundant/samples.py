@@ -12,7 +12,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric.tolerances import REACH
-from armkin.inverse.redundant.boundaries import beside as beside_all
+from armkin.inverse.redundant.boundaries import on_both_sides
 from armkin.inverse.redundant.pieces import Int, best_samples, holding_none, runs, turning
 
 if TYPE_CHECKING:
@@ -109,12 +109,12 @@ def seen(find: Follower, t: Array, known: Array | None = None) -> Seen:
     """What samples of all targets along t (K,) show, and others between them; known: all places where something may
     change (N, V), with samples beside each."""
     N = len(find.target)
-    each = max(AT_A_TIME // len(t), 1) if find.by_formula else max(N, 1)
+    each = max(AT_A_TIME // len(t), 1) if find.free.by_formula else max(N, 1)
     some = (np.arange(k, min(k + each, N)) for k in range(0, max(N, 1), each))
     if known is None:
         found: Seen = _together([_seen(find.sampled(rows, t), rows, False) for rows in some])
     else:
-        more = beside_all(known)
+        more = on_both_sides(known)
         found = _together([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in some])
     return found
 

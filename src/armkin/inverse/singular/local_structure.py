@@ -133,15 +133,7 @@ def ended(at: Structure) -> Bool:
 
 
 def _follow(
-    arm: Arm,
-    task: Task,
-    q: Array,
-    target: Array,
-    U: Array,
-    V: Array,
-    w: Array,
-    out: Structure,
-    rows: NDArray[np.intp],
+    arm: Arm, task: Task, q: Array, target: Array, U: Array, V: Array, w: Array, out: Structure, rows: NDArray[np.intp]
 ) -> Bool:
     """Follow the curves of some postures as far as their spans, and write what those tell that stay at hand (m,)."""
     n = q.shape[1]

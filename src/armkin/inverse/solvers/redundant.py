@@ -42,6 +42,11 @@ class Redundancy(NamedTuple):
         """Whether a branch keeps its index along the turn, as that of a closed form does."""
         return self.geometry.ordered and self.geometry.pairs is not None
 
+    @property
+    def by_formula(self) -> bool:
+        """Whether the others have a closed form that needs no more than its recorded formula."""
+        return self.labelled and self.geometry.doubts is None
+
 
 @lru_cache(maxsize=64)
 def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:

@@ -22,7 +22,7 @@ from armkin.motion.branches.grid import fine_enough
 from armkin.motion.branches.joint_steps import change
 from armkin.motion.branches.linked_branches import ENDS, linked
 from armkin.motion.branches.windows import detoured
-from armkin.motion.branches.wrist_turn import ASIDE, through_wrists
+from armkin.motion.branches.wrist_turn import ASIDE, has_wrist, through_wrists
 from armkin.motion.timing.cubics import Knots
 from armkin.motion.timing.curve import Curve
 from armkin.motion.timing.hold_cap import hold_cap
@@ -111,7 +111,7 @@ def carry(
     columns = linked(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
     all_ = chains(arm, columns)
     all_ = through_boundaries(arm, columns, all_, fixed, tolerance)
-    if route.task.orientation == "full" and arm.n == 6 and not arm.prismatic.any():
+    if route.task.orientation == "full" and has_wrist(arm):
         aside = 0.0 if len(route.given[0]) else ASIDE * tolerance  # a curve of points has little tolerance left
         all_ = through_wrists(arm, route, columns, all_, pace.turn, aside)
     starts = [c for c in all_ if c.first == 0]

@@ -1,4 +1,4 @@
-"""Straight through or beside a wrist singularity: the tip stays on the path, the tool may be turned a little.
+"""Straight through a wrist singularity or beside one, the tool turned a little or the tip a little aside.
 
 Beside a singularity of the wrist joint 4 has to swing round within a distance as short as the path's own from it.
 Over a window about that place the last three joints are cubics instead, from the posture before it to the one behind
@@ -42,9 +42,14 @@ _LEAST = 1e-8  # [1/mm] what a millimetre counts beside a radian, where the tool
 _STEPS = 8  # of Newton's method to a straight wrist
 
 
+def has_wrist(arm: Arm) -> bool:
+    """Whether the last three joints can be taken for a wrist: of six that all turn."""
+    return arm.n == 6 and not arm.prismatic.any()
+
+
 def check(arm: Arm) -> None:
     """Raise UsageError for an arm whose last three joints are no wrist."""
-    if arm.n != 6 or arm.prismatic.any():
+    if not has_wrist(arm):
         raise UsageError(
             f"turn_tolerance is for arms with six joints that turn, the last three a wrist; {arm.name} has "
             f"{arm.n}{' that do not all turn' if arm.n == 6 else ''}: leave it out"

@@ -1,0 +1,26 @@
+"""How many targets machine code leaves to Python."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.inverse import solve
+
+
+def left_to_python(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many targets Python is asked, call by call, from now on."""
+    asked: list[int] = []
+    answered = solve.answered
+
+    def counted(
+        arm: armkin.Arm, task: Any, geometry: Any, targets: np.ndarray, *rest: Any, **named: Any
+    ) -> armkin.Solutions:
+        asked.append(len(targets))
+        return answered(arm, task, geometry, targets, *rest, **named)
+
+    monkeypatch.setattr(solve, "answered", counted)
+    return asked
