@@ -14,6 +14,7 @@ from truth import Array, Bool
 
 import armkin
 from armkin import Status
+from armkin.inverse.singular import curves
 from armkin.inverse.solvers.recognise import solver
 
 STEP = 0.08  # [rad]
@@ -86,3 +87,22 @@ def test_of_a_self_motion_with_two_ends_the_posture_nearest_to_near_is_listed(de
     off = np.abs(np.angle(np.exp(1j * (s.q[s.valid] - q)))).max(axis=1)
     assert off.min() < 1e-6  # nearer to home than the other root of the same component
     assert (off < 0.25).sum() == 1
+
+
+@pytest.mark.parametrize(
+    "degrees",
+    [
+        [14.0165, -163.0765, 92.9008, 0.8236, 144.8238, 174.8718],
+        [-158.4874, 34.3149, 92.7826, -45.7371, -178.5694, -142.5717],
+        [166.1973, -7.3876, 92.6929, -36.8677, -171.277, -30.1079],
+    ],
+)
+def test_a_self_motion_on_which_the_residual_grows_is_known_from_end_to_end(
+    degrees: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Up to 2 rad long: no polynomial holds as far, and each walk to the other roots of its target took 15 to 45 ms."""
+    arm = armkin.load("puma560")
+    monkeypatch.delattr(curves.Curves, "step")  # nobody walks
+    s = armkin.ik(arm, armkin.fk(arm, np.radians(degrees)))
+    assert s.status == armkin.Status.SINGULAR
+    assert s.valid.sum() == 4

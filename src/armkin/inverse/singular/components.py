@@ -33,8 +33,8 @@ from armkin.inverse.numeric.tolerances import (
     SOLUTION,
     TURNED,
 )
-from armkin.inverse.singular import circuits, meetings, roots, self_motions
-from armkin.inverse.singular.local_structure import beyond_folds, ended, local_structure, members
+from armkin.inverse.singular import chains, circuits, meetings, roots, self_motions
+from armkin.inverse.singular.local_structure import beyond_folds, local_structure
 
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 FEW = 24  # candidates of a target that are compared all with all
@@ -246,9 +246,8 @@ class _Groups:
             at = local_structure(arm, task, q[i, c], target[i])
             self.known[i, c], self.moves[i, c], self.which[i, c] = at.known, at.manifold, at.joints
             self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
-            self.ended[i, c] = ended(at)
-            ways = newton.difference(arm, q[i], q[i, c][:, None])
-            self.component = np.concatenate([self.component, members(at, np.arange(len(i)), ways)])
+            on, self.ended[i, c] = chains.whole(arm, task, at, q[i, c], q[i], target[i])
+            self.component = np.concatenate([self.component, on])
         rest = ~self.known[k, b] & ~self.rests[k, b] & (self.lost.sigma[k, b] < MOVING)
         if rest.any():
             k, b = k[rest], b[rest]

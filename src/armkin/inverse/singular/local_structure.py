@@ -43,7 +43,6 @@ NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev's, 
 ITERATIONS = 8  # Newton steps onto the curve
 SHRINK = 8  # a curve that turns away within a span is asked for a span so many times shorter,
 SHRINKS = 3  # as often as this
-DOUBLED = 3  # times that a span is, of a manifold with ends
 STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
@@ -84,20 +83,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
     M, n = q.shape
     r, J = newton.scaled(arm, task, q, target)
     U, S, V = np.linalg.svd(J)
-    rows, lost = J.shape[1], J.shape[1] - n + 1  # with fewer joints than numbers more directions are out of reach
-    out = Structure(
-        known=np.zeros(M, bool),
-        manifold=np.zeros(M, bool),
-        boundary=np.zeros(M, bool),
-        joints=np.zeros((M, n), bool),
-        low=np.zeros(M),
-        high=np.zeros(M),
-        span=1.2 * REACH / np.abs(V[:, -1]).max(axis=1),
-        v=V[:, -1],
-        second=S[:, n - 2] if n > 1 else np.ones(M),
-        x=np.zeros((NODES, M, n)),
-        g=np.zeros((NODES, M, max(lost, 1))),
-    )
+    rows, out = J.shape[1], _unknown(J, S, V)
     if rows < n:
         return out
     w, whole, short = np.zeros((M, n)), out.span.copy(), np.zeros(M, bool)
@@ -116,20 +102,48 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
         left = left[~out.known[left] & (out.second[left] > HIGH) & (short[left] | ~on)]
         out.span[left] = np.where(short[left], whole[left], out.span[left] / SHRINK)
         short[left], w[left] = False, 0.0
-    # a manifold on which the residual grows has ends
-    size = np.linalg.norm(np.abs(out.g).sum(axis=0), axis=1)
-    left = np.flatnonzero(out.manifold & ~ended(out) & (size > CLOSED) & (out.second > HIGH))
-    for _ in range(DOUBLED if len(left) else 0):
-        out.span[left] *= 2.0
-        on = _follow(arm, task, q, target, U, V, w, out, left)
-        out.span[left[~on]] /= 2.0
-        left = left[on & ~ended(out)[left]]
     return out
 
 
-def ended(at: Structure) -> Bool:
-    """Of which components (M,) both ends are known: all that is on them is one of their `members`."""
-    return np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
+def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array) -> Structure:
+    """The curves through postures (M, n) as far as span (M,): known are those that stay at hand."""
+    _, J = newton.scaled(arm, task, q, target)
+    U, S, V = np.linalg.svd(J)
+    out = _unknown(J, S, V)
+    out.span[...] = span
+    out.known[...] = _follow(arm, task, q, target, U, V, np.zeros(q.shape), out, np.arange(len(q)))
+    return out
+
+
+def _unknown(J: Array, S: Array, V: Array) -> Structure:
+    """What Jacobians (M, rows, n) alone tell of their postures; S, V: singular values and right vectors."""
+    M, rows, n = J.shape
+    lost = rows - n + 1  # with fewer joints than numbers more directions are out of reach
+    return Structure(
+        known=np.zeros(M, bool),
+        manifold=np.zeros(M, bool),
+        boundary=np.zeros(M, bool),
+        joints=np.zeros((M, n), bool),
+        low=np.zeros(M),
+        high=np.zeros(M),
+        span=1.2 * REACH / np.abs(V[:, -1]).max(axis=1),
+        v=V[:, -1],
+        second=S[:, n - 2] if n > 1 else np.ones(M),
+        x=np.zeros((NODES, M, n)),
+        g=np.zeros((NODES, M, max(lost, 1))),
+    )
+
+
+def leaves(arm: Arm, at: Structure, rows: NDArray[np.intp], q: Array, ahead: Array) -> tuple[Array, Array]:
+    """Where curves through q (m, n), those of rows (m,), leave their spans, and the way there, (m, n).
+
+    ahead: (m, n) which way they are followed. nan where a curve comes to an end before.
+    """
+    way = np.sign((at.v[rows] * ahead).sum(axis=1))
+    end = np.where(way > 0.0, at.high[rows], -at.low[rows])
+    x = _values(at.x[:, rows], np.multiply.outer([0.9, 1.0], way))
+    open_ = (end >= at.span[rows])[:, None]
+    return np.where(open_, q + x[1] * radian_or_reach(arm), np.nan), x[1] - x[0]
 
 
 def _follow(

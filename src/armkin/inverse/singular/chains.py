@@ -1,0 +1,58 @@
+"""Self-motions longer than one polynomial holds: chains of these, each begun where the one before leaves its span.
+
+A manifold on which the residual grows has two ends, where that passes `SOLUTION`. What lies between is known to be on
+it, and nothing else is.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import CLOSED, HIGH
+from armkin.inverse.singular.local_structure import Structure, leaves, members, stretch
+from armkin.inverse.tasks.task import Task
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+LINKS = 12  # curves on each side of a posture, twice as long each time, or half where one fails
+
+
+def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool]:
+    """Which postures others (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
+
+    Those on which the residual grows are followed both ways until they end, or close.
+    """
+    rows = np.arange(len(q))
+    inside = members(at, rows, newton.difference(arm, others, q[:, None]))
+    ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
+    grown = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
+    left = np.flatnonzero(at.known & at.manifold & ~ended & (grown > CLOSED) & (at.second > HIGH))
+    if not len(left):
+        return inside, ended
+    who, span = np.tile(left, 2), 2.0 * np.tile(at.span[left], 2)
+    start, ahead = leaves(arm, at, who, q[who], np.concatenate([at.v[left], -at.v[left]]))
+    done = np.isnan(start[:, 0])
+    going = np.flatnonzero(~done)
+    for _ in range(LINKS):
+        if not len(going):
+            break
+        own, last, way, rows = who[going], start[going], ahead[going], np.arange(len(going))
+        link = stretch(arm, task, last, target[own], span[going])
+        good = link.known & (link.second > HIGH)
+        span[going] *= np.where(good, 2.0, 0.5)
+        # `q` itself comes again, ahead, on a curve that closes
+        apart = newton.difference(arm, np.concatenate([others[own], q[own, None]], axis=1), last[:, None])
+        on = members(link, rows, apart) & good[:, None]
+        np.logical_or.at(inside, own, on[:, :-1])
+        home = on[:, -1] & ((apart[:, -1] * link.v).sum(axis=1) * (way * link.v).sum(axis=1) > 0.0)
+        there, onwards = leaves(arm, link, rows, last, way)
+        start[going[good]], ahead[going[good]] = there[good], onwards[good]
+        done[going] = good & (home | np.isnan(there[:, 0]))
+        going = going[~done[going]]
+    ended[left] = done.reshape(2, -1).all(axis=0)
+    return inside, ended
