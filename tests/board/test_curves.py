@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import armkin
 from armkin.board.backend.job import braking
+from armkin.board.firmware.segments import curves
 from armkin.board.firmware.segments.counts_to_segments import cycles_of
 from armkin.board.firmware.segments.trajectory_to_counts import cut
 from armkin.board.kinds import board_of
 from armkin.board.path_run import follow, parts
 from armkin.board.sim.queue import intervals
+from armkin.formula.arrays import Array
 from armkin.motion.timing.curve import Curve
 
 
@@ -86,3 +90,28 @@ def test_segments_follow_the_plan_in_time_and_place() -> None:
         # What the whole counts at both ends are off is left behind soon; then a segment ends where the motors are.
         assert np.abs(place - exact).max() < (0.15 if 0.3 < t < stretch.duration - 0.3 else 1.0)
     assert np.round(place).tolist() == move.end.tolist() == move.start.tolist()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_chords_that_may_be_long_are_told_without_a_look(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An arm whose joints might move the tip by a kilometre has every sample looked at: the segments are the same."""
+    arm = armkin.load("three_dof")
+    plan = armkin.path(arm, some_path(seed), tool_speed=20)
+    looked: list[int] = []
+    at = armkin.pulses(arm, plan.motion.start)
+
+    def counted(arm: armkin.Arm, q: Array) -> Array:
+        looked.append(len(q))
+        return armkin.jacobian(arm, q)
+
+    monkeypatch.setattr(curves, "jacobian", counted)
+
+    def bounds(arm: armkin.Arm) -> list[float]:
+        ways = [s for s in plan.motion.stretches if isinstance(s, Curve)]
+        parts = [curves.CurveSegments(arm, s, at, at, 16_000_000, 576, 0.05) for s in ways]
+        return [t for part in parts for t in part.bounds().tolist()]
+
+    found, few = bounds(arm), sum(looked)
+    looked.clear()
+    assert bounds(replace(arm, reach=1e6)) == found
+    assert few < 0.7 * sum(looked)

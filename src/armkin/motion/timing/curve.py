@@ -31,6 +31,13 @@ class Curve:
     def _u(self) -> Array:
         return np.asarray(np.diff(self.x) / (2 * self.path.h))
 
+    @cached_property
+    def _bends(self) -> tuple[Array, Array]:
+        """The cubics' coefficients of the second and third power: (N - 1, n) each."""
+        h, d0, d1 = self.path.h[:, None], self.path.d[:-1], self.path.d[1:]
+        chord = np.diff(self.path.q, axis=0) / h
+        return (3 * chord - 2 * d0 - d1) / h, (d0 + d1 - 2 * chord) / h**2
+
     @property
     def duration(self) -> float:
         """Seconds."""
@@ -67,12 +74,10 @@ class Curve:
     def at(self, t: Array, order: int = 0) -> Array:
         """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
         i, along, v, u = self.place(np.asarray(t, dtype=float))
-        h, w = self.path.h[i][:, None], along[:, None]
-        d0, d1 = self.path.d[i], self.path.d[i + 1]
-        chord = (self.path.q[i + 1] - self.path.q[i]) / h
-        c2, c3 = (3 * chord - 2 * d0 - d1) / h, (d0 + d1 - 2 * chord) / h**2
+        w, c2, c3 = along[:, None], *(part.take(i, axis=0) for part in self._bends)
+        d0 = self.path.d.take(i, axis=0)
         if order == 0:
-            return np.asarray(self.path.q[i] + w * (d0 + w * (c2 + w * c3)))
+            return np.asarray(self.path.q.take(i, axis=0) + w * (d0 + w * (c2 + w * c3)))
         first = d0 + w * (2 * c2 + 3 * w * c3)
         if order == 1:
             return np.asarray(first * v[:, None])

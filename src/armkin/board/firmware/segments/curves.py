@@ -168,14 +168,22 @@ class CurveSegments:
         return out
 
     def _spans(self, t: Array) -> tuple[Array, Array]:
-        """At times t: how long a chord may be [s], and the time to a stop [s] of the motor that needs longest."""
-        q, qd = self.stretch.at(t), self.stretch.at(t, 1)
-        J = jacobian(self.arm, q)[:, :3]
-        v, bend = ((J @ x[:, :, None])[..., 0] for x in (qd, self.stretch.at(t, 2)))
+        """At times t: how long a chord may be [s], and the time to a stop [s] of the motor that needs longest.
+
+        A chord that may be longer than any segment, with joints that bear on the tip no more than the arm's reach
+        lets them, is not looked at more closely: it may be of any length.
+        """
+        arm, qd, qdd = self.arm, self.stretch.at(t, 1), self.stretch.at(t, 2)
+        stop = (np.abs(qd @ arm.motor_gain.T) / motor_accel(arm)).max(axis=1)
+        lever = np.abs(arm.ratio) * np.where(arm.prismatic, 1.0, arm.reach)
+        tight = np.flatnonzero(np.abs(qdd) @ lever > 8 * self.tolerance / _MOST**2)
+        J = jacobian(arm, self.stretch.at(t[tight]))[:, :3]
+        v, bend = ((J @ x[tight, :, None])[..., 0] for x in (qd, qdd))
         along = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9)
         across = np.linalg.norm(bend - along * (along * bend).sum(axis=1, keepdims=True), axis=1)
-        stop = (np.abs(qd @ self.arm.motor_gain.T) / motor_accel(self.arm)).max(axis=1)
-        return np.sqrt(8 * self.tolerance / np.maximum(across, 1e-9)), stop
+        span = np.full(len(t), np.inf)
+        span[tight] = np.sqrt(8 * self.tolerance / np.maximum(across, 1e-9))
+        return span, stop
 
 
 def _reaching(stop: Array, step: float) -> Array:
@@ -185,6 +193,8 @@ def _reaching(stop: Array, step: float) -> Array:
     """
     need = stop / _QUEUED
     out = need.copy()
+    if float(need.max(initial=0.0)) <= _LEAST:  # no segment is shorter
+        return out
     for d in range(1, min(int(stop.max(initial=0.0) / step) + 1, len(stop))):
         out[d:] = np.maximum(out[d:], np.where(stop[:-d] >= d * step, need[:-d], 0.0))
     return out
