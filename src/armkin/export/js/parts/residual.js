@@ -1,7 +1,7 @@
 const REGULAR = 1e-5; // singular value from which on a Jacobian is inverted
 
 /** @type {number[]} */
-const left = []; // as `residual` leaves it, until the next one
+const residualNumbers = []; // as `residual` leaves them, until the next one
 
 /**
  * What joint values miss of a target: lengths in reaches, angles in rad. The array is the same each time.
@@ -10,7 +10,7 @@ const left = []; // as `residual` leaves it, until the next one
 function residual(q, goal) {
   poseOf(q, pose16);
   const T = pose16;
-  const out = left;
+  const out = residualNumbers;
   out.length = 0;
   const first = ARM.orientation === 'full' ? 9 : 0;
   for (let i = 0; i < ARM.position; i++) out.push((goal[first + i] - T[4 * i + 3]) / ARM.reach);
