@@ -48,7 +48,11 @@ class Window:
         goal = route.targets(s)[:, :3, 3]
         for _ in range(_STEPS):
             miss = goal - position(arm, q)
-            step = np.linalg.solve(np.asarray(jacobian(arm, q))[:, :3, :3], miss[:, :, None])[..., 0]
+            J = np.asarray(jacobian(arm, q))[:, :3, :3]
+            try:
+                step = np.linalg.solve(J, miss[:, :, None])[..., 0]
+            except np.linalg.LinAlgError:  # the first three joints are exactly singular somewhere
+                step = (np.linalg.pinv(J) @ miss[:, :, None])[..., 0]
             size = np.abs(step).max(axis=1, initial=1e-300, keepdims=True)
             q[:, :3] += np.minimum(_LONGEST / size, 1.0) * step
             if size.max(initial=0.0) < 1e-13:
