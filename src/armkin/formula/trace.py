@@ -102,7 +102,7 @@ class StraightLineCode:
         numbers = self.numbers()
         outputs = zip(*(numbers(*one) for one in inputs), strict=True)
         return [
-            np.moveaxis(np.array(values).reshape(len(inputs), *axes), 0, -1)
+            np.array(values).reshape(len(inputs), -1).T.reshape(*axes, len(inputs))
             for axes, values in zip(self.axes(), outputs, strict=True)
         ]
 

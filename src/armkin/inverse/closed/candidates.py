@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -216,8 +215,10 @@ def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
 def as_rows(values: Sequence[ArrayLike], count: int) -> Array:
     """Entries on branch axes (b0, b1, b2, N) as rows (N, B, entries)."""
     shape = np.broadcast_shapes((1, 1, 1, count), *(np.shape(v) for v in values))
-    rows = [np.broadcast_to(v, shape).reshape(math.prod(shape[:-1]), count).T for v in values]
-    return np.stack(rows, axis=2).astype(float)
+    out = np.empty((*shape, len(values)))
+    for k, value in enumerate(values):
+        out[..., k] = value
+    return out.reshape(-1, count, len(values)).swapaxes(0, 1).copy()
 
 
 @lru_cache(maxsize=256)

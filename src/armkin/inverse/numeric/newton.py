@@ -132,40 +132,69 @@ def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Ar
 def null_space_of(arm: Arm, task: Task, J: Array) -> tuple[Array, Array, NDArray[np.int64]]:
     """The same of Jacobians J (M, r, n)."""
     _, S, Vt = np.linalg.svd(J, full_matrices=True)
-    full = np.zeros((len(J), arm.n))
+    sigma, nullity = _smallest(arm, task, S)
+    return sigma, Vt, nullity
+
+
+def _smallest(arm: Arm, task: Task, S: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Of singular values (M, k) the one that decides (M,), and how many directions are lost (M,)."""
+    full = np.zeros((len(S), arm.n))
     full[:, : S.shape[1]] = S
     # a task with an axis has one more row than constraints
     count = min(task.constraints, arm.n)
     nullity = arm.n - (full > WEAK).sum(axis=1)
-    return full[:, count - 1], Vt, nullity - (arm.n - count)
+    return full[:, count - 1], nullity - (arm.n - count)
+
+
+class Linear(NamedTuple):
+    """Residuals (M, rows) at postures, and their Jacobians' U (M, rows, rows), singular values S, and V' (M, n, n)."""
+
+    r: Array
+    U: Array
+    S: Array
+    V: Array
+
+    @classmethod
+    def at(cls, arm: Arm, task: Task, q: Array, target: Array) -> Linear:
+        """Of postures (M, n) and their targets."""
+        r, J = scaled(arm, task, q, target)
+        return cls(r, *np.linalg.svd(J))
+
+    def of(self, rows: NDArray[np.intp]) -> Linear:
+        return Linear(self.r[rows], self.U[rows], self.S[rows], self.V[rows])
 
 
 class Lost(NamedTuple):
     """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many
-    directions they lose (K, M) and right singular vectors (K, M, n, n)."""
+    directions they lose (K, M) and right singular vectors (K, M, n, n). weak: these alone, in the rows that place
+    (K, M) says."""
 
     sigma: Array
     nullity: NDArray[np.int64]
     V: Array
+    weak: Linear
+    place: NDArray[np.intp]
 
 
 def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) -> Lost:
     """What the candidates q (K, M, n) lose that are asked (K, M), which solve their targets; others nothing."""
     K, M, n = q.shape
-    out = Lost(np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n)))
+    sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
+    place, none = np.zeros((K, M), np.intp), np.zeros((0, 0))
     k, b = np.nonzero(asked)
     if not len(k):
-        return out
-    _, J = scaled(arm, task, q[k, b], target[k])
+        return Lost(sigma, nullity, V, Linear(none, none, none, none), place)
+    r, J = scaled(arm, task, q[k, b], target[k])
     if J.shape[1] == n == task.constraints:
         # the Frobenius norm of the inverse is no smaller than its largest singular value
         inverse = nudged(np.linalg.inv, J)
-        out.sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
-        weak = bound < FOLDED
-        k, b, J = k[weak], b[weak], J[weak]
-    if len(k):
-        out.sigma[k, b], out.V[k, b], out.nullity[k, b] = null_space_of(arm, task, J)
-    return out
+        sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
+        some = bound < FOLDED
+        k, b, r, J = k[some], b[some], r[some], J[some]
+    weak = Linear(r, *np.linalg.svd(J))
+    V[k, b], place[k, b] = weak.V, np.arange(len(k))
+    sigma[k, b], nullity[k, b] = _smallest(arm, task, weak.S)
+    return Lost(sigma, nullity, V, weak, place)
 
 
 def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Array:

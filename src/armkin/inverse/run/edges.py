@@ -67,9 +67,11 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) 
             more.append(np.where(hangs[:, None, None], tight, np.nan))  # it may be that the joint is not quite free
             unsettled = np.zeros(len(target), bool)
             unsettled[open_[at_ends]], out.complete[open_[at_ends]] = True, False
-        fixed = (0, 0), (0, (len(more) - 1) * loose.shape[1])
         label = np.tile(np.arange(loose.shape[1]), len(more))
-        seeds = Seeds.of(np.concatenate(more, axis=1), label, np.pad(loose, fixed), np.pad(simple, fixed))
+        if len(more) > 1:
+            fixed = np.zeros((len(loose), (len(more) - 1) * loose.shape[1]), bool)
+            loose, simple = (np.concatenate([x, fixed], axis=1) for x in (loose, simple))
+        seeds = Seeds.of(np.concatenate(more, axis=1), label, loose, simple)
         parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(left), seeds)]
     elif runner.geometry.ends:
         return out

@@ -243,7 +243,7 @@ class _Groups:
         one = nullity[k, b] < 2
         if one.any():
             i, c = k[one], b[one]
-            at = local_structure(arm, task, q[i, c], target[i])
+            at = local_structure(arm, task, q[i, c], target[i], self.lost.weak.of(self.lost.place[i, c]))
             self.known[i, c], self.moves[i, c], self.which[i, c] = at.known, at.manifold, at.joints
             self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
             on, self.ended[i, c] = chains.whole(arm, task, at, q[i, c], q[i], target[i])
@@ -327,7 +327,7 @@ class _Groups:
             k = np.flatnonzero(self.open.any(axis=1))
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
         arm, task, target, _ = self.goals
-        q, sigma, chosen = self.at.q, self.lost.sigma, self.chosen
+        q, sigma, chosen, each = self.at.q, self.lost.sigma, self.chosen, np.arange(len(self.open))[:, None]
         # also beside a self-motion: a root of high order
         moving = np.asarray(self.curve.any(axis=2))
         beside = (chosen & (sigma < HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
@@ -338,7 +338,7 @@ class _Groups:
             self_motions.drop_twins(arm, task, at, kept, curve, self.ended[rows], target[rows])
             chosen[rows] = kept
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
-        there = np.take_along_axis(chosen, order, axis=1)
+        there = chosen[each, order]
         status = np.where(there.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
         status[self.double] = Status.BOUNDARY
         status[self.singular] = Status.SINGULAR
@@ -346,9 +346,9 @@ class _Groups:
         if len(k):
             surface[k[self_motions.on_surface(arm, task, q[k, b], self.lost.V[k, b], target[k])]] = True
         return _Settled(
-            np.where(there[:, :, None], np.take_along_axis(q, order[:, :, None], axis=1), np.nan),
+            np.where(there[:, :, None], q[each, order], np.nan),
             there,
-            np.where(there, np.take_along_axis(self.at.label, order, axis=1), OWN),
+            np.where(there, self.at.label[each, order], OWN),
             status,
             self.free,
             missed,
@@ -362,13 +362,13 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
     """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
     arm, task, target, near = goals
     K, _, n = seeds.q.shape
-    there = ~np.isnan(seeds.q).any(axis=2)
+    there, each = ~np.isnan(seeds.q).any(axis=2), np.arange(K)[:, None]
     order = np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]
-    q = np.concatenate([near[:, None], np.take_along_axis(seeds.q, order[:, :, None], axis=1)], axis=1)
-    label = np.insert(np.take_along_axis(seeds.label, order, axis=1), 0, OWN, axis=1)
-    sure = np.pad(np.take_along_axis(seeds.sure, order[:, :, None], axis=1), ((0, 0), (1, 0), (0, 0)))
-    loose, simple = (np.take_along_axis(x & there, order, axis=1) for x in (seeds.loose, seeds.simple))
-    simple = np.pad(simple, ((0, 0), (1, 0)))
+    q = np.concatenate([near[:, None], seeds.q[each, order]], axis=1)
+    label = np.concatenate([np.full((K, 1), OWN), seeds.label[each, order]], axis=1)
+    sure = np.concatenate([np.zeros((K, 1, n), bool), seeds.sure[each, order]], axis=1)
+    loose = (seeds.loose & there)[each, order]
+    simple = np.concatenate([np.zeros((K, 1), bool), (seeds.simple & there)[each, order]], axis=1)
     flat, goal = q.reshape(-1, n).copy(), np.repeat(np.arange(K), q.shape[1])
     size, some = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
     size[some] = newton.missing(arm, task, flat[some], target[goal[some]])

@@ -78,12 +78,15 @@ class Structure(NamedTuple):
     g: Array
 
 
-def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
-    """The structure at postures (M, n) that solve their targets (M, m) or (M, 4, 4); at least n numbers a target."""
+def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton.Linear | None = None) -> Structure:
+    """The structure at postures (M, n) that solve their targets (M, m) or (M, 4, 4); at least n numbers a target.
+
+    known: the residuals there and the Jacobians' singular values, if they are.
+    """
     M, n = q.shape
-    r, J = newton.scaled(arm, task, q, target)
-    U, S, V = np.linalg.svd(J)
-    rows, out = J.shape[1], _unknown(J, S, V)
+    at = known or newton.Linear.at(arm, task, q, target)
+    (r, U, S, V), out = at, _unknown(at)
+    rows = r.shape[1]
     if rows < n:
         return out
     w, whole, short = np.zeros((M, n)), out.span.copy(), np.zeros(M, bool)
@@ -107,18 +110,18 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array) -> Structure:
 
 def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array) -> Structure:
     """The curves through postures (M, n) as far as span (M,): known are those that stay at hand."""
-    _, J = newton.scaled(arm, task, q, target)
-    U, S, V = np.linalg.svd(J)
-    out = _unknown(J, S, V)
+    at = newton.Linear.at(arm, task, q, target)
+    out = _unknown(at)
     out.span[...] = span
-    out.known[...] = _follow(arm, task, q, target, U, V, np.zeros(q.shape), out, np.arange(len(q)))
+    out.known[...] = _follow(arm, task, q, target, at.U, at.V, np.zeros(q.shape), out, np.arange(len(q)))
     return out
 
 
-def _unknown(J: Array, S: Array, V: Array) -> Structure:
-    """What Jacobians (M, rows, n) alone tell of their postures; S, V: singular values and right vectors."""
-    M, rows, n = J.shape
-    lost = rows - n + 1  # with fewer joints than numbers more directions are out of reach
+def _unknown(at: newton.Linear) -> Structure:
+    """What Jacobians alone tell of their M postures."""
+    r, _, S, V = at
+    M, n = len(r), V.shape[2]
+    lost = r.shape[1] - n + 1  # with fewer joints than numbers more directions are out of reach
     return Structure(
         known=np.zeros(M, bool),
         manifold=np.zeros(M, bool),
