@@ -12,6 +12,7 @@ differentials, two motors on one shoulder): the joints follow from the pulses th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -238,8 +239,9 @@ def undriven(arm: Arm) -> list[str]:
     return [name for name, column in zip(arm.joint_names, arm.motor_gain.T, strict=True) if not column.any()]
 
 
+@lru_cache(maxsize=32)
 def joints_per_pulse(arm: Arm) -> Array:
-    """How far a pulse of each motor moves each joint: (n, motors) [rad | mm].
+    """How far a pulse of each motor moves each joint: (n, motors) [rad | mm], read-only: found once for an arm.
 
     Raises UsageError if the motors do not determine the joints.
     """
@@ -256,8 +258,11 @@ def joints_per_pulse(arm: Arm) -> Array:
             f"{arm.name}'s motors do not determine its joints; give it as many independent motors as joints"
         )
     if np.count_nonzero(gain) == len(gain) == arm.n:  # one to one: exact, without a factorisation
-        return np.asarray(np.divide(1.0, gain, out=np.zeros_like(gain), where=gain != 0).T)
-    return np.asarray(np.linalg.pinv(gain / scale) / scale[:, None])
+        found = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain != 0).T
+    else:
+        found = np.asarray(np.linalg.pinv(gain / scale) / scale[:, None])
+    found.flags.writeable = False
+    return found
 
 
 def _nearest(arm: Arm, q: Array, exact: Array, around: Array) -> Array:

@@ -27,6 +27,7 @@ from armkin.inverse.numeric.tolerances import (
     SEED,
     SHAKES,
     STRAY,
+    TWIN_ROOTS,
     UPRIGHT,
 )
 from armkin.model.rotation import inverse
@@ -42,7 +43,7 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
     careful, shake = number > 0, SHAKES[number]
     seed = roots.seeds(pencil, inverse(shaken_goal(goal, shake)), TILT[careful], part=careful or pencil.role.wide)
     if shake == 0:
-        seed = _without_empty(closed, seed, goal)
+        seed = _without_empty(closed, seed, goal, careful)
     target = goal[seed.pose]
     if careful:
         done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
@@ -99,19 +100,23 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
     return answers, unsettled, touching, guesses
 
 
-def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array) -> roots.Seeds:
+def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array, careful: bool) -> roots.Seeds:
     """Seeds without roots that stand for nothing.
 
     A simple root, or a double one with one vector, is one if its vector is no product: a solution's vector is a
     product, and such a root has no other vector. Of a multiple root that was taken apart all products are known.
+    One farther off the real line than a double one is stays in later passes alone: steps may lead it to an answer.
     """
-    some = np.flatnonzero((seed.defect > NO_PRODUCT) & (seed.gap > ALONE))
-    if not some.size:
+    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE)
+    upright = seed.tilt < TWIN_ROOTS
+    some = np.flatnonzero(empty & upright)
+    kept = ~empty | careful | upright
+    if some.size:
+        target = np.ascontiguousarray(goal[seed.pose[some], :3].transpose(1, 2, 0))
+        frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[some].T))
+        kept[some[pose_error(frame, target)[1] > STRAY]] = False
+    if kept.all():
         return seed
-    target = np.ascontiguousarray(goal[seed.pose[some], :3].transpose(1, 2, 0))
-    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[some].T))
-    kept = np.ones(len(seed.pose), np.bool_)
-    kept[some[pose_error(frame, target)[1] > STRAY]] = False
     pose, q, hidden, tilt, rough, defect, gap = seed
     return roots.Seeds(pose[kept], q[kept], hidden[kept], tilt[kept], rough, defect[kept], gap[kept])
 

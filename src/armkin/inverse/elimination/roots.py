@@ -92,7 +92,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
     gap = np.where(parted & steady[pose], np.inf, 0.0)
-    some = np.flatnonzero((defect > NO_PRODUCT) & (slant < TWIN_ROOTS) & steady[pose] & ~parted)
+    some = np.flatnonzero((defect > NO_PRODUCT) & steady[pose] & ~parted)
     gap[some] = _gaps(roots[pose[some]], vectors[pose[some]], which[some])
     return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
 
