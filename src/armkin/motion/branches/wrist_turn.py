@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,12 +81,19 @@ def through_wrists(
     return found
 
 
-def _bent(arm: Arm, q: Array) -> Array:
-    """The volume of the wrist's axes at joint values (N, n): 0 where it is straight; joint 5 alone tells: (N,)."""
+@lru_cache(maxsize=256)
+def _volumes(arm: Arm) -> tuple[float, float, float]:
+    """Of the wrist's axes where joint 5 has turned by 0, 90 and 180 degrees."""
     tried = np.tile(arm.home, (3, 1))
     tried[:, 4] = np.array([0.0, 0.5, 1.0]) * np.pi / arm.ratio[4]
     axes = jacobian(arm, tried)[:, 3:, 3:]
     a, b, c = np.linalg.det(axes / np.linalg.norm(axes, axis=1, keepdims=True)).tolist()
+    return a, b, c
+
+
+def _bent(arm: Arm, q: Array) -> Array:
+    """The volume of the wrist's axes at joint values (N, n): 0 where it is straight; joint 5 alone tells: (N,)."""
+    a, b, c = _volumes(arm)
     angle = q[:, 4] * arm.ratio[4]
     return np.asarray((a + c) / 2 + (a - c) / 2 * np.cos(angle) + (b - (a + c) / 2) * np.sin(angle))
 
