@@ -105,7 +105,7 @@ def test_the_pen_is_lifted_between_strokes() -> None:
         ('<circle r="a"/>', "'a' is no length"),
         ('<g transform="foo(1)"><line x2="1"/></g>', "transform 'foo.1.' is not known"),
         ('<svg><line x2="1"/></svg>', "stands inside of another"),
-        ("", "draws nothing"),
+        ("", "t.svg:2: draws nothing up to here: it needs an outline of circle, ellipse, line, path"),
         ("<g>", "is not XML"),
     ],
 )
@@ -122,7 +122,7 @@ def test_what_is_refused_names_line_and_element(body: str, words: str) -> None:
         (b"\x1f\x8b\x08\0\0", "t.svg:1: is not XML"),
         (b'\n\n<svg>\n<path d="M0 0L1 1 \xff"/></svg>', "t.svg:4: is not XML"),
         (b'<?xml version="1.0" encoding="klingon"?><svg/>', "t.svg:1: is not XML"),
-        (b"<html/>", "is <html>, and no <svg>"),
+        (b"<html/>", "t.svg:1: is <html>, and no <svg>"),
         (b'<svg viewBox="0 0 nan 1"><line x2="1"/></svg>', "t.svg:1: <svg>: '0 0 nan 1' has what is no number"),
         (b'<svg viewBox="0 0 0 0"><line x2="1"/></svg>', "the last two above 0"),
         (b'<svg viewBox="0 0 1 1" width="-5mm"><line x2="1"/></svg>', "width -5mm is below 0"),

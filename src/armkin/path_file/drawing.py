@@ -128,10 +128,11 @@ class Pen:
         self.moves.append(move)
         self.lines.append(line)
 
-    def file(self, name: str, notes: Sequence[str]) -> PathFile:
-        """The path. Raises PathFileError if nothing is drawn."""
+    def file(self, name: str, notes: Sequence[str], raw: bytes, expected: str) -> PathFile:
+        """The path. Raises PathFileError if nothing is drawn; raw: the whole file, expected: what would be drawn."""
         if not any(move.kind in ("polyline", "arc", "circle") for move in self.moves):
-            raise PathFileError(f"{name}: draws nothing", file=name)
+            last = max(len(raw.splitlines()), 1)
+            raise PathFileError(f"{name}:{last}: draws nothing up to here: {expected}", file=name, line=last)
         for drawn in self._drawn:
             drawn[:] = self.placing.points(drawn)
         lines: dict[tuple[str | int, ...], int] = {("moves", k): line for k, line in enumerate(self.lines)}

@@ -39,14 +39,15 @@ _KNOWN_G = {*_GROUP, *_IGNORED_G, 53.0}
 def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
     """The path of a program. Raises PathFileError with line and word for what is refused."""
     if b"\0" in raw:
-        raise PathFileError(f"{name}: is no text; binary G-code must be written as text", file=name)
+        line = raw.partition(b"\0")[0].count(b"\n") + 1
+        raise PathFileError(f"{name}:{line}: is no text; binary G-code must be written as text", file=name, line=line)
     program = _Program(name, Pen(placing), wishes)
     program.run(lines(raw.decode("utf-8-sig", "replace"), name))
     notes = [
         f"{word} is ignored (line {program.first[word]}{f', and {n - 1} more' if n > 1 else ''})"
         for word, n in program.ignored.items()
     ]
-    return program.pen.file(name, notes)
+    return program.pen.file(name, notes, raw, "it needs two places of G0 to G3, and begins at the first")
 
 
 class _Program:

@@ -52,7 +52,7 @@ def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
     """
     root = _tree(raw, name)
     if root.tag != "svg":
-        raise PathFileError(f"{name}: is <{root.tag}>, and no <svg>", file=name)
+        raise PathFileError(f"{name}:{root.line}: is <{root.tag}>, and no <svg>", file=name, line=root.line)
     named = {one.attributes["id"]: one for one in _all(root) if "id" in one.attributes}
     pen = _Drawer(name, Pen(placing), wishes, wishes.lift / placing.scale)
     try:
@@ -62,7 +62,7 @@ def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
     for child in root.children:
         pen.draw(child, frame, named, 0)
     pen.lift()
-    return pen.pen.file(name, ())
+    return pen.pen.file(name, (), raw, f"it needs an outline of {', '.join(sorted(_SHAPES))}")
 
 
 def _tree(raw: bytes, name: str) -> _Element:

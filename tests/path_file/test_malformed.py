@@ -1,0 +1,56 @@
+"""Programs and drawings damaged at random: read, or refused with a line of the file."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import random_drawings
+from armkin.errors import PathFileError
+from armkin.path_file import gcode, svg
+from armkin.path_file.drawing import Wishes
+from read_twice import AS_IT_IS
+
+_JUNK = [b"1e999", b"-", b"nan", b"(", b"%", b"<g>", b"\0", b"\xff\xfe", b"N1*5", b"G10 L20 P9", b"R-1", b"F0", b"P1e9",
+         b"G2 X0 Y0 I0 J0\n", b"G4 P9e9\n", b"#1=5\n", b'transform="scale(0)"', b"A0 0 0 0 0 0 0", b"e"]  # fmt: skip
+_MARKUP = re.compile(rb"[<>&\"\0]")
+
+
+def damaged(text: str, rng: np.random.Generator, markup: bool) -> bytes:
+    """A file with one to five bytes or words put in, taken out or doubled; markup: not between an XML file's quotes."""
+    raw = bytearray(text.encode())
+    for _ in range(rng.integers(1, 6)):
+        i, how = int(rng.integers(0, len(raw) + 1)), rng.integers(0, 4)
+        if how == 0:
+            put = bytes(rng.integers(32, 127, rng.integers(1, 6)).tolist())
+        elif how == 1:
+            put = _JUNK[rng.integers(len(_JUNK))]
+        elif how == 2:
+            put = bytes(raw[i : i + int(rng.integers(1, 60))])
+        else:
+            taken = raw[i : i + int(rng.integers(1, 20))]
+            if markup or not _MARKUP.search(taken):
+                del raw[i : i + len(taken)]
+            continue
+        inside = raw[:i].count(b'"') % 2 == 1
+        if markup or (inside and not _MARKUP.search(put)):
+            raw[i:i] = put
+    return bytes(raw)
+
+
+@pytest.mark.parametrize("kind", ["gcode", "svg", "attributes"])
+def test_what_is_damaged_is_read_or_refused_with_its_line(kind: str) -> None:
+    rng, refused = np.random.default_rng(24), 0
+    make, parse = (random_drawings.program, gcode.parse) if kind == "gcode" else (random_drawings.drawing, svg.parse)
+    for seed in range(40):
+        raw = damaged(make(seed), rng, kind != "attributes")
+        try:
+            parse(raw, "t", AS_IT_IS, Wishes())
+        except PathFileError as error:
+            found = re.match(r"t:(\d+): .", str(error))
+            assert found, error
+            assert 1 <= int(found[1]) <= raw.count(b"\n") + 1
+            refused += 1
+    assert refused >= 10
