@@ -235,7 +235,7 @@ def test_a_home_that_is_singular_and_a_way_that_is_not_keep_their_branch() -> No
 
 
 def test_an_ordinary_line_asks_once_how_straight_a_wrist_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Joint 5 alone tells: the axes of an IRB 2400 were asked anew for each of a line's branches, up to 15 % of its time."""
+    """Joint 5 alone tells; the axes were asked anew for each branch of a line, which took up to 15 % of its time."""
     asked = []
 
     def counted(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
