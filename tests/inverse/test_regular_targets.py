@@ -13,10 +13,11 @@ from test_every_branch import shipped
 import armkin
 from armkin import Status
 from armkin.inverse.answers.batch import Goals
+from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.numeric import newton
 from armkin.inverse.singular import components
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.tasks.task import moved
+from armkin.inverse.tasks.task import moved, targets_of
 from armkin.model.arm import Arm
 
 NAMES = ["three_dof", "planar_3dof", "cobra600", "ra02", "labvolt_5150", "puma560", "ur5e", "irb2400", "stanford"]
@@ -115,3 +116,14 @@ def test_a_little_beyond_a_stretched_arm_is_proved_unreachable(name: str, monkey
             out = next(found for found in both if not found.valid.any())
             assert out.status[0] == Status.UNREACHABLE
             assert out.complete[0]
+
+
+@pytest.mark.parametrize("name", ["three_dof", "puma560"])
+def test_no_targets_have_no_candidates(name: str) -> None:
+    """A compiled batch may leave none to ask the formulas about; every target has as many columns."""
+    arm = armkin.load(name)
+    task, geometry = solver(arm, None)
+    formula = recorded(arm, task, geometry)
+    target = targets_of(task, armkin.fk(arm, np.zeros((2, arm.n))), np.zeros((2, arm.n)))
+    two, none = formula.rows(target), formula.rows(target[:0])
+    assert [x.shape for x in none] == [(0, *x.shape[1:]) for x in two]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -218,7 +219,7 @@ def as_rows(values: Sequence[ArrayLike], count: int) -> Array:
     out = np.empty((*shape, len(values)))
     for k, value in enumerate(values):
         out[..., k] = value
-    return out.reshape(-1, count, len(values)).swapaxes(0, 1).copy()
+    return out.reshape(math.prod(shape[:-1]), count, len(values)).swapaxes(0, 1).copy()
 
 
 @lru_cache(maxsize=256)
