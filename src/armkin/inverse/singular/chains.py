@@ -12,7 +12,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import CLOSED, HIGH
+from armkin.inverse.numeric.tolerances import CLOSED, HIGH, MOVED
 from armkin.inverse.singular.local_structure import Structure, leaves, members, stretch
 from armkin.inverse.tasks.task import Task
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 LINKS = 12  # curves on each side of a posture, twice as long each time, or half where one fails
 
 
-def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool]:
+def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool, Bool]:
     """Which postures others (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
 
-    Those on which the residual grows are followed both ways until they end, or close.
+    Those on which the residual grows are followed both ways until they end, or close. Also the joints (M, n) that move.
     """
     rows = np.arange(len(q))
     inside = members(at, rows, newton.difference(arm, others, q[:, None]))
@@ -33,7 +33,8 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
     grown = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
     left = np.flatnonzero(at.known & at.manifold & ~ended & (grown > CLOSED) & (at.second > HIGH))
     if not len(left):
-        return inside, ended
+        return inside, ended, at.joints
+    joints, least, most = at.joints.copy(), at.least.copy(), at.most.copy()
     who, span = np.tile(left, 2), 2.0 * np.tile(at.span[left], 2)
     start, ahead = leaves(arm, at, who, q[who], np.concatenate([at.v[left], -at.v[left]]))
     done = np.isnan(start[:, 0])
@@ -50,9 +51,14 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
         on = members(link, rows, apart) & good[:, None]
         np.logical_or.at(inside, own, on[:, :-1])
         home = on[:, -1] & ((apart[:, -1] * link.v).sum(axis=1) * (way * link.v).sum(axis=1) > 0.0)
+        off = newton.difference(arm, last, q[own])
+        np.minimum.at(least, own[good], (off + link.least)[good])
+        np.maximum.at(most, own[good], (off + link.most)[good])
         there, onwards = leaves(arm, link, rows, last, way)
         start[going[good]], ahead[going[good]] = there[good], onwards[good]
         done[going] = good & (home | np.isnan(there[:, 0]))
         going = going[~done[going]]
     ended[left] = done.reshape(2, -1).all(axis=0)
-    return inside, ended
+    extent = (most - least)[left]
+    joints[left] = extent > MOVED * extent.max(axis=1)[:, None]
+    return inside, ended, joints

@@ -244,9 +244,9 @@ class _Groups:
         if one.any():
             i, c = k[one], b[one]
             at = local_structure(arm, task, q[i, c], target[i], self.lost.weak.of(self.lost.place[i, c]))
-            self.known[i, c], self.moves[i, c], self.which[i, c] = at.known, at.manifold, at.joints
+            self.known[i, c], self.moves[i, c] = at.known, at.manifold
             self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
-            on, self.ended[i, c] = chains.whole(arm, task, at, q[i, c], q[i], target[i])
+            on, self.ended[i, c], self.which[i, c] = chains.whole(arm, task, at, q[i, c], q[i], target[i])
             self.component = np.concatenate([self.component, on])
         rest = ~self.known[k, b] & ~self.rests[k, b] & (self.lost.sigma[k, b] < MOVING)
         if rest.any():

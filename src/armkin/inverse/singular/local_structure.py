@@ -60,7 +60,8 @@ class Structure(NamedTuple):
 
     known: (M,) whether the curve was followed far enough to tell. manifold, boundary: (M,) what the component is, if
     neither, an isolated root. joints: (M, n) those that move along a manifold. low, high: (M,) ends of the component
-    along v, at most `span` (M,) away, as far as the polynomials hold. v: (M, n). second: (M,) the second smallest
+    along v, at most `span` (M,) away, as far as the polynomials hold. least, most: (M, n) how far the joints' ways go
+    between these. v: (M, n). second: (M,) the second smallest
     singular value. x: (NODES, M, n) coefficients of the joints' ways [rad, reaches] in powers of t / span,
     g: (NODES, M, k) of the residual.
     """
@@ -72,6 +73,8 @@ class Structure(NamedTuple):
     low: Array
     high: Array
     span: Array
+    least: Array
+    most: Array
     v: Array
     second: Array
     x: Array
@@ -130,6 +133,8 @@ def _unknown(at: newton.Linear) -> Structure:
         low=np.zeros(M),
         high=np.zeros(M),
         span=1.2 * REACH / np.abs(V[:, -1]).max(axis=1),
+        least=np.zeros((M, n)),
+        most=np.zeros((M, n)),
         v=V[:, -1],
         second=S[:, n - 2] if n > 1 else np.ones(M),
         x=np.zeros((NODES, M, n)),
@@ -329,7 +334,8 @@ def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
     low = -low
     s = low + np.linspace(0.0, 1.0, FINE)[:, None] * (high - low)  # (FINE, M)
     way = _values(x, s)
-    extent = way.max(axis=0) - way.min(axis=0)
+    out.least[rows], out.most[rows] = way.min(axis=0), way.max(axis=0)
+    extent = out.most[rows] - out.least[rows]
     long = extent.max(axis=1) >= REACH
     slope = _values(g[1:] * np.arange(1, NODES)[:, None, None], s) / span[:, None]  # (FINE, M, k)
     steepest = np.linalg.norm(slope, axis=2).argmax(axis=0)
