@@ -342,7 +342,7 @@ class _Groups:
         status = np.where(there.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
         status[self.double] = Status.BOUNDARY
         status[self.singular] = Status.SINGULAR
-        surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity == 2) & self.curve.any(axis=2))
+        surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity > 1) & self.curve.any(axis=2))
         if len(k):
             surface[k[self_motions.on_surface(arm, task, q[k, b], self.lost.V[k, b], target[k])]] = True
         return _Settled(
