@@ -167,7 +167,7 @@ class Linear(NamedTuple):
 class Lost(NamedTuple):
     """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many
     directions they lose (K, M) and right singular vectors (K, M, n, n). weak: these alone, in the rows that place
-    (K, M) says."""
+    (K, M) says, -1 for the others."""
 
     sigma: Array
     nullity: NDArray[np.int64]
@@ -180,7 +180,7 @@ def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) 
     """What the candidates q (K, M, n) lose that are asked (K, M), which solve their targets; others nothing."""
     K, M, n = q.shape
     sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
-    place, none = np.zeros((K, M), np.intp), np.zeros((0, 0))
+    place, none = np.full((K, M), -1), np.zeros((0, 0))
     k, b = np.nonzero(asked)
     if not len(k):
         return Lost(sigma, nullity, V, Linear(none, none, none, none), place)

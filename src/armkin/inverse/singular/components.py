@@ -190,8 +190,9 @@ class _Groups:
         self.rank = np.maximum(at.size, EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
         self.open: Bool = self.valid & ~at.simple  # those of no group yet
+        self.weak: Bool = (lost.place >= 0) & (lost.sigma < FOLDED) & ~on
         lost.sigma[on] = 0.0
-        self.asked: Bool = ~(self.open & (lost.sigma < FOLDED) & ~on)
+        self.asked: Bool = ~(self.open & self.weak)
         self.known, self.moves = on.copy(), on.copy()
         self.which, self.edge, self.ended = at.sure.copy(), np.zeros((K, M), bool), np.zeros((K, M), bool)
         self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
@@ -209,7 +210,7 @@ class _Groups:
         k, i, j = np.nonzero(mine[:, :, None] & mine[:, None] & others)
         away = np.abs(newton.difference(self.goals.arm, self.at.q[k, i], self.at.q[k, j])).max(axis=1, initial=0.0)
         close[k, i, j] = away < CLOSE_BY
-        weak = mine & (sigma < FOLDED)
+        weak = mine & self.weak
         told = weak & self.known & ~self.moves
         other = weak & ~(told & (sigma >= SOLUTION))  # may be on a self-motion
         alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
