@@ -1,4 +1,4 @@
-"""Calibration: exact derivatives, built arms found again, rows that are wrong, files that every command takes."""
+"""Calibration: exact derivatives, built arms found again, wrong rows among right ones, what few rows show."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from workshop import built, commands, measured, rms
 
 import armkin
 from armkin import robot_file
-from armkin.calibration import robust_fit as fit
+from armkin.calibration import robust_fit
 from armkin.calibration.chain import KINDS, model
 from armkin.calibration.procedure import next_poses
 from armkin.errors import UsageError
 from armkin.model.build import build
-from command_line import run
 from quick import least
 
 # arm, noise [mm], tip error on unseen poses that a prototype reached with 60 rows [mm]; the bar is 1.5 times as much
@@ -64,12 +63,12 @@ def test_a_row_s_weight_is_the_slope_of_its_cost() -> None:
     low, high = (np.sqrt(np.maximum(at + side, 0.0)) for side in (-step, step))
 
     def cost(r: float) -> float:
-        return fit._cost(np.array([[r, 0.0, 0.0]]), None, (1.0, 1.0), np.zeros(1))
+        return robust_fit._cost(np.array([[r, 0.0, 0.0]]), None, (1.0, 1.0), np.zeros(1))
 
     slopes = [(cost(b) - cost(a)) / (b * b - a * a) for a, b in zip(low, high, strict=True)]
     r = np.sqrt(at)[:, None] * [1.0, 0.0, 0.0]
-    assert fit._weights(r, 1.0) == pytest.approx(slopes, rel=1e-6)
-    assert fit._weights(3.0 * r, 3.0) == pytest.approx(fit._weights(r, 1.0))
+    assert robust_fit._weights(r, 1.0) == pytest.approx(slopes, rel=1e-6)
+    assert robust_fit._weights(3.0 * r, 3.0) == pytest.approx(robust_fit._weights(r, 1.0))
 
 
 @pytest.mark.parametrize(("name", "noise", "figure"), FIGURES)
@@ -235,77 +234,6 @@ def test_the_file_says_the_arm_and_is_solved(name: str, tmp_path: Path) -> None:
     assert gap.max() < 1e-6
 
 
-def bad_rows(how: str) -> tuple[np.ndarray, np.ndarray]:
-    arm = armkin.load("ar4")
-    rng = np.random.default_rng(10)
-    c = commands(arm, 40, rng)
-    if how == "still":
-        c[:, 2] = 0.3
-    if how == "in step":
-        c = np.linspace(-0.5, 0.5, 40)[:, None] * np.arange(1, 7)
-    if how == "line":
-        c = np.zeros((40, 6))
-        c[:, 3:] = rng.uniform(-1, 1, (40, 3))
-        c[:, :3] = rng.uniform(-1e-2, 1e-2, (40, 3))
-    x = measured(built(arm, 10), c, rng)
-    if how == "line":
-        x = x[0] + np.linspace(0, 100, 40)[:, None] * [1.0, 2.0, 0.5] + rng.normal(size=(40, 3)) * 0.1
-    return {
-        "radians": (np.radians(c), x),
-        "degrees": (np.degrees(c), x),
-        "metres": (c, x / 1000),
-        "inches": (c, x / 25.4),
-        "columns": (c, x[:, [1, 0, 2]]),
-        "turned columns": (c, x[:, [1, 2, 0]]),
-        "joints": (c[:, [0, 2, 1, 3, 4, 5]], x),
-        "sign": (c * [1, -1, 1, 1, 1, 1], x),
-        "mirror": (c, x * [1, -1, 1]),
-        "another arm": (c, rng.uniform(-300, 300, (40, 3))),
-        "few": (c[:3], x[:3]),
-    }.get(how, (c, x))
-
-
-@pytest.mark.parametrize(
-    ("how", "says"),
-    [
-        ("still", "J3 never moves in the rows"),
-        ("in step", "all joints move in step"),
-        ("line", "the measured points lie on a line"),
-        ("radians", "the joint values look like radians"),
-        ("degrees", "the joint values look like degrees"),
-        ("metres", "the measured points look like metres"),
-        ("inches", "the measured points look like inches"),
-        ("columns", "columns y x z of the measured points look like x y z"),
-        ("turned columns", "columns z x y of the measured points look like x y z"),
-        ("joints", "the columns of J2 and J3 look swapped"),
-        ("sign", "J2 looks commanded with the other sign"),
-        ("mirror", "the measured y looks negative"),
-        ("another arm", "the rows do not fit this arm"),
-        ("few", "3 rows are too few"),
-    ],
-)
-def test_rows_that_cannot_be_right_are_named(how: str, says: str, tmp_path: Path) -> None:
-    c, x = bad_rows(how)
-    with pytest.raises(UsageError, match=says):
-        armkin.calibrate(armkin.load("ar4"), c, x)
-    csv, out = tmp_path / "rows.csv", tmp_path / "new.yaml"
-    np.savetxt(csv, np.concatenate([np.degrees(c), x], axis=1), delimiter=",")
-    done = run("calibrate", "ar4", csv, "--out", out)
-    assert done.code == 2
-    assert done.out == ""
-    assert not out.exists()
-
-
-def test_a_measuring_frame_may_stand_anywhere() -> None:
-    """A frame half a turn and a metre away is a base, not a mistake."""
-    arm = armkin.load("ar4")
-    rng = np.random.default_rng(11)
-    c = commands(arm, 40, rng)
-    away = armkin.fk(arm, c)[:, :3, 3] @ np.array([[-1, 0, 0], [0, -1, 0], [0, 0, 1]]) + [1000, 0, 0]
-    found = armkin.calibrate(arm, c, away + rng.normal(size=(40, 3)) * 0.1)
-    assert np.median(found.after) < 0.4
-
-
 def test_suggested_poses_tell_more_than_random_ones() -> None:
     arm = armkin.load("ar4")
     poses = next_poses(arm, 15)
@@ -333,34 +261,6 @@ def test_200_rows_take_at_most_3_seconds() -> None:
     assert least(lambda: armkin.calibrate(arm, c, x), 3) < 3
 
 
-def test_the_command_writes_a_file_that_the_others_take(tmp_path: Path) -> None:
-    arm = armkin.load("three_dof")
-    rng = np.random.default_rng(13)
-    c = commands(arm, 40, rng)
-    csv, out = tmp_path / "rows.csv", tmp_path / "mine.yaml"
-    rows = np.concatenate([np.degrees(c), measured(built(arm, 13), c, rng)], axis=1)
-    np.savetxt(csv, rows, delimiter=",", header="q1,q2,q3,x,y,z", comments="")
-    done = run("calibrate", "three_dof", csv, "--out", out, "--json")
-    assert done.code == 0, done.err
-    answer = done.json
-    assert answer["after"]["rms_mm"] < 0.05 * answer["before"]["rms_mm"]
-    assert answer["out"] == str(out)
-    assert {row["row"] for row in answer["flagged"]} <= set(range(2, 42))
-    assert len(answer["flagged"]) == 2
-    assert "three_dof, calibrated from 40 measured poses" in out.read_text()
-    for words in (["fk", out, 10, 20, 30], ["ik", out, 300, 100, 250], ["pulses", out, 10, 20, 30], ["info", out]):
-        assert run(*words).code == 0
-    shown = run("calibrate", "three_dof", csv)
-    assert "on rows not used" in shown.out
-    assert "--out NEW.yaml writes the corrected robot file" in shown.err
-    zeros = run("calibrate", "three_dof", csv, "--fix", "base,tool,ratios,lengths,twists", "--json").json
-    assert zeros["corrected"] in (["zeros"], [])
-    assert run("calibrate", "three_dof", csv, "--out", csv.parent / "nowhere" / "x.yaml").code == 1
-    missing = run("calibrate", "three_dof")
-    assert missing.code == 2
-    assert "--suggest 30 says which poses to measure" in missing.err
-
-
 def test_the_page_s_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     root = Path(__file__).parents[2]
     monkeypatch.chdir(root)
@@ -368,31 +268,6 @@ def test_the_page_s_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     names: dict[str, Any] = {}
     exec(block, names)
     assert names["found"].rms("after") < 0.05 * names["found"].rms("before")
-
-
-def test_the_command_suggests_poses(tmp_path: Path) -> None:
-    lines = run("calibrate", "three_dof", "--suggest", 3).out.splitlines()
-    assert lines[0] == "q1,q2,q3"
-    assert len(lines) == 4
-    assert len(run("calibrate", "three_dof", "--suggest", 2, "--json").json["poses"]) == 2
-    csv = tmp_path / "rows.csv"
-    csv.write_text("10,20,30,1,2,3\n")
-    assert len(run("calibrate", "three_dof", csv, "--suggest", 3).out.splitlines()) == 4
-
-
-def test_poses_with_orientations_from_a_file(tmp_path: Path) -> None:
-    from armkin.model.rotation import rpy
-
-    arm = armkin.load("ur5e")
-    rng = np.random.default_rng(14)
-    c = commands(arm, 30, rng)
-    T = built(arm, 14).poses(c)
-    rows = np.concatenate([np.degrees(c), T[:, :3, 3], np.degrees(rpy(T[:, :3, :3]))], axis=1)
-    csv = tmp_path / "rows.csv"
-    np.savetxt(csv, rows, delimiter=",")
-    answer = run("calibrate", "ur5e", csv, "--poses", "--json").json
-    assert answer["after"]["rms_mm"] < 0.3
-    assert any(entry["name"] == "tool yaw" for entry in answer["corrections"])
 
 
 def test_few_rows_state_no_deviations() -> None:
