@@ -33,7 +33,7 @@ def targets_in(labels: Sequence[str], values: ArrayLike) -> Array:
         from armkin.model.rotation import transforms
 
         return transforms(numbers[..., :3], numbers[..., 3:])
-    return numbers * _label_scale(labels)
+    return numbers * label_scale(labels)
 
 
 def targets_out(labels: Sequence[str], targets: Array) -> list[list[float]]:
@@ -44,9 +44,9 @@ def targets_out(labels: Sequence[str], targets: Array) -> list[list[float]]:
         from armkin.model.rotation import rpy
 
         targets = np.concatenate([targets[:, :3, 3], rpy(targets[:, :3, :3])], axis=1)
-    return [list(row) for row in (targets / _label_scale(labels) + 0.0).tolist()]
+    return [list(row) for row in (targets / label_scale(labels) + 0.0).tolist()]
 
 
-def _label_scale(labels: Sequence[str]) -> list[float]:
+def label_scale(labels: Sequence[str]) -> list[float]:
     """What one unit of each of a target's numbers is in [mm, rad, 1]."""
     return [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]

@@ -13,6 +13,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
+from armkin.inverse.numeric.newton import nudged
 from armkin.motion.branches.joint_steps import turns_of
 
 if TYPE_CHECKING:
@@ -48,11 +49,8 @@ class Window:
         goal = route.targets(s)[:, :3, 3]
         for _ in range(_STEPS):
             miss = goal - position(arm, q)
-            J = np.asarray(jacobian(arm, q))[:, :3, :3]
-            try:
-                step = np.linalg.solve(J, miss[:, :, None])[..., 0]
-            except np.linalg.LinAlgError:  # the first three joints are exactly singular somewhere
-                step = (np.linalg.pinv(J) @ miss[:, :, None])[..., 0]
+            # the first three joints may be exactly singular somewhere
+            step = nudged(np.linalg.solve, np.asarray(jacobian(arm, q))[:, :3, :3], miss[:, :, None])[..., 0]
             size = np.abs(step).max(axis=1, initial=1e-300, keepdims=True)
             q[:, :3] += np.minimum(_LONGEST / size, 1.0) * step
             if size.max(initial=0.0) < 1e-13:

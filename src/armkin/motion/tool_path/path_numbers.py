@@ -13,7 +13,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.fitting import task_for
 from armkin.model import units
-from armkin.model.targets import label_units, targets_in
+from armkin.model.targets import label_scale, targets_in
 from armkin.motion.tool_path.geometry import Spot, spot
 
 if TYPE_CHECKING:
@@ -41,8 +41,7 @@ def moves(arm: Arm, given: Any, task: str | None = None) -> PathFile:
 
         rows = np.concatenate([rows[:, :3, 3], units.angles_out(rpy(rows[:, :3, :3]))], axis=1)
     elif rows.ndim == 2:
-        unit = [units.DEGREE if u == "deg" else 1.0 for u in label_units(definition.labels)]
-        rows = rows / np.array(unit)[: rows.shape[-1]]
+        rows = rows / np.array(label_scale(definition.labels))[: rows.shape[-1]]
     if rows.ndim != 2 or len(rows) < 2 or not np.isfinite(rows).all():
         raise UsageError(f"a path of targets has shape (w, {len(definition.labels)}), w at least 2, all finite")
     listed = [{"point": rows[0].tolist()}, *({"line": row} for row in rows[1:].tolist())]
