@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "commands.h"
+#include "port.h"
 #include "schedule.h"
 
 enum { MAX_CLIENTS = CONTROL_FDS - 1 };
@@ -68,6 +69,7 @@ int control_wait_for(struct pollfd *fds) {
 static void answer(const client *c, char *line) {
     char *text = NULL;
     size_t size, sent = 0;
+    port_look();              /* what the test did to the port before it asked happens before the answer */
     FILE *reply = open_memstream(&text, &size);
     commands_execute(line, reply);
     fclose(reply);

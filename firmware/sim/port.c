@@ -86,7 +86,9 @@ static void on_open(void) {
 
 /* inotify tells of every opening and closing, also of those between two looks; a hang-up on the master
  * is the truth about now (two openings in a row may arrive as one event). */
-static void look_for_users(void) {
+void port_look(void) {
+    if (master < 0)
+        return;
     char events[4096] __attribute__((aligned(__alignof__(struct inotify_event))));
     ssize_t n;
     while ((n = read(watch, events, sizeof events)) > 0) {
@@ -149,7 +151,7 @@ static void write_host(void) {
 bool port_service(void) {
     if (master < 0)
         return false;
-    look_for_users();
+    port_look();
     bool any = is_open && read_host();
     write_host();
     return any;

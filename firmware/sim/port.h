@@ -15,6 +15,7 @@ void port_end(void);
 const char *port_path(void);               /* what to give to --port */
 int port_wait_for(struct pollfd *fds);     /* fill in what poll() shall wait for; at most 2 */
 bool port_service(void);                   /* move bytes; true: the host has sent some */
+void port_look(void);                      /* see who has opened and closed the port up to now */
 bool port_is_open(void);
 void port_json(FILE *out);
 

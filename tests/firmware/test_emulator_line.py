@@ -119,6 +119,13 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
     assert not where.parent.exists()
 
 
+def test_an_answer_knows_of_every_opening_before_its_question(probe: Path) -> None:
+    with EmulatedBoard(elf=probe, speed="max") as board:
+        for opened in range(1, 501):
+            os.close(os.open(board.port, os.O_RDWR | os.O_NOCTTY))
+            assert board.stats()["port"]["opened"] == opened
+
+
 def test_a_long_transfer_keeps_every_byte(probe: Path) -> None:
     with EmulatedBoard(elf=probe) as board, serial.Serial(board.port, 250000, timeout=60) as port:
         board.wait(2 * MS)
