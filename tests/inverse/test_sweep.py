@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.inverse import choose
+from armkin.inverse import choose_branch
 from armkin.inverse.solvers.recognise import solver
 
 ARM = armkin.load("planar_3dof")
 TARGETS = np.random.default_rng(3).uniform([50, -100], [250, 100], (40, 2))
-SWEPT = choose.Request(arm=ARM, task="xy", swept={"q1": np.linspace(-90, 90, 60).tolist()}, every=False)
+SWEPT = choose_branch.Request(arm=ARM, task="xy", swept={"q1": np.linspace(-90, 90, 60).tolist()}, every=False)
 
 
 @pytest.mark.parametrize("branch", [None, "elbow up", "elbow down"])
 def test_what_is_dropped_is_not_shown(branch: str | None) -> None:
     request = replace(SWEPT, branch=branch)
     for few, every in zip(
-        choose.solve(request, TARGETS), choose.solve(replace(request, every=True), TARGETS), strict=True
+        choose_branch.solve(request, TARGETS), choose_branch.solve(replace(request, every=True), TARGETS), strict=True
     ):
         assert (few.status, few.total, few.within_limits, few.refused) == (
             every.status,
@@ -34,35 +34,35 @@ def test_what_is_dropped_is_not_shown(branch: str | None) -> None:
         best = [None if one.best is None else one.branches[one.best].joints for one in (few, every)]
         assert best[0] == best[1]
         assert [one.joints for one in few.branches[:1]] == [one.joints for one in every.branches[:1]]
-    assert any(one.best is not None for one in choose.solve(request, TARGETS))
+    assert any(one.best is not None for one in choose_branch.solve(request, TARGETS))
 
 
 def test_each_value_is_prepared_once_for_all_rows() -> None:
-    choose.solve(SWEPT, TARGETS[:1])  # the arm with its redundant joint at zero
+    choose_branch.solve(SWEPT, TARGETS[:1])  # the arm with its redundant joint at zero
     for joint, most in (("q2", 3), ("q1", 1)):  # of q1, the redundant one, all values have one arm
         request = replace(SWEPT, swept={joint: [1.25, 2.5, 3.75]})
         before = solver.cache_info().misses
         for first in range(0, 40, 10):
-            choose.solve(request, TARGETS[first : first + 10])
+            choose_branch.solve(request, TARGETS[first : first + 10])
         assert solver.cache_info().misses - before <= most
 
 
 def test_branches_kept_do_not_grow_with_the_values(monkeypatch: pytest.MonkeyPatch) -> None:
     kept: list[int] = []
-    add = choose._Found.add
+    add = choose_branch._Found.add
 
-    def noted(found: choose._Found, *what: Any) -> None:
+    def noted(found: choose_branch._Found, *what: Any) -> None:
         add(found, *what)
         kept.append(len(found.branches))
 
-    monkeypatch.setattr(choose._Found, "add", noted)
+    monkeypatch.setattr(choose_branch._Found, "add", noted)
     request = replace(SWEPT, swept={"q1": [0.0, 10.0, 20.0, 30.0, 40.0] * 40})
-    [*_, most] = sorted(answer.total for answer in choose.solve(request, TARGETS[:6]))
+    [*_, most] = sorted(answer.total for answer in choose_branch.solve(request, TARGETS[:6]))
     assert most > 60
     assert max(kept) < 30
 
 
 def test_all_branches_of_many_values_are_solved_in_parts() -> None:
     every = replace(SWEPT, every=True, swept={"q1": [0.0] * 100, "q2": [0.0] * 50})
-    assert choose.most_targets(every) * choose.combinations(every) <= 16_384
-    assert choose.most_targets(replace(every, swept={"q1": [0.0] * 100, "q2": [0.0] * 100})) == 1
+    assert choose_branch.most_targets(every) * choose_branch.combinations(every) <= 16_384
+    assert choose_branch.most_targets(replace(every, swept={"q1": [0.0] * 100, "q2": [0.0] * 100})) == 1

@@ -178,16 +178,16 @@ def test_names_of_bodies_are_taken(tmp_path: Path) -> None:
 
 
 def test_the_refusal_has_fields() -> None:
-    from armkin.inverse import choose
+    from armkin.inverse import choose_branch
 
     arm = armkin.load("three_dof", scene=BENCH)
-    request = choose.Request(arm=arm)
-    [answer] = choose.solve(request, np.array([[300.0, 0.0, -100.0]]))
-    error = choose.refusal(request, answer, 0.0)
+    request = choose_branch.Request(arm=arm)
+    [answer] = choose_branch.solve(request, np.array([[300.0, 0.0, -100.0]]))
+    error = choose_branch.refusal(request, answer, 0.0)
     assert isinstance(error, NoBranchError)
     assert [hit["with"] for hit in error.fields["hits"]] == ["floor", "table"]
-    ignoring = choose.Request(arm=arm, ignore=True)
-    [taken] = choose.solve(ignoring, np.array([[300.0, 0.0, -100.0]]))
+    ignoring = choose_branch.Request(arm=arm, ignore=True)
+    [taken] = choose_branch.solve(ignoring, np.array([[300.0, 0.0, -100.0]]))
     assert taken.best == 0
 
 

@@ -33,7 +33,7 @@ def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
 
 def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> dict[str, list[float]]:
     """`--sweep J=LOW:HIGH:COUNT`: joint name -> values [deg | mm], both ends included."""
-    from armkin.inverse.choose import MOST_SWEEPS
+    from armkin.inverse.choose_branch import MOST_SWEEPS
 
     found: dict[str, list[float]] = {}
     for text in words or ():

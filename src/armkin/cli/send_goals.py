@@ -90,18 +90,18 @@ class Goals:
         """Joint values (w, n); near: where the arm stands [rad | mm]."""
         if self.joints is not None:
             return self.joints
-        from armkin.inverse import choose
+        from armkin.inverse import choose_branch
 
         at = units.joints_out(arm, near).tolist() if self.near is None else self.near
-        request = choose.Request(
+        request = choose_branch.Request(
             arm=arm, task=self.task, near=at, branch=self.branch, held=self.held, ignore=arm.ignores_keep_out
         )
-        [answer] = choose.solve(request, self.target, self.rounding)  # type: ignore[arg-type]
+        [answer] = choose_branch.solve(request, self.target, self.rounding)  # type: ignore[arg-type]
         if answer.best is None and answer.within_limits and answer.refused is None:
-            raise choose.blocked(request, answer)
+            raise choose_branch.blocked(request, answer)
         if answer.best is None:
-            [nearest] = choose.closest(request, self.target)  # type: ignore[arg-type]
-            raise choose.refusal(request, answer, nearest.distance)
+            [nearest] = choose_branch.closest(request, self.target)  # type: ignore[arg-type]
+            raise choose_branch.refusal(request, answer, nearest.distance)
         return answer.branches[answer.best].q[None]
 
 

@@ -1,6 +1,7 @@
 """Targets to the columns of `ik`: one row a target with its best branch, or one a branch.
 
-What `armkin.inverse.choose` answers target by target, on arrays; only branches that are listed get their residual.
+What `armkin.inverse.choose_branch` answers target by target, on arrays; only
+branches that are listed get their residual.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.columns.table import Table, Words, joined
-from armkin.inverse import choose
+from armkin.inverse import choose_branch
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.numeric.tolerances import EQUAL
@@ -35,7 +36,7 @@ class Listed(NamedTuple):
 
 
 def columns(
-    request: choose.Request,
+    request: choose_branch.Request,
     targets: Array,
     rows: NDArray[np.integer],
     every: bool,
@@ -48,7 +49,7 @@ def columns(
     """
     arm, near = request.arm, units.joints_in(request.arm, request.near_out)
     kept = [i for i, name in enumerate(arm.joint_names) if name not in request.held]
-    s = request.ik(choose.locked(request), targets, request.task, near=near[kept], **more)
+    s = request.ik(choose_branch.locked(request), targets, request.task, near=near[kept], **more)
     q, within = s.q, s.within_limits
     if request.held:
         values = units.joints_in(arm, [request.held.get(name, 0.0) for name in arm.joint_names])
@@ -78,7 +79,9 @@ class _Found(NamedTuple):
     names: Sequence[int]
 
 
-def _listed(request: choose.Request, found: _Found, rows: NDArray[np.integer], every: bool, quick: Any) -> Listed:
+def _listed(
+    request: choose_branch.Request, found: _Found, rows: NDArray[np.integer], every: bool, quick: Any
+) -> Listed:
     s, some, scale = found.s, found.some, units.scale(request.arm)
     q, within, free, valid = found.q[some], found.within[some], found.free[some], s.valid[some]
     wanted = free if request.branch is None else free & np.isin(s.branch[some], found.names)
@@ -166,7 +169,9 @@ class _Lines(NamedTuple):
     branch: NDArray[np.intp]  # (K,)
 
 
-def _table(request: choose.Request, s: Solutions, rows: NDArray[np.integer], some: slice, lines: _Lines) -> Table:
+def _table(
+    request: choose_branch.Request, s: Solutions, rows: NDArray[np.integer], some: slice, lines: _Lines
+) -> Table:
     """One line for each target, or branch of it, with numbers where there is a branch."""
     there, every = lines.there, bool(lines.there.all())
     mm, rad = _missed(request, s, some, lines)
@@ -189,7 +194,7 @@ def _table(request: choose.Request, s: Solutions, rows: NDArray[np.integer], som
     return table | {name: _spread(np.asarray(table[name]), there) for name in numbers}
 
 
-def _missed(request: choose.Request, s: Solutions, some: slice, lines: _Lines) -> tuple[Array, Array]:
+def _missed(request: choose_branch.Request, s: Solutions, some: slice, lines: _Lines) -> tuple[Array, Array]:
     """What some branches miss: (K,) [mm] and (K,) [rad]."""
     q = s.q[some][lines.target, lines.branch] if request.held else lines.q
     target = s.target[some] if len(q) == len(lines.there) == len(s.target[some]) else s.target[some][lines.target]

@@ -11,7 +11,7 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.forward import fk
-from armkin.inverse import choose
+from armkin.inverse import choose_branch
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers import recognise
 from armkin.inverse.tasks.fitting import task_for
@@ -95,8 +95,8 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
     """Every branch of the target; `q` is the pose to show."""
     shown = units.joints_out(arm, question.q).tolist()
     held = {name: shown[arm.joint_names.index(name)] for name in question.held}
-    request = choose.Request(arm=arm, near=shown, held=held, ik=quick.ik if quick else ik)
-    prepared = choose.prepared(request)
+    request = choose_branch.Request(arm=arm, near=shown, held=held, ik=quick.ik if quick else ik)
+    prepared = choose_branch.prepared(request)
     task, why = _task(prepared)
     if task is None:
         return {"task": None, "why": why, "branches": [], "status": None}
@@ -112,7 +112,7 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
             raise UsageError(f"target: task {task.name} takes {len(task.labels)} numbers: {' '.join(task.labels)}")
         goal = targets_in(task.labels, [values])[0]
     request = replace(request, task=task.name)
-    [found] = choose.solve(request, goal[None])
+    [found] = choose_branch.solve(request, goal[None])
     branches = found.branches
     answer: dict[str, Any] = {
         "task": task.name,
@@ -136,7 +136,7 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
         answer["chosen"] = stay[0] if stay else 0  # a free one, if there is one
         answer["q"] = branches[answer["chosen"]].q
     elif question.nearest:
-        [nearest] = choose.closest(request, goal[None])
+        [nearest] = choose_branch.closest(request, goal[None])
         answer["closest"] = {
             "joints": units.joints_out(arm, nearest.q).tolist(),
             "distance_mm": nearest.distance,
@@ -145,7 +145,7 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
     return answer
 
 
-def _row(arm: Arm, branch: choose.Branch) -> dict[str, Any]:
+def _row(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
     """A branch as the page lists it."""
     return {
         "name": branch.name,
@@ -157,7 +157,7 @@ def _row(arm: Arm, branch: choose.Branch) -> dict[str, Any]:
     }
 
 
-def _same(branches: Sequence[choose.Branch], q: Array) -> int | None:
+def _same(branches: Sequence[choose_branch.Branch], q: Array) -> int | None:
     """The branch that a pose is on; None on a self-motion, where the pose is one of many."""
     for k, branch in enumerate(branches):
         apart = np.abs(branch.q - q)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from armkin.cli.answers import Branch, Closest, Ik
     from armkin.columns.table import Table
     from armkin.formula.arrays import Array
-    from armkin.inverse import choose
+    from armkin.inverse import choose_branch
     from armkin.inverse.answers.closest import Closest as NearestPose
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
@@ -79,7 +79,7 @@ def ik(
     the nearest pose within limits is shown instead. Without a target, the poses that
     `armkin fk --json` wrote to standard input are the targets.
     """
-    from armkin.inverse import choose
+    from armkin.inverse import choose_branch
     from armkin.inverse.redundant.position_first import check as position_first_is_for
     from armkin.inverse.tasks.fitting import task_for
 
@@ -88,7 +88,7 @@ def ik(
     what = task_for(arm, task)
     reached = None if given is None else _reached(arm, what, given[1])
     held = lock_and_sweep.locks(arm, lock)
-    request = choose.Request(
+    request = choose_branch.Request(
         arm=arm,
         task=what.name,
         near=None if near is None else inputs.joint_list(arm, near, "--near"),
@@ -99,7 +99,7 @@ def ik(
         position_first=position_first,
     )
     if position_first:
-        position_first_is_for(choose.locked(request), what.name)
+        position_first_is_for(choose_branch.locked(request), what.name)
     if position_first and compiled:
         raise UsageError("--position-first has no compiled solver; leave --compiled away")
     if compiled and sweep:
@@ -140,14 +140,14 @@ def ik(
     values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
     goal = targets_in(what.labels, values)
     words = None if reached is not None else [[decimals(word) for word in target or ()]]
-    [found] = choose.solve(request, goal, _rounding(arm, what, values, words))
+    [found] = choose_branch.solve(request, goal, _rounding(arm, what, values, words))
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
     with output.destination(out) as write:
         write(f"{render.to_json(answer)}\n" if json else ik_text.text(arm, answer))
     if answer["best"] is None and answer["closest"] is None:
-        raise choose.blocked(request, found)
+        raise choose_branch.blocked(request, found)
     if answer["best"] is None and answer["closest"] is not None:
-        raise choose.refusal(request, found, answer["closest"]["distance_mm"])
+        raise choose_branch.refusal(request, found, answer["closest"]["distance_mm"])
 
 
 def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float]]:
@@ -170,7 +170,7 @@ def _rounding(arm: Arm, task: Task, values: Array, shown: list[list[int]] | None
 class Questions:
     """What is asked of each row of a batch; continuous: each is compared with the one before."""
 
-    request: choose.Request
+    request: choose_branch.Request
     task: Task
     all_branches: bool
     turns: bool
@@ -216,14 +216,18 @@ class Questions:
 
     def objects(self, chunk: Chunk, with_closest: bool = True) -> Iterator[Ik]:
         """An object a row."""
-        from armkin.inverse import choose
+        from armkin.inverse import choose_branch
 
-        most = choose.most_targets(self.request)
+        most = choose_branch.most_targets(self.request)
         for first in range(0, len(chunk.values), most):
             part = chunk.values[first : first + most]
             targets = targets_in(self.task.labels, part)
-            found = choose.solve(self.request, targets, _rounding(self.request.arm, self.task, part))
-            each = choose.continued(self.request, found) if self.continuous else ((self.request, one) for one in found)
+            found = choose_branch.solve(self.request, targets, _rounding(self.request.arm, self.task, part))
+            each = (
+                choose_branch.continued(self.request, found)
+                if self.continuous
+                else ((self.request, one) for one in found)
+            )
             alone = self.continuous or not with_closest  # each row's `near` is another one
             nearest = {} if alone else _nearest_to(self.request, targets, found)
             for k, (values, goal, (request, one)) in enumerate(zip(part.tolist(), targets, each, strict=True)):
@@ -236,11 +240,11 @@ class Questions:
 
 
 def _answer(
-    request: choose.Request,
+    request: choose_branch.Request,
     task: Task,
     values: list[float],
     goal: Array,
-    found: choose.Answer,
+    found: choose_branch.Answer,
     all_branches: bool,
     turns: bool,
     *,
@@ -278,21 +282,25 @@ def _answer(
     return answer
 
 
-def _nearest_to(request: choose.Request, targets: Array, found: Sequence[choose.Answer]) -> dict[int, NearestPose]:
+def _nearest_to(
+    request: choose_branch.Request, targets: Array, found: Sequence[choose_branch.Answer]
+) -> dict[int, NearestPose]:
     """The nearest poses of those targets that no legal branch reaches, all at once."""
-    from armkin.inverse import choose
+    from armkin.inverse import choose_branch
 
     rows = [k for k, one in enumerate(found) if one.best is None and not one.within_limits]
-    return dict(zip(rows, choose.closest(request, targets[rows]), strict=True)) if rows else {}
+    return dict(zip(rows, choose_branch.closest(request, targets[rows]), strict=True)) if rows else {}
 
 
-def _closest(request: choose.Request, goal: Array, found: choose.Answer, nearest: NearestPose | None) -> Closest | None:
+def _closest(
+    request: choose_branch.Request, goal: Array, found: choose_branch.Answer, nearest: NearestPose | None
+) -> Closest | None:
     """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for.
 
     None where every branch within limits hits something. nearest: if it is known.
     """
     import armkin
-    from armkin.inverse import choose
+    from armkin.inverse import choose_branch
 
     arm = request.arm
     if found.branches and found.branches[0].within_limits:  # only the branch asked for is outside
@@ -310,7 +318,7 @@ def _closest(request: choose.Request, goal: Array, found: choose.Answer, nearest
         answer.update(_near_to(arm, legal))
         return answer
     if nearest is None:
-        [nearest] = choose.closest(request, goal[None])
+        [nearest] = choose_branch.closest(request, goal[None])
     answer = {
         "joints": units.joints_out(arm, nearest.q).tolist(),
         "position_mm": nearest.position.tolist(),
@@ -323,12 +331,12 @@ def _closest(request: choose.Request, goal: Array, found: choose.Answer, nearest
     return answer
 
 
-def _near_to(arm: Arm, branch: choose.Branch) -> Any:
+def _near_to(arm: Arm, branch: choose_branch.Branch) -> Any:
     """What a branch is near to, where there are keep-outs."""
     return {"clearance_mm": branch.clearance, "hits": list(branch.hits)} if arm.keep_out else {}
 
 
-def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> Branch:
+def _branch(request: choose_branch.Request, branch: choose_branch.Branch, turns: bool) -> Branch:
     arm = request.arm
     row: Branch = {
         "joints": branch.joints,
@@ -340,13 +348,16 @@ def _branch(request: choose.Request, branch: choose.Branch, turns: bool) -> Bran
         "motion": branch.motion,
     }
     row.update(_near_to(arm, branch))
-    from armkin.inverse import choose
+    from armkin.inverse import choose_branch
     from armkin.inverse.solvers.redundant import redundant_joint
 
     if branch.interval is not None:
-        row["family"] = {"joint": redundant_joint(choose.locked(request), request.task), "interval": [*branch.interval]}
+        row["family"] = {
+            "joint": redundant_joint(choose_branch.locked(request), request.task),
+            "interval": [*branch.interval],
+        }
     if turns:
-        row["turns"] = choose.turns(request, branch)
+        row["turns"] = choose_branch.turns(request, branch)
     return row
 
 

@@ -139,14 +139,14 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
     import numpy as np
 
     from armkin.forward import position
-    from armkin.inverse import choose
+    from armkin.inverse import choose_branch
     from armkin.inverse.tasks.fitting import task_for
     from armkin.plot import plot_poses
 
     what = task_for(arm, task)
     values = inputs.target_list(arm, what, text)
-    request = choose.Request(arm=arm, task=what.name, held=lock_and_sweep.locks(arm, lock))
-    [answer] = choose.solve(request, targets_in(what.labels, [values]))
+    request = choose_branch.Request(arm=arm, task=what.name, held=lock_and_sweep.locks(arm, lock))
+    [answer] = choose_branch.solve(request, targets_in(what.labels, [values]))
     goal = render.labelled(what.labels, values, label_units(what.labels))
     if not answer.branches:
         raise NoSolutionError(f"{arm.name} cannot reach {goal}: there is no branch to draw")
