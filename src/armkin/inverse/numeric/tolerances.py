@@ -56,6 +56,7 @@ NO_SECOND = 1e-10  # second singular value over the first below which a matrix o
 BLUR_OF_PAIRS = 3e-8  # [rad] how far rounding parts two roots of such a matrix, times the square root of that quotient
 SAME_END = 1e-10  # [rad] places this close where a branch of seven joints ends are one
 BESIDE_END = 1e-3  # [rad] from such a place, where samples tell what is on its sides; less where two are closer
+BESIDE_CROSSING = 1e-6  # [rad] from where a limit is crossed, known but for rounding, to where a secant begins
 NO_ROOM = 1e-13  # [rad, rad^2] what is left there that is nothing
 BEFORE_MERGING = 1e-8  # [rad] from where two branches merge to where they are still there
 JOINED = 1e-3  # and how close two are just before they merge, in parts of what lay between them at the last sample

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.inverse.numeric.tolerances import BEFORE_MERGING, JOINED, NO_ROOM, SAME_END, TINY
+from armkin.inverse.numeric.tolerances import BEFORE_MERGING, BESIDE_CROSSING, JOINED, NO_ROOM, SAME_END, TINY
 from armkin.inverse.redundant.pieces import Int, golden_section, margin
 from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
 
@@ -82,6 +82,14 @@ class _Ends:
             some = going[~better]
             hi[some], at_hi[some] = guess[~better], room[~better]
         return out
+
+
+def crossed_at(find: Follower, at: Changes, value: Array) -> Array:
+    """Where limits are crossed (M,), known but for the rounding of their polynomials: a secant step in the joints."""
+    near, far = (margin(find.arm, find.own(at.row, at.branch, value + h)) for h in (0.0, BESIDE_CROSSING))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        step = near * BESIDE_CROSSING / (near - far)
+        return np.asarray(np.where(np.abs(step) < BESIDE_CROSSING, value + step, value))
 
 
 def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, Array]:

@@ -9,10 +9,10 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import SOLUTION
 from armkin.inverse.redundant.boundaries import boundaries, places
-from armkin.inverse.redundant.ends import hidden_stretches, number_of, places_of
+from armkin.inverse.redundant.ends import crossed_at, hidden_stretches, number_of, places_of
 from armkin.inverse.redundant.follower import Follower, over_a_turn
 from armkin.inverse.redundant.pieces import Int, Pieces, none
-from armkin.inverse.redundant.samples import Changes, Runs, Seen, seen, unexplained, value_at
+from armkin.inverse.redundant.samples import Changes, Runs, Seen, place_between, seen, value_at
 from armkin.inverse.tasks.task import distance
 
 EVEN = 180  # samples of a turn of the redundant joint besides all places where something may change;
@@ -41,12 +41,11 @@ class Followed(NamedTuple):
         if of is not None:
             at, known = places(of, find.target)
             some = np.flatnonzero(known)
-            part = find.of(some)
-            found = seen(part, over_a_turn(EVEN), at[some])
-            left[some] = unexplained(found, at[some])
-            kept = ~left[some]
-            own = _pieces(part, found)
-            curves = curves._with(some[kept], own.of(kept[own.row]), np.cumsum(kept) - 1, found.short[kept], True)
+            own, short, explained = _between_places(find.of(some), at[some])
+            left[some] = ~explained
+            curves = curves._with(
+                some[explained], own.of(explained[own.row]), np.cumsum(explained) - 1, short[explained], True
+            )
         some = np.flatnonzero(left)
         if len(some):
             own, short = _sampled(find.of(some), 1)
@@ -70,6 +69,22 @@ class Followed(NamedTuple):
         """As `Curves.at`."""
         there = self.find.one(pieces.row, pieces.branch, parameter)
         return there.q, there.legal
+
+
+def _between_places(find: Follower, at: Array) -> tuple[Pieces, Bool, Bool]:
+    """Pieces of some targets whose curves can change at places (N, V) alone, which are short (N,), and which change at
+    these alone (N,)."""
+    found = seen(find, over_a_turn(EVEN), at)
+    changes = found.crossed.at, found.gone.at
+    legal, there = ends = [place_between(found.t, one, at) for one in changes]
+    crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(found.crossed.rooms).any(axis=1))
+    legal[crossing] = crossed_at(find, changes[0].some(crossing), legal[crossing])
+    explained = np.ones(len(at), bool)
+    for one, end in zip(changes, ends, strict=True):
+        explained[one.row[np.isinf(end)]] = False
+    parts = [_of_runs(found.t, found.legal, True, changes[0], legal)]
+    parts.append(_of_runs(found.t, found.there, False, changes[1], there).of(~found.there.within))
+    return Pieces(*(np.concatenate(pair) for pair in zip(*parts, strict=True))), found.short, explained
 
 
 def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:

@@ -119,15 +119,14 @@ def seen(find: Follower, t: Array, known: Array | None = None) -> Seen:
     return found
 
 
-def unexplained(found: Seen, known: Array) -> Bool:
-    """Whether something changes between samples of targets (N,) that no known place (N, V) lies between."""
-    out = np.zeros(len(known), bool)
-    for at in (found.gone.at, found.crossed.at):
-        low, high = value_at(found.t, at.row, at.k)[:, None], value_at(found.t, at.row, at.k + 1)[:, None]
-        own = known[at.row]
-        explained = ((own >= low) & (own <= high)) | ((own + 2 * np.pi >= low) & (own + 2 * np.pi <= high))
-        out[at.row[~explained.any(axis=1)]] = True
-    return out
+def place_between(t: Array, at: Changes, known: Array) -> Array:
+    """The known place (N, V) of a turn that each change (M,) between samples at t (N, K) is at; nan where there is
+    none."""
+    low, own = value_at(t, at.row, at.k)[:, None], known[at.row]
+    width = value_at(t, at.row, at.k + 1)[:, None] - low
+    with np.errstate(invalid="ignore"):
+        on = np.remainder(own - low, 2 * np.pi)
+        return np.asarray(np.where(on <= width, low + on, np.inf).min(axis=1, initial=np.inf))
 
 
 def _together(parts: Sequence[Any]) -> Any:
