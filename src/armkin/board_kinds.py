@@ -1,6 +1,7 @@
 """What the host must know of each board before it is connected: one entry a board, one a driver.
 
-CONTRIBUTING.md has the whole walk. Boards with other firmware are found by `installed_kinds`.
+A new board for our firmware is a row of BOARDS; a new kind, with somebody else's firmware, is a file in `board/kinds/`
+with KIND, a `ForeignBoard`, and BOARD, its class: `installed_kinds` finds it by its name. CONTRIBUTING.md has the walk.
 The pin maps are the firmware's (`firmware/src/boards/`); a test holds the two tables together.
 """
 

@@ -13,7 +13,7 @@ from workshop import built, commands, measured, rms
 
 import armkin
 from armkin import robot_file
-from armkin.calibration import robust_fit
+from armkin.calibration import dropped_rows, robust_fit
 from armkin.calibration.chain import KINDS, model
 from armkin.calibration.procedure import next_poses
 from armkin.errors import UsageError
@@ -67,8 +67,8 @@ def test_a_row_s_weight_is_the_slope_of_its_cost() -> None:
 
     slopes = [(cost(b) - cost(a)) / (b * b - a * a) for a, b in zip(low, high, strict=True)]
     r = np.sqrt(at)[:, None] * [1.0, 0.0, 0.0]
-    assert robust_fit._weights(r, 1.0) == pytest.approx(slopes, rel=1e-6)
-    assert robust_fit._weights(3.0 * r, 3.0) == pytest.approx(robust_fit._weights(r, 1.0))
+    assert dropped_rows.weights(r, 1.0) == pytest.approx(slopes, rel=1e-6)
+    assert dropped_rows.weights(3.0 * r, 3.0) == pytest.approx(dropped_rows.weights(r, 1.0))
 
 
 @pytest.mark.parametrize(("name", "noise", "figure"), FIGURES)

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.calibration.chain import Model
-from armkin.calibration.robust_fit import FINEST, Fit
+from armkin.calibration.dropped_rows import FINEST
+from armkin.calibration.robust_fit import Fit
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.calibration import observability
 from armkin.calibration.chain import KINDS, model
+from armkin.calibration.dropped_rows import dropped
 from armkin.calibration.impossible_rows import check
 from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
 from armkin.calibration.robust_fit import Measured
@@ -23,7 +24,6 @@ from armkin.forward import as_joints
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-FLAGGED = 0.1  # a row of less weight is called wrong
 STATED = 20  # rows from which on standard deviations are stated: of 8 to 10 rows half lay within one, not 68 %
 HOPELESS = 0.25  # of the points' spread: an error that large on unseen rows is no calibration
 
@@ -116,7 +116,7 @@ def calibrate(
         level=LEVELS[choice.level],
         before=choice.errors[0],
         after=choice.errors[choice.level],
-        flagged=np.flatnonzero(found.weights < FLAGGED),
+        flagged=dropped(found.weights),
         noise=found.scale[0],
         corrections=listed,
         unseen=observability.unseen(corrections, found),

@@ -1,9 +1,7 @@
 """Robust damped Gauss-Newton with a prior.
 
-Minimised is sum rho(|r_k| / s) + sum (p_i / prior_i)^2, with Geman and McClure's rho(u) = u^2 / (1 + u^2 / K^2), whose
-weight (1 + u^2 / K^2)^-2 forgets rows that are far out (Geman and McClure, Statistical methods for tomographic image
-reconstruction, 1987), and the scale s from the median of the residuals. What the rows do not show stays where the prior
-has it: at the robot file.
+Minimised is sum rho(|r_k| / s) + sum (p_i / prior_i)^2, with the loss rho and the scale s of `dropped_rows`: rows
+that are far out are forgotten. What the rows do not show stays where the prior has it: at the robot file.
 """
 
 from __future__ import annotations
@@ -14,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.calibration.chain import Model
+from armkin.calibration.dropped_rows import loss, scales, weights
 from armkin.formula.arrays import Array
 
-K = 4.0  # residuals beyond K scales lose three quarters of their weight
-MEDIAN = 1.5382  # of the length of three standard normal numbers
-FINEST = 0.005, 1e-5  # [mm, rad] no scale is smaller: what a measurement's last digit is worth
 STEPS = 40
 
 
@@ -75,8 +71,8 @@ def fit(
     off, turned, J = residuals(model, p, data)
     held = 0.0  # numbers that the fit itself has used up
     for step in range(steps):
-        scale = _scales(off, turned, held)
-        weight, weight_turn = _weights(off, scale[0]), _weights(turned, scale[1])
+        scale = scales(off, turned, held)
+        weight, weight_turn = weights(off, scale[0]), weights(turned, scale[1])
         H, g = _normal(J[:, :, free] * prior, off, turned, weight, weight_turn, scale)
         z = p[free] / prior
         cost = _cost(off, turned, scale, z)
@@ -98,35 +94,14 @@ def fit(
         damping *= 0.1
         if np.abs(move).max(initial=0.0) < 1e-5 and step > 3:
             break
-    scale = _scales(off, turned, held)
-    weight, weight_turn = _weights(off, scale[0]), _weights(turned, scale[1])
+    scale = scales(off, turned, held)
+    weight, weight_turn = weights(off, scale[0]), weights(turned, scale[1])
     H, _ = _normal(J[:, :, free] * prior, off, turned, weight, weight_turn, scale)
     return Fit(p, scale, np.minimum(weight, weight_turn), H + np.eye(len(free)), free)
 
 
-def _scales(off: Array, turned: Array | None, held: float) -> tuple[float, float]:
-    """The noise of a component from the median residual, larger by what the fit has used up."""
-    numbers = off.size + (0 if turned is None else turned.size)
-    used = np.sqrt(numbers / max(numbers - held, 0.25 * numbers))
-    size = float(np.median(np.linalg.norm(off, axis=1))) / MEDIAN * used
-    turn = 0.0 if turned is None else float(np.median(np.linalg.norm(turned, axis=1))) / MEDIAN * used
-    return max(size, FINEST[0]), max(turn, FINEST[1])
-
-
-def _weights(r: Array | None, scale: float) -> Array:
-    if r is None:
-        return np.ones(1)
-    u2 = np.einsum("mi,mi->m", r, r) / scale**2
-    return np.asarray((1.0 + u2 / K**2) ** -2)
-
-
 def _cost(off: Array, turned: Array | None, scale: tuple[float, float], z: Array) -> float:
-    total = float(z @ z)
-    for r, s in ((off, scale[0]), (turned, scale[1])):
-        if r is not None:
-            u2 = np.einsum("mi,mi->m", r, r) / s**2
-            total += float((u2 / (1.0 + u2 / K**2)).sum())
-    return total
+    return float(z @ z) + sum(loss(r, s) for r, s in ((off, scale[0]), (turned, scale[1])) if r is not None)
 
 
 def _normal(

@@ -1,4 +1,7 @@
-"""Rows of numbers from a CSV file or a pipe: columns by the heading's names, or in order without one."""
+"""Rows of numbers from a CSV file or a pipe: columns by the heading's names, or in order without one.
+
+Targets [mm, deg] become what `armkin.ik` takes in `armkin.model.targets`.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """A page for an arm: see it, choose the branch, write a program, move the motors.
 
 server.py           HTTP on 127.0.0.1: files, events, actions
-request_checks.py   who may ask, and whether a request's fields are what they must be
+page_key.py         who may ask: the key and the origin of a request
+request_checks.py   whether a request's fields are what they must be
 tabs.py             the open pages: which one holds control, what each has still to hear
 actions.py          every action by its name; program_actions.py: those on the program
 playing.py          a plan as the page plays it, by error

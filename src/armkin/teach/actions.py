@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.teach import request_checks
+from armkin.teach.page_key import RefusedError
 from armkin.teach.program_actions import ProgramActions
-from armkin.teach.request_checks import RefusedError
 from armkin.teach.scene import first_lock, jogs, scene
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
 

@@ -18,7 +18,7 @@ from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.robot_file.catalogue import locate
 from armkin.teach import request_checks
-from armkin.teach.request_checks import RefusedError
+from armkin.teach.page_key import RefusedError
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned

@@ -20,7 +20,7 @@ from armkin.board.sim.port import Paced
 from armkin.errors import ArmkinError, LinkError
 from armkin.model import units
 from armkin.motors import joints as joints_of
-from armkin.teach.request_checks import RefusedError
+from armkin.teach.page_key import RefusedError
 
 if TYPE_CHECKING:
     from armkin.board.ports import Port

@@ -21,7 +21,7 @@ from typing import Any
 from armkin.errors import ArmkinError, LinkError
 from armkin.teach import request_checks
 from armkin.teach.actions import Actions
-from armkin.teach.request_checks import Guard, RefusedError
+from armkin.teach.page_key import KEY, TAB, Guard, RefusedError
 
 STATIC = Path(__file__).parent / "static"
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
@@ -132,9 +132,7 @@ class _Handler(BaseHTTPRequestHandler):
             raise RefusedError(404, "there is no such action")
         fields = request_checks.body(self.rfile.read(request_checks.length(headers)))
         try:
-            answer = self.server.actions.act(
-                self.path.removeprefix("/api/"), headers.get(request_checks.TAB, ""), fields
-            )
+            answer = self.server.actions.act(self.path.removeprefix("/api/"), headers.get(TAB, ""), fields)
         except ArmkinError as error:
             status = 502 if isinstance(error, LinkError) else 422
             self._json(status, {"error": error.message, "kind": error.kind})
@@ -209,7 +207,7 @@ def _headers(handler: BaseHTTPRequestHandler) -> dict[str, str]:
     found: dict[str, str] = {}
     for name, value in handler.headers.items():
         key = name.title()
-        if key in found and key in ("Host", "Origin", "Content-Length", request_checks.KEY):
+        if key in found and key in ("Host", "Origin", "Content-Length", KEY):
             raise RefusedError(400, f"{key} is there twice")
         found[key] = value
     return found

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from armkin.teach.request_checks import RefusedError
+from armkin.teach.page_key import RefusedError
 
 MOST = 4  # a browser has six connections to a server: each page keeps one, and STOP must find one free
 _FORGET = 20.0  # [s] until a page that has never listened is forgotten

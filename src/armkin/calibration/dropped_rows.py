@@ -1,0 +1,49 @@
+"""Where a calibration drops a row: one that is far out loses its weight, however the others are fitted.
+
+Geman and McClure's loss rho(u) = u^2 / (1 + u^2 / K^2) of a residual of u scales, whose weight (1 + u^2 / K^2)^-2
+forgets rows that are far out (Geman and McClure, Statistical methods for tomographic image reconstruction, 1987); the
+scale is that of the median residual. No row is left out beforehand: a better fit may take it back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array
+
+K = 4.0  # residuals beyond K scales lose three quarters of their weight
+MEDIAN = 1.5382  # of the length of three standard normal numbers
+FINEST = 0.005, 1e-5  # [mm, rad] no scale is smaller: what a measurement's last digit is worth
+DROPPED = 0.1  # a row of less weight is called wrong
+
+
+def weights(r: Array | None, scale: float) -> Array:
+    """The weights (M,) of residuals (M, 3); 1 for all where nothing was measured."""
+    if r is None:
+        return np.ones(1)
+    return np.asarray((1.0 + _squared(r, scale) / K**2) ** -2)
+
+
+def loss(r: Array, scale: float) -> float:
+    """The sum of rho over residuals (M, 3): what `weights` are the slopes of."""
+    u2 = _squared(r, scale)
+    return float((u2 / (1.0 + u2 / K**2)).sum())
+
+
+def scales(off: Array, turned: Array | None, held: float) -> tuple[float, float]:
+    """The noise of a component [mm, rad] from the median residual, larger by the `held` numbers that a fit has used."""
+    numbers = off.size + (0 if turned is None else turned.size)
+    used = np.sqrt(numbers / max(numbers - held, 0.25 * numbers))
+    size = float(np.median(np.linalg.norm(off, axis=1))) / MEDIAN * used
+    turn = 0.0 if turned is None else float(np.median(np.linalg.norm(turned, axis=1))) / MEDIAN * used
+    return max(size, FINEST[0]), max(turn, FINEST[1])
+
+
+def dropped(weights: Array) -> NDArray[np.intp]:
+    """The rows, from 0, that a fit with these weights (M,) did without."""
+    return np.flatnonzero(weights < DROPPED)
+
+
+def _squared(r: Array, scale: float) -> Array:
+    return np.asarray(np.einsum("mi,mi->m", r, r) / scale**2)
