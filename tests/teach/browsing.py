@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from playwright.sync_api import Browser, Page, sync_playwright
@@ -109,6 +109,24 @@ def until(page: Page, condition: str, argument: object = None, seconds: float = 
             )
             raise AssertionError(f"not within {seconds:g} s: {condition} ({argument}); the page says {seen}")
         page.wait_for_timeout(20)
+
+
+def jogged(page: Page, press: Callable[[], None], release: Callable[[], None], there: Callable[[], object]) -> None:
+    """A jog's button is held until the board is there, and stays held. On a busy computer the page's signs of life come
+    late, which ends the jog: it is pressed anew then, as a person would."""
+    end = time.monotonic() + 120
+    press()
+    while not there():
+        assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
+        if "press again" in page.inner_text("#arrived"):
+            release()
+            press()
+        page.wait_for_timeout(20)
+
+
+def standing(page: Page) -> str:
+    """What the board does and whether its position is known, as the page says it."""
+    return page.inner_text("#standing")
 
 
 def repainted(page: Page) -> None:

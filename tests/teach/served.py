@@ -113,6 +113,7 @@ class Page:
 
     def __init__(self, server: Server) -> None:
         self.server = server
+        self.presses = 0  # of a jog's button
         for _ in range(600):  # pages that have just been closed are open still, for a moment
             status, self.opened = act(server, "open")
             if status != 429:
@@ -127,6 +128,29 @@ class Page:
 
     def act(self, action: str, /, **fields: Any) -> tuple[int, Any]:
         return act(self.server, action, fields, self.id)
+
+    def press(self, **jog: Any) -> tuple[int, Any]:
+        """A jog's button is pressed; unless it is held, the jog ends after 0.3 s."""
+        self.presses += 1
+        return self.act("jog", press=self.presses, **jog)
+
+    def hold(self) -> None:
+        assert self.act("jog_on", press=self.presses)[0] == 200
+
+    def let_go(self) -> None:
+        assert self.act("jog_end", press=self.presses)[0] == 200
+
+    def jog(self, there: Callable[[Any], bool], **jog: Any) -> None:
+        """A jog's button is held until the board's state is as it shall be, and stays held; it is pressed anew where
+        its signs of life came late."""
+        end = time.monotonic() + 100
+        while not there(self.state()):
+            assert time.monotonic() < end, self.state()
+            if self.state()["doing"] == "jog":
+                self.hold()
+            else:
+                assert self.press(**jog)[0] in (200, 409)  # 409: another jog still comes to rest
+            time.sleep(0.03)
 
     def hear(self, topic: str, until: Callable[[Any], bool] = lambda data: True) -> Any:
         """The next news of a topic that is as it shall be."""

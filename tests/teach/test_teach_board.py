@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +65,7 @@ def test_a_robot_file_that_has_changed_moves_nothing(tmp_path: Path) -> None:
         page = Page(server)
         page.idle()
         path.write_text(path.read_text().replace("a: 258", "a: 200"))
-        for name, fields in (("send", {"q": POSE, "speed": 100}), ("jog", {"joint": 0, "percent": 10})):
+        for name, fields in (("send", {"q": POSE, "speed": 100}), ("jog", {"press": 1, "joint": 0, "percent": 10})):
             status, answer = page.act(name, **fields)
             assert status == 422
             assert "has changed" in answer["error"]
@@ -75,13 +74,13 @@ def test_a_robot_file_that_has_changed_moves_nothing(tmp_path: Path) -> None:
 
 
 def test_a_jog_lasts_as_long_as_it_is_asked_for(sim: Page) -> None:
-    jogged(sim, 50, lambda at: at > 15)
+    sim.jog(lambda now: now["joints"][0] > 15, joint=0, percent=50)
     began = sim.clock()  # the page falls silent
     state = sim.idle()
     assert sim.clock() - began < 1.0
     assert 15 < state["joints"][0] < 80  # 30 deg/s for about a second; 60 s would have taken it to its limit
-    jogged(sim, -50, lambda at: at < state["joints"][0] - 3)
-    assert sim.act("jog_end")[0] == 200
+    sim.jog(lambda now: now["joints"][0] < state["joints"][0] - 3, joint=0, percent=-50)
+    sim.let_go()
     began = sim.clock()
     sim.idle()
     assert sim.clock() - began < 0.5
@@ -97,17 +96,29 @@ def test_a_jog_that_begins_before_its_request_is_answered_is_one(sim: Page, monk
         time.sleep(0.2)  # this thread has to wait for its turn
 
     monkeypatch.setattr(board.thread, "submit", late)
-    assert sim.act("jog", joint=0, percent=100)[0] == 200
+    assert sim.press(joint=0, percent=100)[0] == 200
     assert sim.idle()["pulses"][0] > 0  # its button counts as held from its request on
 
 
-def jogged(page: Page, percent: float, there: Callable[[float], bool]) -> None:
-    """The first joint jogs, as its button is held, until it is there."""
-    end = time.monotonic() + 60
-    while not there(page.state()["joints"][0]):
-        assert time.monotonic() < end, page.state()
-        assert page.act("jog", joint=0, percent=percent)[0] in (200, 409)  # 409: it has come too late, and comes again
-        time.sleep(0.05)
+def test_one_press_begins_one_jog_whatever_comes_late(sim: Page) -> None:
+    first = {"press": 1, "joint": 0, "percent": 100}
+    assert sim.act("jog", **first)[0] == 200
+    stood = sim.idle()["pulses"]  # nothing was heard of its button for 0.3 s
+    assert stood[0] > 0
+    for late in ("jog_on", "jog", "jog_end", "jog_on", "jog"):
+        assert sim.act(late, **first)[0] == 200
+        assert sim.idle()["pulses"] == stood
+    second = {**first, "press": 2}  # let go before it was heard of
+    for late in ("jog_on", "jog_end", "jog", "jog_on"):
+        assert sim.act(late, **second)[0] == 200
+        assert sim.idle()["pulses"] == stood
+    assert sim.act("send", q=HOME, speed=20)[0] == 200
+    assert sim.act("jog", **{**first, "press": 3})[0] == 409  # busy: this press begins nothing afterwards, either
+    assert sim.idle()["pulses"] == [0, 0, 0]
+    assert sim.act("jog_on", press=3)[0] == 200
+    assert sim.act("jog", **{**first, "press": 3})[0] == 200
+    assert sim.idle()["pulses"] == [0, 0, 0]
+    assert sim.act("jog", joint=0, percent=100)[0] == 422  # of no press
 
 
 def test_the_gripper(sim: Page) -> None:
@@ -199,7 +210,7 @@ def test_boards_of_others_as_far_as_they_can(robot: str, differs: str) -> None:
         assert page.idle()["error"] == ""
         assert page.idle()["joints"] == pytest.approx(goal, abs=1)
         for _ in range(20):  # a page that is not heard of for 0.3 s, on a busy machine, has let the button go
-            assert page.act("jog", joint=0, percent=-20)[0] == 200
+            assert page.press(joint=0, percent=-20)[0] == 200
             state = page.idle()
             assert state["error"] == ""
             if state["joints"][0] < goal[0] - 1:

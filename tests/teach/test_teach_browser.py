@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from browsing import COUNTS, aim, idle, opened, repainted, settled, until, value, values
+from browsing import COUNTS, aim, idle, jogged, opened, repainted, settled, standing, until, value, values
 from matplotlib import image
 from playwright.sync_api import Browser, Page
 from served import served
@@ -103,8 +103,12 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         page.keyboard.press("Escape")
         idle(page, "stopped")
         tab_to("#jog-up")
-        page.keyboard.down(" ")
-        until(page, "document.querySelector('#standing').textContent.startsWith('jog')")
+        jogged(
+            page,
+            lambda: page.keyboard.down(" "),
+            lambda: page.keyboard.up(" "),
+            lambda: standing(page).startswith("jog"),
+        )
         page.keyboard.up(" ")
         idle(page, "jog: done")
         page.evaluate("document.activeElement.blur()")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from browsing import COUNTS, aim, idle, opened, settled, until, values
+from browsing import COUNTS, aim, idle, jogged, opened, settled, until, values
 from emulator import EmulatedBoard
 from pins import net
 from playwright.sync_api import Browser, Page
@@ -68,11 +68,7 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         before = net(board)
         page.select_option("#jog-joint", label="q1")
         page.hover("#jog-up")
-        page.mouse.down()
-        end = time.monotonic() + 60
-        while net(board)[0] <= before[0] + 50:
-            assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
-            page.wait_for_timeout(20)
+        jogged(page, page.mouse.down, page.mouse.up, lambda: net(board)[0] > before[0] + 50)
         page.mouse.up()
         idle(page, "jog: done")
         after = net(board)

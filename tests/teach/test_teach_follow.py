@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import opened, settled, until
+from browsing import idle, jogged, opened, settled, standing, until
 from playwright.sync_api import Browser
 from served import Page, served
 
@@ -38,7 +38,7 @@ def rests(page: Page) -> bool:
 ENDS: dict[str, dict[str, Any]] = {
     "send": {"q": NEAR, "speed": 100},
     "run": {"speed": 100},
-    "jog": {"joint": 0, "percent": 50},
+    "jog": {"press": 1, "joint": 0, "percent": 50},
     "grip": {"value": "closed"},
     "assume_home": {"consent": True},
     "home": {},  # this arm has no switches: what is refused ends it, too
@@ -56,12 +56,8 @@ def test_what_else_the_board_is_told_ends_following(following: Page, name: str) 
 
 
 def test_a_jog_that_ends_leaves_the_arm_there(following: Page) -> None:
-    end = time.monotonic() + 60
-    while following.state()["joints"][0] < 12:
-        assert time.monotonic() < end
-        following.act("jog", joint=0, percent=50)
-        time.sleep(0.05)
-    following.act("jog_end")
+    following.jog(lambda now: now["joints"][0] >= 12, joint=0, percent=50)
+    following.let_go()
     following.idle()
     following.act("look", q=NEAR)  # as the page asks for its numbers when a job has ended
     assert rests(following)
@@ -183,12 +179,9 @@ def test_the_page_s_follow(browser: Browser) -> None:
         # A jog ends it, and leaves the arm where the button was let go.
         follow()
         page.hover("#jog-up")
-        page.mouse.down()
-        until(page, "document.querySelector('#standing').textContent.startsWith('jog')")
+        jogged(page, page.mouse.down, page.mouse.up, lambda: standing(page).startswith("jog"))
         page.mouse.up()
-        # of a busy computer the page's signs of life come late: a jog ends, and the next one begins another
-        until(page, "document.querySelector('#arrived').textContent.includes('jog')")
-        until(page, "!document.querySelector('#standing').textContent.startsWith('jog')")
+        idle(page, "jog: done")
         settled(page)
         unfollowed()
         assert still(server.actions.stands())

@@ -24,16 +24,15 @@ SCENES = Path(__file__).parents[2] / "examples" / "scenes"
 
 def held(page: Page, there: Callable[[dict[str, Any]], bool], **jog: Any) -> list[np.ndarray]:
     """Joint values on the way, while a jog is asked for until the board is there."""
-    seen, end = [], time.monotonic() + 100
-    while True:
-        state = page.state()
+    seen = []
+
+    def look(state: dict[str, Any]) -> bool:
         if state["joints"] is not None:
             seen.append(np.array(state["joints"]))
-        if there(state):
-            return seen
-        assert time.monotonic() < end, state
-        assert page.act("jog", **jog)[0] in (200, 409)  # 409: it has come too late, and comes again
-        time.sleep(0.03)
+        return there(state)
+
+    page.jog(look, **jog)
+    return seen
 
 
 def tips(seen: list[np.ndarray]) -> np.ndarray:
@@ -61,10 +60,24 @@ def test_the_tip_keeps_its_line_and_stops_when_nobody_asks(sim: Page) -> None:
     assert 40 < way[-1][1] < 200  # the line would have gone on to the edge of the reach
     assert np.abs(way[:, [0, 2]]).max() < 0.05 + 0.15  # the tolerance, and half a step of each joint at the tip
     assert (np.diff(way[:, 1]) > -0.2).all()
-    began = sim.clock()  # let go, it brakes at once
     held(sim, lambda now: tips([now["joints"]])[0][1] < begin[1] + 20, axis="y", frame="base", percent=-40)
-    assert sim.act("jog_end")[0] == 200
+    sim.let_go()
     sim.idle()
+
+
+def test_a_late_sign_of_life_does_not_revive_a_jog_that_brakes(sim: Page) -> None:
+    begin = stand(sim, BENT)
+    held(sim, lambda now: abs(tips([now["joints"]])[0][2] - begin[2]) > 5, axis="z", frame="base", percent=-20)
+    for _ in range(20):
+        if sim.state()["doing"] != "jog":
+            break
+        time.sleep(0.35)
+        sim.hold()
+    else:
+        raise AssertionError("the jog goes on")
+    stood = sim.idle()["pulses"]
+    sim.hold()
+    assert sim.idle()["pulses"] == stood
 
 
 def test_stop_passes_a_jog_of_the_tip(sim: Page) -> None:
@@ -92,7 +105,7 @@ def test_it_rests_before_a_limit_and_says_which(sim: Page) -> None:
     "wrong", [{"axis": "rx"}, {"axis": "w"}, {"axis": 3}, {"frame": "world"}, {"percent": 0}, {"percent": 1e9}]
 )
 def test_a_jog_that_makes_no_sense_is_refused(sim: Page, wrong: dict[str, Any]) -> None:
-    assert sim.act("jog", **{"axis": "x", "frame": "base", "percent": 10, **wrong})[0] == 422
+    assert sim.press(**{"axis": "x", "frame": "base", "percent": 10, **wrong})[0] == 422
     assert sim.idle()["pulses"] == [0, 0, 0]
 
 

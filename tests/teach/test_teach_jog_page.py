@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
-from browsing import opened, until
+from browsing import jogged, opened, standing, until
 from playwright.sync_api import Browser
 from served import served
 
@@ -14,13 +15,12 @@ window.pad = {id: 'Pad <b>1</b>', connected: true, mapping: 'standard', axes: [0
               buttons: Array.from({length: 17}, () => ({pressed: false}))};
 navigator.getGamepads = () => [window.pad, null];
 """
-# Answers to a jog that are late: the arm stops for want of signs of life before the page can say that it shall.
+# Signs of life that are a second late.
 _LATE = """
 const ask = window.fetch;
 window.fetch = async (what, how) => {
-  const answer = await ask(what, how);
-  if (String(what).endsWith('/api/jog')) await new Promise((done) => setTimeout(done, 1000));
-  return answer;
+  if (String(what).endsWith('/api/jog_on')) await new Promise((done) => setTimeout(done, 1000));
+  return ask(what, how);
 };
 """
 _AT = "document.querySelector('#position').textContent"
@@ -42,12 +42,13 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         assert [group.get_attribute("label") for group in groups] == ["Joints", "Tip, base axes", "Tip, tool axes"]
         page.select_option("#jog-joint", "base x")
         page.locator("#jog-down").focus()
-        page.keyboard.down("Space")
-        jogs()
-        until(page, "document.querySelectorAll('#live polyline').length === 6")
-        until(page, "document.querySelector('#live-keys').textContent.includes('apart')")
-        until(page, f"!{_AT}.includes('q2 90.00')")
-        page.keyboard.up("Space")
+        charted = (
+            "document.querySelectorAll('#live polyline').length === 6 && "
+            f"document.querySelector('#live-keys').textContent.includes('apart') && !{_AT}.includes('q2 90.00')"
+        )
+        down, up = partial(page.keyboard.down, "Space"), partial(page.keyboard.up, "Space")
+        jogged(page, down, up, lambda: page.evaluate(charted))
+        up()
         jogs(ends=True)
         assert page.text_content("#trouble") == ""
         stands, stood = joints(), page.text_content("#position")
@@ -65,36 +66,49 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         assert page.locator("#pad b").count() == 0  # its name is text
         page.wait_for_timeout(300)
         assert joints() == stands
-        page.evaluate("() => { pad.buttons[5].pressed = true; }")
-        jogs()
-        until(page, f"{_AT} !== argument", stood)
-        page.evaluate("() => { pad.buttons[5].pressed = false; }")
+        pull, let_go = (f"() => {{ pad.buttons[5].pressed = {on}; }}" for on in ("true", "false"))
+
+        def release() -> None:
+            page.evaluate(let_go)
+            page.wait_for_timeout(200)  # it is looked at 20 times a second
+
+        jogged(page, partial(page.evaluate, pull), release, lambda: page.text_content("#position") != stood)
+        release()
         jogs(ends=True)
         assert joints()[1] < stands[1]  # forwards again
-        # STOP with the shoulder button still held: the jog does not begin again. On a busy computer the jog may end by
-        # itself, for want of signs of life, before the request arrives.
-        for _ in range(20):
-            page.evaluate("() => { pad.buttons[1].pressed = false; pad.buttons[5].pressed = true; }")
-            jogs()
-            page.evaluate("() => { pad.buttons[1].pressed = true; }")
-            jogs(ends=True)
-            until(page, "document.querySelector('#arrived').textContent !== ''")
-            if (page.text_content("#arrived") or "").startswith("stopped"):
-                break
-        stood = page.text_content("#position")
-        page.wait_for_timeout(300)
-        assert (page.text_content("#arrived") or "").startswith("stopped")
-        assert page.text_content("#position") == stood
+        # STOP, by the pad or the page, with the shoulder button still held: what is held on begins no other jog.
+        for stop in ("pad.buttons[1].pressed = true", "document.querySelector('#stop').click()"):
+            for _ in range(20):  # on a busy computer the jog may end by itself before the request arrives
+                jogged(page, partial(page.evaluate, pull), release, lambda: standing(page).startswith("jog"))
+                page.evaluate(f"() => {{ {stop}; }}")
+                jogs(ends=True)
+                until(page, "document.querySelector('#arrived').textContent !== ''")
+                page.evaluate("() => { pad.buttons[1].pressed = false; }")
+                if (page.text_content("#arrived") or "").startswith("stopped"):
+                    break
+                release()
+            stood = page.text_content("#position")
+            page.wait_for_timeout(300)
+            assert (page.text_content("#arrived") or "").startswith("stopped")
+            assert page.text_content("#position") == stood
+            release()
 
 
-def test_a_jog_that_ended_before_the_page_could_end_it_stays_told(browser: Browser) -> None:
+def test_a_jog_whose_signs_of_life_came_late_begins_no_other(browser: Browser) -> None:
     with served(board="sim") as server, opened(browser, server.address, script=_LATE) as page:
         until(page, f"{_AT}.startsWith('It stands')")
         page.locator("#jog-up").focus()
-        with page.expect_response("**/api/jog_end") as ending:
+        with page.expect_response("**/api/jog_on") as late:
             page.keyboard.down("Space")
-            until(page, "document.querySelector('#standing').textContent.startsWith('jog')")
-            page.keyboard.up("Space")
-            until(page, "document.querySelector('#arrived').textContent === 'jog: done'")
-        assert ending.value.ok
-        assert page.text_content("#arrived") == "jog: done"
+            until(page, "document.querySelector('#arrived').textContent.startsWith('jog: done: let go')")
+            stood = page.text_content("#position")
+        assert late.value.ok
+        page.keyboard.down("Space")  # as a key that is held repeats itself
+        page.wait_for_timeout(300)
+        page.keyboard.up("Space")
+        page.wait_for_timeout(300)
+        assert page.text_content("#position") == stood
+        assert page.text_content("#trouble") == ""
+        page.keyboard.down("Space")
+        until(page, f"{_AT} !== argument", stood)
+        page.keyboard.up("Space")

@@ -42,7 +42,6 @@ class BoardActions:
         """program: the motion of the page's program from joint values (n,) [rad | mm], at a fraction of its speed."""
         self.thread, self.arm, self.program = thread, thread.arm, program
         self._alive = 0.0  # until when a jog goes on
-        self._jogging: tuple[object, ...] | None = None
         self._goal: Array | None = None
         self._lock = threading.Lock()
 
@@ -55,6 +54,7 @@ class BoardActions:
             "assume_home": self.assume_home,
             "home": self.home,
             "jog": self.jog,
+            "jog_on": self.jog_on,
             "jog_end": self.jog_end,
             "grip": self.grip,
         }
@@ -122,36 +122,52 @@ class BoardActions:
         return {}
 
     def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Turn a joint, or move the tip along an axis, as long as this is asked again and again."""
+        """A button was pressed: turn a joint, or move the tip along an axis, while `jog_on` comes in time.
+
+        One press begins one jog: neither a sign of life that is late nor a request that is overtaken by the button's
+        release moves the arm.
+        """
+        press = _press(fields)
         percent = request_checks.number(fields, "percent", -100, 100)
         if percent == 0:
             raise UsageError("percent: 0 is no jog")
-        wanted, job = self._jog_of(fields, percent)
-        if self.thread.doing == "jog" and self._jogging == wanted:
-            self._alive = time.monotonic() + DEAD_MAN
-            return {}
+        job = self._jog_of(fields, percent)
         self.check_file()
         with self._lock:  # the job asks how long it goes on as soon as it is submitted
-            self.thread.submit("jog", job)
-            self._jogging, self._alive = wanted, time.monotonic() + DEAD_MAN
+            if press > tab.press:
+                tab.press = press
+                self.thread.submit("jog", job)
+                self._alive = time.monotonic() + DEAD_MAN
         return {}
 
-    def _jog_of(self, fields: Fields, percent: float) -> tuple[tuple[object, ...], Job]:
-        """What is to be jogged, and the job that does it."""
+    def _jog_of(self, fields: Fields, percent: float) -> Job:
+        """The job that jogs what is asked for."""
         if "axis" not in fields:
             joint = request_checks.whole(fields, "joint", self.arm.n)
-            return (joint, percent), lambda machine: self._jog(machine, joint, percent)
+            return lambda machine: self._jog(machine, joint, percent)
         from armkin.motion.jog_line import axes
 
         axis, frame = request_checks.text(fields, "axis", 10), request_checks.text(fields, "frame", 10)
         if axis not in axes(self.arm) or frame not in ("base", "tool"):
             raise UsageError(f"axis, frame: expected one of {', '.join(axes(self.arm))}, and base or tool")
         tool: Frame = "tool" if frame == "tool" else "base"
-        return (axis, frame, percent), lambda machine: self._jog_tip(machine, axis, tool, percent / 100)
+        return lambda machine: self._jog_tip(machine, axis, tool, percent / 100)
+
+    def jog_on(self, tab: Tab, fields: Fields) -> dict[str, Any]:
+        """The button is still held. Where the last sign of life was too long ago, its jog is over."""
+        press = _press(fields)
+        with self._lock:
+            now = time.monotonic()
+            if press == tab.press and now < self._alive:
+                self._alive = now + DEAD_MAN
+        return {}
 
     def jog_end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """The button was let go."""
-        self._alive = 0.0
+        """The button was let go; what comes later of that press moves nothing."""
+        press = _press(fields)
+        with self._lock:
+            tab.press = max(tab.press, press)
+            self._alive = 0.0
         return {}
 
     def grip(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -283,6 +299,11 @@ class BoardActions:
 
     def _progress(self, done: float, total: float) -> None:
         self.thread.done, self.thread.at = (round(done, 1), round(total, 1)), done
+
+
+def _press(fields: Fields) -> int:
+    """Which press of a jog's button, counted by the page."""
+    return request_checks.whole(fields, "press", 2**31)
 
 
 def _home(board: Board) -> None:

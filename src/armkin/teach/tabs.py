@@ -21,6 +21,7 @@ class Tab:
         self.id = secrets.token_urlsafe(16)
         self.born = time.monotonic()
         self.listening = False
+        self.press = -1  # the last one of its jog's button that has begun a jog or was let go
         self._news: dict[str, Any] = {}
         self._ready = threading.Condition()
 

@@ -90,7 +90,7 @@ export class Board {
       await act(name, fields);
     } catch (error) {
       this.page.trouble(/** @type {Error} */ (error).message);
-      if (name === "jog") this.jog.stopped();
+      if (name.startsWith("jog")) this.jog.over();
     }
   }
 
@@ -105,7 +105,7 @@ export class Board {
 
   /** STOP was pressed. */
   stopped() {
-    this.jog.stopped();
+    this.jog.stop();
   }
 
   /** @param {import("./types.js").BoardState} state */
@@ -125,8 +125,10 @@ export class Board {
     bar.hidden = !doing || !state.total_s;
     bar.value = state.total_s ? state.done_s / state.total_s : 0;
     if (before && state.ended.count !== before.ended.count) {
-      get("arrived").textContent = state.error ? "" : `${state.ended.name}: done`;
-      if (state.error) this.jog.stopped(); // at a limit, say: it does not begin again while its button is still held
+      const held = state.ended.name === "jog" && this.jog.held; // at a limit, say, or its signs of life came late
+      if (state.error || held) this.jog.over();
+      const more = held ? ": let go and press again to go on" : "";
+      get("arrived").textContent = state.error ? "" : `${state.ended.name}: done${more}`;
       if (state.error && state.error !== "stopped") this.page.trouble(state.error);
     }
     if (state.error === "stopped") get("arrived").textContent = "stopped: the arm stands on its path, its position is known";

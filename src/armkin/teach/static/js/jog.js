@@ -18,9 +18,11 @@ export class Jog {
   constructor(arm, board) {
     this.arm = arm;
     this.board = board;
+    this.presses = 0; // so far: each begins one jog at most
+    this.held = false;
     this.beating = 0;
-    /** @type {Promise<unknown>} */
-    this.answered = Promise.resolve(); // when all that was asked for has been answered
+    this.unanswered = 0; // signs of life
+    this.spent = true; // the gamepad's button has to be let go before it begins a jog
     this.polling = 0;
     this.pushed = ""; // what the gamepad asks for
     this.select = /** @type {HTMLSelectElement} */ (get("jog-joint"));
@@ -35,8 +37,8 @@ export class Jog {
     this.dead("jog-down", -1);
     this.dead("jog-up", 1);
     get("gamepad").addEventListener("change", () => this.pad());
-    document.addEventListener("visibilitychange", () => this.end());
-    window.addEventListener("blur", () => this.end());
+    document.addEventListener("visibilitychange", () => this.stop());
+    window.addEventListener("blur", () => this.stop());
   }
 
   /** What is chosen, in words of the server. @param {number} sign @param {string} [axis] of the tip, in the chosen frame */
@@ -48,35 +50,51 @@ export class Jog {
 
   /** @param {object} fields */
   begin(fields) {
-    if (this.beating) return;
-    let asked = false;
-    const beat = () => {
-      if (!this.beating) return;
-      const sent = asked ? this.board.tell("jog", fields) : this.board.ask("jog", fields);
-      asked = true;
-      this.answered = Promise.all([this.answered, sent]).then(() => {}); // not one list in another
-    };
-    this.beating = setInterval(beat, BEAT);
-    this.answered.then(beat);
+    if (this.held) return;
+    this.held = true;
+    this.presses++;
+    this.board.ask("jog", { press: this.presses, ...fields });
+    this.beating = setInterval(() => this.beat(), BEAT);
   }
 
+  /** A sign of life. A server that is slow has no line of them waiting before a STOP. */
+  async beat() {
+    if (this.unanswered > 1) return;
+    this.unanswered++;
+    await this.board.tell("jog_on", { press: this.presses });
+    this.unanswered--;
+  }
+
+  /** The button is let go: what the server hears later of this press moves nothing. */
   end() {
-    if (!this.beating) return;
-    this.stopped();
-    // Not before the server has had every sign of life: one that came after the end would begin another jog.
-    this.answered = this.answered.then(() => this.board.tell("jog_end"));
+    if (!this.held) return;
+    this.forget();
+    this.board.tell("jog_end", { press: this.presses });
   }
 
-  /** Nothing is asked for any more. */
-  stopped() {
+  /** Ended by something else than its button, which has to be pressed anew. */
+  stop() {
+    this.spent = true;
+    this.end();
+  }
+
+  /** The server has ended it, or never begun it: the button has to be pressed anew. */
+  over() {
+    this.spent = true;
+    this.forget();
+  }
+
+  forget() {
     clearInterval(this.beating);
-    this.beating = 0;
+    this.held = false;
   }
 
   /** A dead man's button: by pointer, and by the space bar or Enter. @param {string} id @param {number} sign */
   dead(id, sign) {
     const button = get(id);
+    button.addEventListener("contextmenu", (event) => event.preventDefault()); // it would swallow the button's release
     button.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
       button.setPointerCapture(event.pointerId); // held is what is pressed, also where the page moves beneath the pointer
       this.begin(this.chosen(sign));
     });
@@ -86,7 +104,7 @@ export class Jog {
     button.addEventListener("keydown", (event) => {
       if (event.key !== " " && event.key !== "Enter") return;
       event.preventDefault();
-      this.begin(this.chosen(sign));
+      if (!event.repeat) this.begin(this.chosen(sign)); // of a jog that has ended its held key begins no other
     });
   }
 
@@ -95,6 +113,7 @@ export class Jog {
     clearInterval(this.polling);
     if (this.pushed) this.end();
     this.pushed = "";
+    this.spent = true;
     const on = /** @type {HTMLInputElement} */ (get("gamepad")).checked;
     get("pad").textContent = on ? "Press a button of the gamepad, so that the browser tells of it." : "";
     if (on) this.polling = setInterval(() => this.poll(), POLL);
@@ -103,15 +122,16 @@ export class Jog {
   poll() {
     const found = Array.from(navigator.getGamepads?.() ?? []).find((one) => one?.connected);
     if (found) get("pad").textContent = `${found.id.slice(0, 60)}: hold a shoulder button and push a stick; B is STOP.`;
-    const stop = found?.buttons[CROSSED]?.pressed;
-    if (stop) get("stop").click();
-    const fields = found && !stop && !document.hidden && document.hasFocus() ? this.asked(found) : null;
+    if (found?.buttons[CROSSED]?.pressed) get("stop").click();
+    if (!found || document.hidden || !document.hasFocus()) this.spent = true;
+    else if (!SHOULDERS.some((k) => found.buttons[k]?.pressed)) this.spent = false;
+    const fields = found && !this.spent ? this.asked(found) : null;
     const wanted = fields ? JSON.stringify(fields) : "";
     if (this.pushed && wanted !== this.pushed) {
       this.pushed = "";
       this.end();
     }
-    if (!fields || this.beating || this.board.busy()) return; // what brakes still comes to rest first
+    if (!fields || this.held || this.board.busy()) return; // what brakes still comes to rest first
     this.pushed = wanted;
     this.begin(fields);
   }
