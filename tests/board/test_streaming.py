@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,13 +81,51 @@ def test_a_stall_before_the_first_step_begins_again() -> None:
     assert again[30 + (11 if again[4] & 2 else 5) :][:6] == bytes(6)  # behind a pause
 
 
-def test_a_stall_behind_the_first_step_is_a_hold() -> None:
+@pytest.mark.parametrize("rows", [[[-30, 5, -5]], [[0.3, 90, -90], [0, 89.7, -90], [-30, 5, -5]]])
+def test_a_stall_in_the_beginning_goes_on_from_there(rows: list[list[float]]) -> None:
     port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 4, 0.08)
+    machine = machine_on(port)
+    plans, at = list[Any](), machine.counts()
+    for row in rows:
+        plans.append(machine.plan(at, np.deg2rad([row])))
+        at = tuple(plans[-1].end.tolist())
+    assert machine.run(plans).error == 0
+    assert machine.counts() == at
+    again = next(payload_of(data) for data in port.sent if payload_of(data)[1] == 0)  # of a new session
+    assert again[6:18] != bytes(12), "what is left, not all of it"
+
+
+@pytest.mark.parametrize(("load", "sessions"), [(0.0, 1), (1.5, 0)])
+def test_a_stall_where_the_arm_turns_back(monkeypatch: pytest.MonkeyPatch, load: float, sessions: int) -> None:
+    """A beginning behind a rest is begun anew, too; a busy computer fills the queue first, for it may stall there."""
+    monkeypatch.setattr(streaming, "_load", lambda session: load)
+    out = ARM.home + np.deg2rad([5, -5, 5])
+    for frame in (11, 12, 13):  # the first two behind the rest, on a quiet computer
+        port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, 0.1)
+        machine = machine_on(port)
+        machine.run([machine.plan(machine.counts(), np.array([out, ARM.home]), speed=0.1)])
+        assert machine.counts() == (0, 0, 0)
+        assert sum(payload_of(data)[1] == 0 for data in port.sent) == sessions
+
+
+def test_a_stall_behind_the_beginning_is_a_hold() -> None:
+    port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 16, 0.45)
+    machine = machine_on(port)
+    moves = {"moves": [{"point": [350, 0, 300]}, {"circle": {"centre": [300, 0, 300]}}]}
+    plan = machine.lay(armkin.path(ARM, moves).motion, np.array(machine.counts()))
+    with pytest.raises(HeldError, match="keep its queue filled"):
+        machine.run([plan])
+    assert machine.counts() != tuple(plan.end.tolist())
+
+
+def test_after_a_second_somebody_may_be_near_the_arm() -> None:
+    """A program that was suspended moves nothing when it goes on."""
+    port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 4, 1.1)
     machine = machine_on(port)
     plan = machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))
     with pytest.raises(HeldError, match="keep its queue filled"):
         machine.run([plan])
-    assert machine.counts() != (0, 0, 0)
+    assert machine.counts() not in {(0, 0, 0), tuple(plan.end.tolist())}
 
 
 def test_two_frames_fit_the_line() -> None:

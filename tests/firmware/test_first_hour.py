@@ -31,7 +31,7 @@ def test_a_lost_arm_is_brought_home_by_keys_and_a_motor_turns_the_other_way(
         yield person
 
     monkeypatch.setattr("armkin.cli.commands.begin.keys", keys_of)
-    with EmulatedBoard("uno_cnc_shield", speed="max") as board:
+    with EmulatedBoard("uno_cnc_shield") as board:
         done = run("begin", path, "--port", board.port)
         assert done.code == 0, done.err
         assert not person.keys

@@ -9,21 +9,18 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.starting import from_counts, unbelievable
 from armkin.board.firmware import resets_and_stops, streaming
 from armkin.board.firmware.board_status import as_json
 from armkin.board.firmware.segments import trajectory_to_counts
-from armkin.board.firmware.segments.onwards import onwards, places_on
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Flag, Status
-from armkin.board.firmware.wire.session import DeviceError, Session
+from armkin.board.firmware.wire.session import DeviceError, Session, probe
 from armkin.board_kinds import board_name
 from armkin.errors import LinkError, PositionKnownError
 from armkin.model.units import joints_out
-from armkin.motors import joints, pulses
+from armkin.motors import pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
@@ -130,7 +127,7 @@ class Machine(Backend):
             counts = pulses(self.arm, self.arm.home if assume is None else assume).tolist()
             self.vouch(dict(zip(self.configuration.axes, counts, strict=True)))
         self.enable(self.configuration.axes)
-        self.session.probe()
+        probe(self.session)
         return lost
 
     def configure(self) -> None:
@@ -194,7 +191,7 @@ class Machine(Backend):
         """
         try:
             self.status, end = streaming.carry_out(
-                self.session, from_counts(plans, self.counts), self.configuration.axes, progress, self._onwards
+                self.session, from_counts(plans, self.counts), self.configuration.axes, progress, self.lay
             )
         except StoppedError as stopped:
             self.status = stopped.status or self.status
@@ -210,12 +207,6 @@ class Machine(Backend):
                 "a bug in armkin or its firmware, please report it"
             )
         return self.status
-
-    def _onwards(self, plan: trajectory_to_counts.Cut, stands: list[int]) -> trajectory_to_counts.Cut | None:
-        """What is left of a plan for an arm that stands at these counts; None: not on it."""
-        counts = np.array(stands, dtype=np.int64)
-        place = next(places_on([plan], counts), None)
-        return None if place is None else self.lay(onwards(plan, place, joints(self.arm, counts)), counts)
 
     def in_time(self) -> None:
         """Raise LinkError if the board says that ticks came late."""

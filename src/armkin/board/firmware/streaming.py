@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from armkin.board.firmware.segments.onwards import left_of
 from armkin.board.firmware.segments.straight_lines import UNHEARD, Pieces
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.go_back_n import QUESTION
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
     from armkin.board.firmware.segments.counts_to_segments import Counts, Move
     from armkin.board.firmware.segments.trajectory_to_counts import Cut
     from armkin.board.firmware.wire.session import Session
+    from armkin.motion.timing.trajectory import Trajectory
+
+    Lay = Callable[[Trajectory, Counts], Cut]
 
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
 _LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.05
@@ -40,37 +45,66 @@ _FAR = 0.005  # [s] of the slowest answer, from where on the queue is too short 
 _BUSY = 0.0003, 0.0005  # [s] that a board is busy with a frame, and with a segment of it,
 _BETWEEN = 2.2  # times that between ticks
 _ACK = 16  # [bytes] of an answer
-_BEGUN = 0.1  # [s] after its longest pause, until which a motion that has made no step may begin again
+_BEGINNING, _STOOD = 0.7, 1.0  # [s] of a motion, in which it goes on by itself if the arm stood no longer than this
+
+
+class _UnderWay:
+    """The moves of which the board may still do a part, in order."""
+
+    def __init__(self) -> None:
+        self._moves: deque[tuple[int, Cut, int]] = deque()  # frames before each, its plan, its number there
+
+    def add(self, frames: int, plan: Cut, number: int, taken: int) -> None:
+        """Add a move behind so many frames; those before the one of which the board took a frame last are done."""
+        self._moves.append((frames, plan, number))
+        self._forget(taken)
+
+    def _forget(self, taken: int) -> None:
+        while len(self._moves) > 1 and self._moves[1][0] < taken:
+            self._moves.popleft()
+
+    def left(self, session: Session, axes: Sequence[int], lay: Lay, *, first: bool) -> Sequence[Cut] | None:
+        """What is left for an arm whose queue ran dry; None unless that was in a move's beginning.
+
+        first: whether it may be the first move of all. None, too, if somebody may have come near the arm since.
+        """
+        began, status = session.port.now(), _at_rest(session)
+        self._forget(session.taken)
+        frames, plan, number = self._moves[0]
+        if not all(status.known >> axis & 1 for axis in axes) or (frames == 0 and not first):
+            return None
+        plans = [plan, *(plan for _, plan, k in islice(self._moves, 1, None) if k == 0)]
+        found = left_of(plans, number, [status.counts[axis] for axis in axes], lay)
+        stood = session.deaf + session.port.now() - began
+        return None if found is None or found[1] > _BEGINNING or stood > _STOOD else found[0]
 
 
 def carry_out(
-    session: Session,
-    plans: Iterable[Cut | None],
-    axes: Sequence[int],
-    progress: Progress,
-    onwards: Callable[[Cut, list[int]], Cut | None],
+    session: Session, plans: Iterable[Cut | None], axes: Sequence[int], progress: Progress, lay: Lay
 ) -> tuple[Status, Counts | None]:
-    """Carry out plans, one after another; None in between: nothing to do yet. axes: the motors' on the board.
+    """Carry out plans, one after another; None in between: nothing to do yet.
 
+    axes: the motors' on the board. lay: a trajectory from counts as a plan for this board.
     Returns the status at rest, and where the last plan ends. Raises DeviceError if the board ends the session. If the
-    queue runs dry before the first step, it begins again, with more time to fill; behind it, too, where the line has
-    damaged what was to fill it: then with what is left of the plan, as `onwards` says.
+    queue runs dry in a move's beginning, as a busy computer or a bad line did not fill it in time, what is left
+    follows, with more time to fill the queue: unless the arm stood for so long that somebody may be near.
     """
     end: Counts | None = None
     total = begun = done = 0.0
-    source, first = iter(plans), list[Any]()  # first: at most two plans
+    source, under_way = iter(plans), _UnderWay()
 
     def frames(plans: Iterable[Cut | None], least: float) -> Iterator[Batch | None]:
         nonlocal end, total, begun
+        given = 0
         for plan in plans:
             if plan is None:
                 yield None
                 continue
-            if len(first) < 2:
-                first.append(plan)
             total += plan.duration
-            for move in plan.moves(lambda: _pieces(session)):
+            for k, move in enumerate(plan.moves(lambda: _pieces(session))):
+                under_way.add(given, plan, k, session.taken)
                 for batch in batches(session, move, axes, plan.clock, least):
+                    given += 1
                     begun += batch.seconds
                     yield batch
             end = plan.end
@@ -82,38 +116,29 @@ def carry_out(
 
     least, todo = 0.0, source
     while True:
-        since = session.port.now()
+        session.attend()
         try:
             return stream(session, frames(todo, least), tell), end
         except DeviceError as error:
-            late = session.port.now() - since > _LEAD_MOST + _BEGUN
-            if error.error != Error.DRY or late or len(first) != 1 or least == _LEAD_MOST:
-                raise
-            left = _left_of(session, first[0], axes, onwards)
+            dry = error.error == Error.DRY
+            left = under_way.left(session, axes, lay, first=least < _LEAD_MOST) if dry else None
             if left is None:
                 raise
-            session.reopen()
-            total = begun = done = 0.0
-            # a line of which it is known by now is given a bad one's lead, then four times that, and then the longest
-            least = min(max(_LEAD_BAD, 4 * least), _LEAD_MOST) if session.line.damaged else _LEAD_MOST
-            first.clear()
-            todo = chain([left], source)
+        session.reopen()
+        total = begun = done = 0.0
+        # a line of which it is known by now is given a bad one's lead, then four times that, and then the longest
+        least = min(max(_LEAD_BAD, 4 * least), _LEAD_MOST) if session.line.damaged else _LEAD_MOST
+        under_way, todo = _UnderWay(), chain(left, source)
 
 
-def _left_of(
-    session: Session, plan: Cut, axes: Sequence[int], onwards: Callable[[Cut, list[int]], Cut | None]
-) -> Cut | None:
-    """What is left of a plan whose beginning ran dry: all before its first step; behind it None on a good line."""
+def _at_rest(session: Session) -> Status:
+    """The status of an arm whose queue ran dry, and what it tells of the line."""
     status = session.rest()
     if status.bad and not session.line.damaged:  # the board alone knows of it yet
         session.line.resent += 1
     if session.line.damaged and not session.line.noisy:  # one frame that is lost, and sent again, holds nothing
         session.line.resent += 1
-    counts = [status.counts[axis] for axis in axes]
-    if counts == plan.start.tolist():
-        return plan
-    known = all(status.known >> axis & 1 for axis in axes)
-    return onwards(plan, counts) if known and session.line.damaged else None
+    return status
 
 
 def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
@@ -158,7 +183,12 @@ def _reaches(session: Session, batch: Batch) -> bool:
     behind a long ramp would pass for a queue that runs dry.
     """
     left = session.under_way + session.queued / 1000
-    return batch.at_rest or left <= 0 or left < _MARGIN * (batch.seconds - _SPARE)
+    return batch.at_rest or left <= 0 or left < _soonest(batch.seconds)
+
+
+def _soonest(seconds: float) -> float:
+    """Seconds before a rest, from when on a beginning of so many seconds may follow it in the queue."""
+    return _MARGIN * (seconds - _SPARE)
 
 
 def _pieces(session: Session) -> Pieces:
@@ -248,7 +278,9 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
     source = (s.of(moving) for s in move.segments)
     todo: list[Segment] = list(islice(source, _SEEN))
     pause, sizes = _start(session, todo, room, clock, least) if todo else (0.0, list[int]())
-    begins = not line.damaged and _left(session) >= pause  # behind a rest, which may wait for room
+    # Behind a rest, for which it may wait until less is left there: the queue is filled while that lasts.
+    waits = _soonest(_seconds(todo[: _fit(todo, _BATCH[1], room)], clock)) if todo else 0.0
+    begins = not line.damaged and min(_left(session), waits) >= pause
     if begins:
         sizes = []
     elif todo and (longer := later(todo[0], pause, clock)):

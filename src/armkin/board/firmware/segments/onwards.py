@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ import numpy as np
 from armkin.board.firmware.wire.protocol import STEP
 from armkin.motion.remainder import remainder
 from armkin.motion.timing.trajectory import Trajectory
-from armkin.motors import places
+from armkin.motors import joints, places
 
 if TYPE_CHECKING:
     from armkin.board.firmware.segments.trajectory_to_counts import Cut
@@ -36,6 +36,23 @@ def onwards(part: Cut, place: Place, here: Array) -> Trajectory:
     stretches, arm = part.trajectory.stretches, part.trajectory.arm
     first = remainder(arm, stretches[place.stretch], place.seconds, here)
     return Trajectory(arm, here, (first, *stretches[place.stretch + 1 :]))
+
+
+def left_of(
+    plans: Sequence[Cut], move: int, counts: Sequence[int], lay: Callable[[Trajectory, np.ndarray], Cut]
+) -> tuple[Sequence[Cut], float] | None:
+    """What is left of plans for an arm at rest on a move of the first, and the seconds since that move began.
+
+    counts: where it stands; lay: a trajectory from there as a plan for its board. None: it does not stand on that move.
+    """
+    first, here = plans[0], np.array(counts, dtype=np.int64)
+    if move == 0 and (here == first.start).all():
+        return plans, 0.0
+    place = next((p for p in places_on([first], here) if p.stretch == move), None)
+    if place is None:
+        return None
+    left = onwards(first, place, joints(first.trajectory.arm, here))
+    return [lay(left, here), *plans[1:]], place.seconds
 
 
 def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:

@@ -154,11 +154,11 @@ class Window:
         """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
         reply_checks.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
 
-    def acknowledge(self, reply: Ack | Status, asked: float = 0.0) -> bool:
-        """Take a reply's `next` and `free`, asked for then; True if that acknowledges something."""
+    def acknowledge(self, reply: Ack | Status, asked: float = 0.0) -> int:
+        """Take a reply's `next` and `free`, asked for then; the number of frames that it acknowledges."""
         done = (reply.next - self._next) & 255
         if done > len(self._sent):
-            return False
+            return 0
         for _ in range(done):
             self._sent.popleft()
         self._next, self._free = reply.next, reply.free
@@ -169,4 +169,4 @@ class Window:
             type(reply) is Ack or asked > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
         ):
             self._gap = True  # something behind the first frame has arrived, the first has not
-        return done > 0
+        return done

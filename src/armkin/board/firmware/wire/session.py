@@ -51,6 +51,7 @@ class Session:
         self.last: Ack | Status | None = None  # as last heard
         self._error: Ack | Status | None = None
         self.heard = port.now()
+        self.attend()
         self._silent_for = 0.0  # [s] in which an answer would have been heard
         self._asked = 0.0
         self._until = 0.0  # something has to go on by then
@@ -148,6 +149,10 @@ class Session:
         """Seconds of motion that the board has not acknowledged."""
         return self._window.seconds
 
+    def attend(self) -> None:
+        """Begin to measure the longest time [s] that this program is deaf, and to count frames that the board takes."""
+        self.deaf, self.taken, self._turn = 0.0, 0, self.port.now()
+
     def flush(self) -> None:
         """Send what is in line, and wait until the board has executed or queued all of it."""
         while self._window:
@@ -167,6 +172,7 @@ class Session:
         if self._stop():
             raise StoppedError(self.hold())
         now = self.port.now()
+        self.deaf, self._turn = max(self.deaf, now - self._turn), now
         self._window.send()
         # There is room for one question beside the frames; on a bad line the one before may be lost.
         late = self._window.late and (self.line.damaged or not self.line.unanswered)
@@ -178,6 +184,7 @@ class Session:
         if now - self._asked >= quick:
             self._ask()
         self._hear(timeout)
+        self.deaf = max(self.deaf, self.port.now() - now)
         if self._error is not None:
             if self._stop():  # a suspended sender wakes to both: the board's silence, and the wish that it stop
                 raise StoppedError(self.hold())
@@ -214,18 +221,13 @@ class Session:
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
                 asked = self.line.answered(reply.tag)
-            if self._window.acknowledge(reply, asked) or goes_on:
+            self.taken += (taken := self._window.acknowledge(reply, asked))
+            if taken or goes_on:
                 self._patient()
             if reply.error and self._error is None:
                 self._error = reply
 
     # Questions, and stopping
-
-    def probe(self) -> None:
-        """Ask a few questions, to learn whether the line is good before anything depends on it."""
-        for _ in range(_PROBES):
-            if self.status().bad:
-                self.line.resent += 1
 
     def status(self, page: int = 0) -> Status:
         """Where the board stands, now; also after the session has ended."""
@@ -282,6 +284,13 @@ class Session:
             left = self.queued - 1000 * (self.port.now() - self.heard)  # what is queued goes on unheard
             self.pump(ends=not self._window and left < _ENDS)
             yield self.under_way + self.queued / 1000
+
+
+def probe(session: Session) -> None:
+    """Ask a few questions, to learn whether the line is good before anything depends on it."""
+    for _ in range(_PROBES):
+        if session.status().bad:
+            session.line.resent += 1
 
 
 def _nonce() -> int:
