@@ -50,9 +50,8 @@ class Session:
         self._status: Status | None = None
         self.last: Ack | Status | None = None  # as last heard
         self._error: Ack | Status | None = None
-        self.heard = port.now()
         self.attend()
-        self._silent_for = 0.0  # [s] in which an answer would have been heard
+        self.heard, self._silent_for = self._turn, 0.0  # [s] in which an answer would have been heard
         self._asked = 0.0
         self._until = 0.0  # something has to go on by then
 
@@ -176,8 +175,8 @@ class Session:
         self._window.send()
         # There is room for one question beside the frames; on a bad line the one before may be lost.
         late = self._window.late and (self.line.damaged or not self.line.unanswered)
-        soon = ends or self._window.out_of_credit or late
-        quick = _POLL_SOON if soon else _POLL_NOISY if self.line.damaged else _POLL
+        often = _POLL_NOISY if self.line.damaged else _POLL
+        quick = _POLL_SOON if ends or self._window.out_of_credit or late else often
         quick = quick / 2 if self.line.noisy else quick
         if self.line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
             quick = _POLL
@@ -206,9 +205,9 @@ class Session:
     def _hear(self, timeout: float) -> None:
         for reply in self.line.replies(timeout):
             self.heard = self.port.now()
-            if isinstance(reply, Info):
+            if isinstance(reply, Info):  # of a HELLO that was repeated
                 reply_checks.check_session(reply.nonce & 0xFFFF, self._digest, self.port.name)
-                continue  # of a HELLO that was repeated
+                continue
             assert self.info is not None
             reply_checks.check_reply(reply, self.info, self.port.name)
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
@@ -221,8 +220,8 @@ class Session:
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
                 asked = self.line.answered(reply.tag)
-            self.taken += (taken := self._window.acknowledge(reply, asked))
-            if taken or goes_on:
+            if (taken := self._window.acknowledge(reply, asked)) or goes_on:
+                self.taken += taken
                 self._patient()
             if reply.error and self._error is None:
                 self._error = reply
