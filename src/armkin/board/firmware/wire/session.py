@@ -170,8 +170,8 @@ class Session:
         """
         if self._stop():
             raise StoppedError(self.hold())
-        now = self.port.now()
-        self.deaf, self._turn = max(self.deaf, now - self._turn), now
+        before, now = self._turn, self.port.now()
+        self._turn = now
         self._window.send()
         # There is room for one question beside the frames; on a bad line the one before may be lost.
         late = self._window.late and (self.line.damaged or not self.line.unanswered)
@@ -183,7 +183,7 @@ class Session:
         if now - self._asked >= quick:
             self._ask()
         self._hear(timeout)
-        self.deaf = max(self.deaf, self.port.now() - now)
+        self.deaf = max(self.deaf, now - before, self.port.now() - now)
         if self._error is not None:
             if self._stop():  # a suspended sender wakes to both: the board's silence, and the wish that it stop
                 raise StoppedError(self.hold())
