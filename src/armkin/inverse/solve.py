@@ -17,7 +17,7 @@ from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
 from armkin.inverse.answers import rounding as target_rounding
-from armkin.inverse.answers.batch import Batch, Goals, empty, pack, replaced
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, empty, pack, replaced
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
@@ -33,7 +33,6 @@ from armkin.inverse.run import single as one_target
 from armkin.inverse.run.edges import examined
 from armkin.inverse.run.workers import check, shared
 from armkin.inverse.singular import free_postures, legal_postures, near_itself
-from armkin.inverse.singular.components import Seeds
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.fitting import task_for

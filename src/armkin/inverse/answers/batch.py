@@ -1,4 +1,4 @@
-"""Results of a batch as the solvers fill them: arrays of all targets, and how rows are written, packed and widened."""
+"""What a batch is asked, and its results as the solvers fill them: how rows are written, packed and widened."""
 
 from __future__ import annotations
 
@@ -25,6 +25,40 @@ class Goals(NamedTuple):
 
     def of(self, rows: NDArray[np.intp]) -> Goals:
         return Goals(self.arm, self.task, self.target[rows], self.near[rows])
+
+
+class Seeds(NamedTuple):
+    """Candidate branches of K targets.
+
+    q: (K, B, n), nan where there is none. loose: (K, B) those that depend on a value preferred for a free joint.
+    label: (K, B) of the solver's own numbering. sure: (K, B, n) joints that move along those that are known to
+    lie on a self-motion, one posture of each. simple: (K, B) branches as they stand: no closed form doubts them.
+    """
+
+    q: Array
+    loose: Bool
+    label: NDArray[np.int64]
+    sure: Bool
+    simple: Bool
+
+    @classmethod
+    def of(cls, q: Array, label: NDArray[np.int64], loose: Bool | None = None, simple: Bool | None = None) -> Seeds:
+        """Candidates of which no self-motion is known; by default none is loose, and none is simple."""
+        none, label = np.zeros(q.shape[:2], bool), np.broadcast_to(label, q.shape[:2])
+        sure = np.zeros(q.shape, bool)
+        return cls(q, none if loose is None else loose, label, sure, none if simple is None else simple)
+
+    @classmethod
+    def joined(cls, parts: list[Seeds]) -> Seeds:
+        """Those of several groups of targets, one below the other."""
+        K, width = sum(len(part.q) for part in parts), max(part.q.shape[1] for part in parts)
+        out, start = cls.of(np.full((K, width, parts[0].q.shape[2]), np.nan), np.zeros((K, 1), int)), 0
+        out = out._replace(label=out.label.copy(), simple=out.simple.copy())
+        for part in parts:
+            for whole, some in zip(out, part, strict=True):
+                whole[start : start + len(some), : some.shape[1]] = some
+            start += len(part.q)
+        return out
 
 
 class Batch(NamedTuple):

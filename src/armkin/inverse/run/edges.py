@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
-from armkin.inverse.answers.batch import Batch, Goals, wider, write
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
 from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, NEARBY, SAME
 from armkin.inverse.singular import components, linkages, near_itself
-from armkin.inverse.singular.components import Seeds
 
 AT_ONCE = 1024  # targets examined together
 

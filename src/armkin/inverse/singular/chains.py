@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 LINKS = 12  # curves on each side of a posture, twice as long each time, or half where one fails
 
 
-def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool, Bool]:
+def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
     """Which postures others (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
 
-    Those on which the residual grows are followed both ways until they end, or close. Also the joints (M, n) that move.
+    Those on which the residual grows are followed both ways until they end, or close. Also on which of these (M,) no
+    other curve crosses, and the joints (M, n) that move.
     """
     rows = np.arange(len(q))
     inside = members(at, rows, newton.difference(arm, others, q[:, None]))
@@ -33,8 +34,8 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
     grown = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
     left = np.flatnonzero(at.known & at.manifold & ~ended & (grown > CLOSED) & (at.second > HIGH))
     if not len(left):
-        return inside, ended, at.joints
-    joints, least, most = at.joints.copy(), at.least.copy(), at.most.copy()
+        return inside, ended, ended & at.alone, at.joints
+    joints, least, most, alone = at.joints.copy(), at.least.copy(), at.most.copy(), at.alone.copy()
     who, span = np.tile(left, 2), 2.0 * np.tile(at.span[left], 2)
     start, ahead = leaves(arm, at, who, q[who], np.concatenate([at.v[left], -at.v[left]]))
     done = np.isnan(start[:, 0])
@@ -54,6 +55,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
         off = newton.difference(arm, last, q[own])
         np.minimum.at(least, own[good], (off + link.least)[good])
         np.maximum.at(most, own[good], (off + link.most)[good])
+        np.logical_and.at(alone, own[good], link.alone[good])
         there, onwards = leaves(arm, link, rows, last, way)
         start[going[good]], ahead[going[good]] = there[good], onwards[good]
         done[going] = good & (home | np.isnan(there[:, 0]))
@@ -61,4 +63,4 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
     ended[left] = done.reshape(2, -1).all(axis=0)
     extent = (most - least)[left]
     joints[left] = extent > MOVED * extent.max(axis=1)[:, None]
-    return inside, ended, joints
+    return inside, ended, ended & alone, joints

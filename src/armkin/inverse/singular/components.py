@@ -9,13 +9,14 @@ ones `local_structure` tells the component.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.answers.batch import Goals
+from armkin.inverse.answers.batch import Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
@@ -65,8 +66,8 @@ class Examined(NamedTuple):
 class _Settled(NamedTuple):
     """The same; whether a loose candidate came to nothing, and whether a self-motion is a surface, (K,) each.
 
-    moved: (K, n) joints that move along self-motions other than those that were known. beyond: (K,) all that is near
-    lies beyond a fold.
+    moved: (K, n) joints that move along self-motions other than those of which all is known. beyond: (K,) all that is
+    near lies beyond a fold.
     """
 
     q: Array
@@ -80,40 +81,6 @@ class _Settled(NamedTuple):
     beyond: Bool
 
 
-class Seeds(NamedTuple):
-    """Candidate branches of K targets.
-
-    q: (K, B, n), nan where there is none. loose: (K, B) those that depend on a value preferred for a free joint.
-    label: (K, B) of the solver's own numbering. sure: (K, B, n) joints that move along those that are known to
-    lie on a self-motion, one posture of each. simple: (K, B) branches as they stand: no closed form doubts them.
-    """
-
-    q: Array
-    loose: Bool
-    label: Int
-    sure: Bool
-    simple: Bool
-
-    @classmethod
-    def of(cls, q: Array, label: Int, loose: Bool | None = None, simple: Bool | None = None) -> Seeds:
-        """Candidates of which no self-motion is known; by default none is loose, and none is simple."""
-        none, label = np.zeros(q.shape[:2], bool), np.broadcast_to(label, q.shape[:2])
-        sure = np.zeros(q.shape, bool)
-        return cls(q, none if loose is None else loose, label, sure, none if simple is None else simple)
-
-    @classmethod
-    def joined(cls, parts: list[Seeds]) -> Seeds:
-        """Those of several groups of targets, one below the other."""
-        K, width = sum(len(part.q) for part in parts), max(part.q.shape[1] for part in parts)
-        out, start = cls.of(np.full((K, width, parts[0].q.shape[2]), np.nan), np.zeros((K, 1), int)), 0
-        out = out._replace(label=out.label.copy(), simple=out.simple.copy())
-        for part in parts:
-            for whole, some in zip(out, part, strict=True):
-                whole[start : start + len(some), : some.shape[1]] = some
-            start += len(part.q)
-        return out
-
-
 def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None) -> Examined:
     """Correct, group and classify candidate branches of doubted targets.
 
@@ -122,18 +89,17 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     and for self-motions that may meet others; unsettled: (K,) targets whose candidates may not be all, of a solver
     that loses singular ones: more are asked for these and for what is singular.
     """
-    q = seeds.q
     found = _settle(goals, seeds, SEED)
     again = found.open | found.surface | ~(found.valid.any(axis=1) | (found.beyond & (unsettled is None)))
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
         first, last = found.moved.argmax(axis=1), goals.arm.n - 1 - found.moved[:, ::-1].argmax(axis=1)
-        wider = again | found.moved.any(axis=1) & (last - first > 2)
+        more_of = again | found.moved.any(axis=1) & (last - first > 2)
     else:
-        wider = again | unsettled | (found.status != Status.EXACT)
-    if not wider.any():
-        return Examined(*found[:5], np.zeros(len(q), bool))
-    rows = np.flatnonzero(wider)
+        more_of = again | unsettled | (found.status != Status.EXACT)
+    if not more_of.any():
+        return Examined(*found[:5], again)
+    rows = np.flatnonzero(more_of)
     others, labels, open_ = more(rows, again[rows])
     if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
         open_ |= found.surface[rows]
@@ -147,17 +113,13 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
     whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
     second = _settle(goals.of(rows), Seeds.of(np.concatenate([found.q[rows], others], axis=1), whose), HOPELESS)
-    K, n = found.free.shape
-    width = max(found.q.shape[1], second.q.shape[1])
-    out = Examined(
-        np.full((K, width, n), np.nan), np.zeros((K, width), bool), np.full((K, width), OWN), found.status, found.free,
-        again,
-    )  # fmt: skip
-    for some, part in ((np.arange(K), found), (rows, second)):
-        out.q[some], out.valid[some], out.label[some] = np.nan, False, OWN
-        own = part.q.shape[1]
-        out.q[some, :own], out.valid[some, :own], out.label[some, :own] = part.q, part.valid, part.label
-        out.status[some], out.free[some] = part.status, part.free
+    wider = ((0, 0), (0, max(second.q.shape[1] - found.q.shape[1], 0)))
+    q, valid = np.pad(found.q, (*wider, (0, 0)), constant_values=np.nan), np.pad(found.valid, wider)
+    out = Examined(q, valid, np.pad(found.label, wider, constant_values=OWN), found.status, found.free, again)
+    out.q[rows], out.valid[rows], out.label[rows] = np.nan, False, OWN
+    own = second.q.shape[1]
+    out.q[rows, :own], out.valid[rows, :own], out.label[rows, :own] = second[:3]
+    out.status[rows], out.free[rows] = second.status, second.free
     return out
 
 
@@ -192,12 +154,17 @@ class _Groups:
         self.open: Bool = self.valid & ~at.simple  # those of no group yet
         self.weak: Bool = (lost.place >= 0) & (lost.sigma < FOLDED) & ~on
         lost.sigma[on] = 0.0
-        self.asked: Bool = ~(self.open & self.weak)
-        self.known, self.moves = on.copy(), on.copy()
-        self.which, self.edge, self.ended = at.sure.copy(), np.zeros((K, M), bool), np.zeros((K, M), bool)
+        self.asked: Bool = ~(self.open & self.weak)  # what component it is on; pushed: whether pushes move it
+        self.known, self.moves, self.pushed = on.copy(), on.copy(), self.asked.copy()
+        self.which, self.edge = at.sure.copy(), np.zeros((K, M), bool)
+        self.ended, self.alone = np.zeros((K, M), bool), on.copy()
         self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
         self.chosen, self.curve = at.simple.copy(), np.zeros((K, M, n), bool)
         self.free, self.singular, self.double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
+
+    @cached_property
+    def tube(self) -> Array:
+        return self.lost.tube()
 
     def _plain(self) -> None:
         """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries
@@ -214,7 +181,9 @@ class _Groups:
         told = weak & self.known & ~self.moves
         other = weak & ~(told & (sigma >= SOLUTION))  # may be on a self-motion
         alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
-        told &= ~np.asarray((weak & self.moves).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[:, None]
+        told &= ~np.asarray((weak & (self.moves | ~self.pushed)).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[
+            :, None
+        ]
         some = np.flatnonzero(told.any(axis=1))
         if len(some):
             mine, one = told[some], self.component[self.place[some]] & valid[some, None] & others
@@ -235,33 +204,43 @@ class _Groups:
         self.free |= self.curve.any(axis=1)
 
     def _ask(self, k: Int, b: Int) -> None:
-        """What components these candidates lie on, if that is not known."""
-        arm, task, target, _ = self.goals
-        q, nullity = self.at.q, self.lost.nullity
+        """What components these candidates lie on that lose one direction, if that is not known."""
+        (arm, task, target, _), q = self.goals, self.at.q
         some = ~self.asked[k, b]
         k, b = k[some], b[some]
         self.asked[k, b] = True
-        one = nullity[k, b] < 2
+        one = self.lost.nullity[k, b] < 2
         if one.any():
             i, c = k[one], b[one]
             at = local_structure(arm, task, q[i, c], target[i], self.lost.weak.of(self.lost.place[i, c]))
             self.known[i, c], self.moves[i, c] = at.known, at.manifold
             self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
-            on, self.ended[i, c], self.which[i, c] = chains.whole(arm, task, at, q[i, c], q[i], target[i])
+            on, self.ended[i, c], self.alone[i, c], self.which[i, c] = chains.whole(
+                arm, task, at, q[i, c], q[i], target[i]
+            )
             self.component = np.concatenate([self.component, on])
-        rest = ~self.known[k, b] & ~self.rests[k, b] & (self.lost.sigma[k, b] < MOVING)
+        self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < MOVING)
+        self.rank[k, b] += np.where(self.pushed[k, b] | (b == 0), 0.0, 1.0)  # it may be on a component that is known
+
+    def _push(self, k: Int, b: Int) -> None:
+        """Whether these candidates move, of which `_ask` did not tell."""
+        self._ask(k, b)
+        rest = ~self.pushed[k, b]
         if rest.any():
             k, b = k[rest], b[rest]
-            lost = np.maximum(nullity[k, b], 1)
-            found = self_motions.self_motion(arm, task, q[k, b], self.lost.V[k, b], lost, target[k])
+            self.pushed[k, b] = True
+            lost = np.maximum(self.lost.nullity[k, b], 1)
+            found = self_motions.self_motion(
+                self.goals.arm, self.goals.task, self.at.q[k, b], self.lost.V[k, b], lost, self.goals.target[k]
+            )
             self.moves[k, b], self.which[k, b] = found
 
     def _lead(self, k: Int, b: Int) -> None:
         """One group of each of targets k (m,): those that are one with their b-th candidate (m,)."""
-        self._ask(k, b)
+        self._push(k, b)
         arm, near, sigma = self.goals.arm, self.goals.near, self.lost.sigma
         q, label, size = self.at.q, self.at.label, self.at.size
-        moving, joints, sure = self.moves[k, b], self.which[k, b], self.known[k, b]
+        sure = self.known[k, b]
         exact = np.where(sure[:, None], np.maximum(size[k], CLOSED), size[k])  # of known components as in `_plain`
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
         one: Bool = np.asarray(self.component[self.place[k, b]])
@@ -269,6 +248,8 @@ class _Groups:
         if len(some):
             far = away[some].max(axis=2)
             one[some] = roots.alike(arm, self.goals.task, q, k[some], b[some], far, sigma, size, self.goals.target)
+        self._inherit(k, b, one)
+        moving, joints = self.moves[k, b], self.which[k, b]
         one &= self.open[k]
         on = self._on_motion(k, b, away, one | ~self.open[k]) | (one & (sure & moving)[:, None])
         on[np.arange(len(k)), b] = True
@@ -285,10 +266,28 @@ class _Groups:
         pick[own] = b[own]
         self.chosen[k, pick] = True
         self.curve[k, pick] = joints & moving[:, None]
+        self.ended[k, pick], self.alone[k, pick] = self.ended[k, b], self.alone[k, b]
         if len(own):  # named like the candidate of its group that is closest to it
             alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
             twin = alike.argmin(axis=1)
             label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
+
+    def _inherit(self, k: Int, b: Int, one: Bool) -> None:
+        """Components (m, M) that a manifold begun at another of their candidates has as its own are that manifold.
+
+        Where a second direction is all but lost the curve through a candidate beside a manifold may leave it.
+        """
+        thick = self.tube[k, b] > TURNED
+        i, c = np.nonzero(one & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & (self.tube[k] > TURNED))
+        self._ask(k[i], c)
+        own = one & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & self.known[k] & self.moves[k]
+        i, c = np.nonzero(own)
+        back = self.component[self.place[k[i], c], b[i]]
+        i, first = np.unique(i[back], return_index=True)
+        k, b, c = k[i], b[i], c[back][first]
+        one[i] |= self.component[self.place[k, c]]
+        for array in (self.moves, self.which, self.ended, self.alone):
+            array[k, b] = array[k, c]
 
     def _on_motion(self, k: Int, b: Int, away: Array, one: Bool) -> Bool:
         """Which candidates (m, M) lie on the self-motions of those that lead, besides those `one` with them (m, M).
@@ -309,7 +308,7 @@ class _Groups:
             at, goal = q[k[some], b[some]], target[k[some]]
             mine[some] &= circuits.on_one(arm, task, at, joints[some], q[k[some]], far[some], goal)
             i, c = np.nonzero(far & mine & (self.resting[k] & joints[:, None]).any(axis=2))  # another curve crosses
-            self._ask(k[i], c)
+            self._push(k[i], c)
             rests = self.resting[k[i], c] & ~self.which[k[i], c]
             mine[i, c] &= ~(self.moves[k[i], c] & (joints[i] & rests).any(axis=1))
         return np.asarray(mine)
@@ -336,7 +335,7 @@ class _Groups:
         if len(rows):
             at, kept, curve = q[rows], chosen[rows], self.curve[rows]
             self_motions.drop_contained(arm, task, at, sigma[rows], self.resting[rows], kept, curve, target[rows])
-            self_motions.drop_twins(arm, task, at, kept, curve, self.ended[rows], target[rows])
+            self_motions.drop_twins(arm, task, at, kept, curve, self.ended[rows], self.tube[rows], target[rows])
             chosen[rows] = kept
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
         there = chosen[each, order]
@@ -354,7 +353,7 @@ class _Groups:
             self.free,
             missed,
             surface,
-            np.asarray((self.curve & ~self.at.sure).any(axis=1)),
+            np.asarray((self.curve & ~self.alone[:, :, None]).any(axis=1)),
             beyond,
         )
 

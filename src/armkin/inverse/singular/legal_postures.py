@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.answers.batch import Batch, Goals, wider, write
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.answers.closest import thorough
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_row
@@ -55,7 +55,7 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = out.branch[k, out.valid[k]].astype(np.int64)
-        found = components.examine(beside, components.Seeds.of(q[None], label), no_more)
+        found = components.examine(beside, Seeds.of(q[None], label), no_more)
         _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
         if not (inside & found.valid[0]).any():
             continue

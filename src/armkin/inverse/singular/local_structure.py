@@ -61,7 +61,7 @@ class Structure(NamedTuple):
     known: (M,) whether the curve was followed far enough to tell. manifold, boundary: (M,) what the component is, if
     neither, an isolated root. joints: (M, n) those that move along a manifold. low, high: (M,) ends of the component
     along v, at most `span` (M,) away, as far as the polynomials hold. least, most: (M, n) how far the joints' ways go
-    between these. v: (M, n). second: (M,) the second smallest
+    between these. alone: (M,) no other curve crosses within the span. v: (M, n). second: (M,) the second smallest
     singular value. x: (NODES, M, n) coefficients of the joints' ways [rad, reaches] in powers of t / span,
     g: (NODES, M, k) of the residual.
     """
@@ -75,6 +75,7 @@ class Structure(NamedTuple):
     span: Array
     least: Array
     most: Array
+    alone: Bool
     v: Array
     second: Array
     x: Array
@@ -135,6 +136,7 @@ def _unknown(at: newton.Linear) -> Structure:
         span=1.2 * REACH / np.abs(V[:, -1]).max(axis=1),
         least=np.zeros((M, n)),
         most=np.zeros((M, n)),
+        alone=np.zeros(M, bool),
         v=V[:, -1],
         second=S[:, n - 2] if n > 1 else np.ones(M),
         x=np.zeros((NODES, M, n)),
@@ -160,9 +162,9 @@ def _follow(
     """Follow the curves of some postures as far as their spans, and write what those tell that stay at hand (m,)."""
     n = q.shape[1]
     start = _Curve(q[rows], target[rows], U[rows, :, n - 1 :], V[rows, -1], w[rows], out.span[rows])
-    on, x, g = _polynomials(arm, task, start)
+    on, alone, x, g = _polynomials(arm, task, start)
     some = rows[on]
-    out.x[:, some], out.g[:, some] = x[:, on], g[:, on]
+    out.x[:, some], out.g[:, some], out.alone[some] = x[:, on], g[:, on], alone[on]
     _decide(out, some)
     return on
 
@@ -235,8 +237,9 @@ class _Curve(NamedTuple):
     span: Array
 
 
-def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Array, Array]:
-    """Which curves (M,) stay at hand as far as their spans, and coefficients of x (NODES, M, n) and g (NODES, M, k).
+def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Bool, Array, Array]:
+    """Which curves (M,) stay at hand as far as their spans, on which of these no other crosses, and coefficients of x
+    (NODES, M, n) and g (NODES, M, k).
 
     Each node is Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation
     problems, 1977).
@@ -248,7 +251,7 @@ def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Array, Arra
     bordered = np.zeros((len(t), rows + 1, rows + 1))
     bordered[:, :rows, n:], bordered[:, rows, :n] = start.u[who], start.v[who]
     away = t[:, None] * start.v[who] + 0.5 * (t * t)[:, None] * start.w[who]
-    g, active = np.full((len(t), k), np.nan), np.arange(len(t))
+    g, active, regular = np.full((len(t), k), np.nan), np.arange(len(t)), np.zeros(len(t))
     for _ in range(ITERATIONS):
         one = who[active]
         r, bordered[active, :rows, :n] = newton.scaled(arm, task, start.q[one] + away[active] * unit, start.target[one])
@@ -259,6 +262,7 @@ def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Array, Arra
         # the last rows span what no motion across v reaches: u has turned on the way
         across = inverse[:, n:, :rows]
         g[active] = _least(across, step[:, n:])
+        regular[active] = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
         size = np.abs(step[:, :n]).max(axis=1)
         active = active[~(size < ARRIVED) & (np.abs(away[active]).max(axis=1) < 3.0 * np.abs(t[active]))]
         if not len(active):
@@ -272,8 +276,13 @@ def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Array, Arra
     with np.errstate(invalid="ignore"):
         on &= last[:, :n].max(axis=1) < SMOOTH * start.span
         on &= last[:, n:].max(axis=1) < 0.01 * SOLUTION
+    # a crossing is a zero of the bordered Jacobian's smallest singular value, which no two nodes are as close to as it
+    # changes between any two
+    weakest, apart = regular.reshape(NODES, M), np.multiply.outer(-np.diff(NODE), start.span)
+    steepest = (np.abs(np.diff(weakest, axis=0)) / apart).max(axis=0)
+    alone = (weakest[1:] + weakest[:-1] > 2.0 * steepest * apart).all(axis=0)
     power = np.tensordot(_POWERS, chebyshev, axes=1)
-    return np.asarray(on), power[:, :, :n], power[:, :, n:]
+    return np.asarray(on), np.asarray(alone), power[:, :, :n], power[:, :, n:]
 
 
 def _least(across: Array, left: Array) -> Array:

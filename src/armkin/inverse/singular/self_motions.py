@@ -22,6 +22,7 @@ from armkin.inverse.numeric.tolerances import (
     GROWTH,
     HIGH,
     MOVED,
+    REACH,
     SAME,
     SOLUTION,
     STALLED,
@@ -94,16 +95,19 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     return np.asarray(out.reshape(2, -1).any(axis=0))
 
 
-def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, ended: Bool, target: Array) -> None:
+def drop_twins(
+    arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, ended: Bool, tube: Array, target: Array
+) -> None:
     """Keep one of chosen postures (K, M) of self-motions that turn out to be the same: change chosen.
 
     curve: (K, M, n) the joints that a posture's self-motion moves; ended: (K, M) those of which both ends are known,
-    and all that is between. One group's posture may be close to another's; where a self-motion consists of double
-    roots, known to the root of rounding, its postures were taken for many.
+    and all that is between; tube: (K, M) how far postures may be off their curve. One group's posture may be close to
+    another's; where a self-motion consists of double roots, known to the root of rounding, its postures were taken for
+    many.
     """
     moving = np.asarray(curve.any(axis=2))
     moving[:, 0] = True  # `near`, the first: nothing is said to move where three directions are lost at once
-    some = chosen & moving
+    some = chosen & moving & ~ended  # what else were on one of these would be one with it
     pairs = some[:, :, None] & some[:, None] & np.tri(q.shape[1], k=-1, dtype=bool)
     k, i, j = np.nonzero(pairs)
     if not len(k):
@@ -112,10 +116,11 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, ended:
     same, size = np.zeros(len(k), bool), np.abs(apart)
     # one may be where its own self-motion and the other meet
     turned = np.where(curve[k, i], 0.0, size).max(axis=1)
-    held = (turned < TURNED) & ((size > TURNED).sum(axis=1) <= ALONG)
+    thick = np.maximum(TURNED, tube[k, i] + tube[k, j])
+    held = (turned < thick) & ((size > thick[:, None]).sum(axis=1) <= ALONG)
     # a joint may move too slowly at one of the two alone to be called free there
     most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
-    slow = ~held & (most > TURNED) & (most < DRIFT) & ~(ended[k, i] | ended[k, j])
+    slow = ~held & (most > TURNED) & (most < DRIFT)
     held |= np.equal(j, 0)  # `near` stands for all that meet there
     open_ = np.flatnonzero(held)
     same[open_] = _straight(arm, task, at[open_], apart[open_], target[k[open_]])
@@ -131,8 +136,8 @@ def drop_twins(arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, ended:
 def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool:
     """Whether the joints can move from q (M, n) to q + way while they keep the target, each at a constant pace: (M,).
 
-    A quarter, half and three quarters of the way are asked, each way round for joints that turn by 180 degrees. They
-    may be off by as much as roots of high order are.
+    A quarter, half and three quarters of the way are asked, each way round for joints that turn by about 180 degrees.
+    They may be off by as much as roots of high order are.
     """
     out = np.zeros(len(q), bool)
     if not len(q):
@@ -149,8 +154,8 @@ def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool
 
 
 def _both_ways(arm: Arm, way: Array) -> Array:
-    """A way (n,) each way round for joints that turn by 180 degrees: (m, n)."""
-    half = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(way) < TURNED))
+    """A way (n,) each way round for joints that turn by about 180 degrees: (m, n)."""
+    half = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(way) < REACH))
     flips = np.array(list(itertools.product((0.0, 1.0), repeat=len(half))))
     ways = np.tile(way, (len(flips), 1))
     ways[:, half] -= 2.0 * np.pi * flips * np.sign(way[half])
