@@ -23,6 +23,7 @@ _VARIABLES = {
     "NO_COLOR": "no colours on a terminal",
     "CC": "the C compiler of --compiled",
     "XDG_CACHE_HOME": "where what it built is kept",
+    "XDG_STATE_HOME": "where locks and notes of ports are kept",
 }
 
 

@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import sys
+import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -22,6 +23,9 @@ from slow import SLOW
 
 # Before numpy is imported: its threads bring small matrices nothing, and those of two workers wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# What is noted of pseudo-terminals is no business of the boards of who runs the tests.
+os.environ["XDG_STATE_HOME"] = os.path.join(tempfile.gettempdir(), "armkin-tests")
 
 # What Python compiles is kept, whatever this computer says: else each of some thousand commands compiles armkin again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

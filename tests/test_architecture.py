@@ -19,6 +19,7 @@ MAY_IMPORT: dict[str, str] = {
     "board_kinds": "",
     "installed_kinds": "board_kinds",
     "signals": "",
+    "user_folders": "",
     "files": "errors",
     "formula": "errors",
     "robot_file": "errors files board_kinds installed_kinds",
@@ -65,9 +66,9 @@ MAY_IMPORT: dict[str, str] = {
     " inverse/elimination inverse/branches keep_out motors export/c",
     "compiled": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
     " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export/c columns"
-    " inverse/redundant",
+    " inverse/redundant user_folders",
     "plot": "keep_out keep_out/shapes errors files formula model forward motion motion/plan view reachability",
-    "board/ports": "errors",
+    "board/ports": "errors user_folders",
     "board/firmware/wire": "errors board/ports board/backend",
     "board/firmware/segments": "errors formula model forward motors motion motion/timing board/backend"
     " board/firmware/wire",

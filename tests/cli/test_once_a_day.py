@@ -12,7 +12,7 @@ from armkin.cli import board_link
 def test_the_notes_of_a_port_come_once_a_day(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     for port, words, said in (
         ("/dev/one", ["no checksum"], "note: no checksum"),
         ("/dev/one", ["no checksum"], ""),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -119,7 +118,7 @@ def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest
     for port in ("kinds.firmware.SerialPort", "ports.SerialPort", "kinds.klipper.SocketPort"):
         monkeypatch.setattr(f"armkin.board.{port}", opened)
     # The same in every run: no notes of other runs, no random session numbers, no leads for a busy computer.
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(session, "secrets", Numbers(rng))
     monkeypatch.setattr(streaming, "_load", lambda session: 0.0)
     codes = list[int]()

@@ -177,7 +177,7 @@ def arms() -> Iterator[Arms]:
         stack.enter_context(mock.patch.object(sys, "path", packages))
         installed_kinds._offered.cache_clear()
         stack.callback(installed_kinds._offered.cache_clear)
-        stack.enter_context(mock.patch("tempfile.tempdir", str(folder)))
+        stack.enter_context(mock.patch.dict("os.environ", XDG_STATE_HOME=str(folder)))
         found, checked = Arms(folder), Laid.__post_init__
 
         def note(laid: Laid) -> None:

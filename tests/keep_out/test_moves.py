@@ -116,7 +116,7 @@ def test_a_port_remembers_its_scene(table: str, tmp_path: Path, monkeypatch: pyt
     from armkin.cli import keep_outs
     from armkin.errors import UsageError
 
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     bare, inside = armkin.load("three_dof"), armkin.load("three_dof", scene=table)
     keep_outs.check_port("/dev/ttyX", bare, False)
     keep_outs.check_port("/dev/ttyX", inside, False)

@@ -23,6 +23,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
+from armkin import user_folders
 from armkin.errors import FileError, MissingExtraError
 
 # No fast-math: sums keep their order, infinities and what is not a number keep their meaning. That errno is not
@@ -31,9 +32,6 @@ FLAGS = ["-std=c99", "-march=native", "-fno-math-errno", "-fno-trapping-math", "
 FLAGS += ["-shared", "-fPIC"]
 _DAY = 86_400.0  # [s]
 LONGEST = 60.0  # [s] that optimising may take; three_dof takes 2, an arm by elimination 8
-
-
-_CACHES = {"win32": "AppData/Local", "darwin": "Library/Caches"}  # of a user, where it is not ~/.cache
 
 
 def announce() -> None:
@@ -151,16 +149,17 @@ def _digest(held: bytes) -> str:
 
 def _folder() -> Path | None:
     """The cache folder, made if need be; None if it is not this user's alone."""
-    home = os.environ.get("XDG_CACHE_HOME", "")
-    base = Path(home) if os.path.isabs(home) else Path.home() / _CACHES.get(sys.platform, ".cache")
-    folder = base / "armkin" / "compiled"
+    folder = user_folders.compiled()
+    if folder is None:
+        return None
+    base = folder.parent.parent
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
         for path in (folder.parent, folder):  # one by one: `parents` would leave those above to the umask
             path.mkdir(mode=0o700, exist_ok=True)
         # who can write a folder above can put another in its place
         own = all(_is_ours(path, path == folder) for path in (folder, folder.parent, base))
-    except (OSError, RuntimeError):  # no home, a file in the way, a full or read-only disk
+    except OSError:  # a file in the way, a full or read-only disk
         return None
     return folder if own and os.access(folder, os.W_OK) else None
 

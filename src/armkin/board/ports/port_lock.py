@@ -10,7 +10,6 @@ import hashlib
 import os
 import signal
 import sys
-import tempfile
 import threading
 import time
 from contextlib import suppress
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from armkin.board.ports.port import SIM
 from armkin.errors import PortInUseError
+from armkin.user_folders import of_port
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
@@ -125,10 +125,7 @@ def _acquired(name: str) -> BaseFileLock | None:
 def _path(name: str, end: str) -> str:
     real = name if "://" in name else os.path.realpath(name)
     key = hashlib.sha256(real.encode("utf-8", "surrogateescape")).hexdigest()[:16]
-    user = "user"  # on Windows the folder is the user's own
-    if sys.platform != "win32":
-        user = str(os.getuid())
-    return os.path.join(tempfile.gettempdir(), f"armkin-{user}-{key}.{end}")
+    return f"{of_port(key)}.{end}"
 
 
 def _read_pid(name: str) -> int | None:
