@@ -35,7 +35,7 @@ Baud = Annotated[
         metavar="N",
         parser=str,
         callback=_rate,
-        help="The port's rate. [default: what the kind of board uses]",
+        help="Baud rate of the port. [default: what the kind of board uses]",
     ),
 ]
 NoReset = Annotated[

@@ -19,7 +19,7 @@ RobotOrPipe = Annotated[
     str | None,
     typer.Argument(
         metavar="[ROBOT]",
-        help="Robot file or name; an answer on standard input names its own.",
+        help="Robot file or name; left out where an answer on standard input names it.",
         autocompletion=completion.robots,
     ),
 ]

@@ -31,12 +31,17 @@ def parse(raw: bytes, name: str) -> PathFile:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise PathFileError(f"{name}: is not UTF-8 text", file=name) from None
+    lines = csv.reader(io.StringIO(text))
     filled = (
         (number, row)
-        for number, row in enumerate(csv.reader(io.StringIO(text)), 1)
+        for number, row in enumerate(lines, 1)
         if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
     )
-    rows = list(islice(filled, MOST_POINTS + 2))  # a header, and one too many
+    try:
+        rows = list(islice(filled, MOST_POINTS + 2))  # a header, and one too many
+    except csv.Error as error:
+        line = lines.line_num
+        raise PathFileError(f"{name}:{line}: no row of numbers: {error}", file=name, line=line) from None
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
     header: list[str] | None = None
@@ -69,10 +74,10 @@ def parse(raw: bytes, name: str) -> PathFile:
         moves.append(_move(keys, [v for v in values if v is not None], first=not moves, where=(name, number)))
     if not moves:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
-    lines: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}
+    places: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}
     smooth = moves[0].point is not None and "blend" not in (header or ())
     return PathFile.model_construct(moves=moves, corners="tolerance" if smooth else None).read_from(
-        Source(name, lines, rows=True)
+        Source(name, places, rows=True)
     )
 
 

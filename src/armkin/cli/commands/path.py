@@ -29,11 +29,11 @@ _STEP = 0.01  # [s] between the rows of --out
 def path(
     robot: Robot,
     file: Annotated[
-        str | None, typer.Argument(metavar="[FILE|-]", help="Moves: a path file (YAML), or corners as CSV rows.")
+        str | None, typer.Argument(metavar="[FILE|-]", help="A path file (YAML), waypoints as CSV, G-code or SVG.")
     ] = None,
     via: Annotated[
         list[str] | None,
-        typer.Option("--via", metavar="X,Y,Z", help="Instead of a file: a corner of straight lines. Repeatable."),
+        typer.Option("--via", metavar="X,Y,Z", help="Instead of a file: a waypoint on straight lines. Repeatable."),
     ] = None,
     port: Annotated[
         str | None,

@@ -52,7 +52,7 @@ def plot(
 ) -> None:
     """A picture of the arm.
 
-    In one pose, in all branches of a target, or along a path. Takes what fk, ik and pulses say with --json
+    In one pose, in all branches of a target, or along a path. Takes what fk, ik and pulses print with --json
     from a pipe, too.
     """
     from armkin.plot import canvas

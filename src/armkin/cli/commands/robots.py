@@ -18,7 +18,7 @@ def robots(json: Json = False, out: Out = None) -> None:
 
     Each is used by its name from any folder: `armkin fk three_dof -30 5 -5`. simulate: `send --dry-run`, and
     `--port sim` without assumptions. `armkin info ROBOT` says what is missing for the rest. compared: whether the
-    geometry was held against a maker's or another author's figure, or against the URDF alone that it comes from;
+    geometry was compared with a maker's or another author's figure, or only with the URDF that it comes from;
     --json says which.
     """
     from armkin.robot_file import catalogue
