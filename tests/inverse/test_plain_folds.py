@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.inverse.run import edges
+from armkin.inverse.run import chunks, edges
 from armkin.inverse.singular import components, local_structure
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
@@ -16,13 +16,13 @@ from armkin.inverse.tasks.task import targets_of
 ARMS = ("three_dof", "puma560", "ur5e")
 
 
-def beside_folds(arm: armkin.Arm) -> np.ndarray:
+def beside_folds(arm: armkin.Arm, N: int = 16) -> np.ndarray:
     """Postures (N, n) with joint 3 beside a stretched or folded elbow, 1e-6 to 1e-3 rad off."""
     rng = np.random.default_rng(5)
-    q = rng.uniform(-np.pi, np.pi, (16, arm.n))
+    q = rng.uniform(-np.pi, np.pi, (N, arm.n))
     wrist = (arm.link[3] @ arm.link[4])[:2, 3] if arm.name == "puma560" else np.array([1.0, 0.0])
     stretched = -float(np.arctan2(wrist[1], wrist[0]))
-    q[:, 2] = stretched + rng.choice([0.0, np.pi], 16) + rng.choice([-1.0, 1.0], 16) * np.geomspace(1e-6, 1e-3, 16)
+    q[:, 2] = stretched + rng.choice([0.0, np.pi], N) + rng.choice([-1.0, 1.0], N) * np.geomspace(1e-6, 1e-3, N)
     return q
 
 
@@ -78,6 +78,38 @@ def test_branches_that_are_not_examined_are_what_examining_finds(name: str, monk
     for field in ("status", "valid", "free", "complete", "branch"):
         assert np.array_equal(getattr(short, field), getattr(long, field)), field
     np.testing.assert_allclose(np.nan_to_num(short.q), np.nan_to_num(long.q), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "task"),
+    [*((name, None) for name in ARMS), ("labvolt_5150", None), ("labvolt_5150", "pose"), ("ra02", None)],
+)
+def test_what_two_jacobians_tell_is_what_examining_finds(
+    name: str, task: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arm = armkin.load(name)
+    which, tell, told = task_for(arm, task), chunks.tell, 0
+    rng = np.random.default_rng(12)
+    q = np.concatenate([beside_folds(arm, 80), rng.uniform(-np.pi, np.pi, (40, arm.n))])
+    q[80:110, arm.n - 2] = rng.choice([-1.0, 1.0], 30) * np.geomspace(1e-6, 1e-3, 30)
+    q[110:, 1:] = rng.integers(-4, 4, (10, arm.n - 1)) * np.pi / 4
+    target = np.asarray(targets_of(which, armkin.fk(arm, q), q))
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal told
+        left = tell(*arguments)
+        told += len(arguments[3].rows) - len(left)
+        return left
+
+    monkeypatch.setattr(chunks, "tell", counted)
+    short = armkin.ik(arm, target, task)
+    monkeypatch.setattr(chunks, "tell", lambda goals, runner, out, at: at.rows)
+    long = armkin.ik(arm, target, task)
+    assert told > 20
+    assert {0, 1} <= set(short.status.tolist())
+    for field in ("status", "valid", "free", "complete", "branch", "within_limits"):
+        assert np.array_equal(getattr(short, field), getattr(long, field)), field
+    np.testing.assert_allclose(np.nan_to_num(short.q), np.nan_to_num(long.q), rtol=0, atol=1e-9)
 
 
 def test_a_component_is_followed_as_far_as_it_goes() -> None:

@@ -55,7 +55,8 @@ def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float) -> N
 
 @pytest.mark.parametrize("name", ["three_dof", "puma560", "ur5e"])
 def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Random targets of which two branches lie 3e-5 to 3e-4 rad apart: one call."""
+    """Random targets of which two branches lie 3e-5 to 3e-4 rad apart: most are told by their Jacobians, the others at
+    once."""
     known = []
     examine = components.examine
 
@@ -72,8 +73,8 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
     straight = {"three_dof": 0.0, "puma560": np.arctan2(20.32, 431.8) - np.pi / 2, "ur5e": 0.0}[name]
     q[:, 2] = straight + 10.0 ** rng.uniform(-4.5, -3.6, 100) * rng.choice([-1.0, 1.0], 100)
     answers = armkin.ik(arm, goal(task, screw, q).array())
-    assert len(known) == 1
-    assert known[0] > 50
+    assert len(known) <= 1
+    assert sum(known) < 20
     assert set(np.unique(answers.status)) == {Status.EXACT, Status.BOUNDARY}
 
 

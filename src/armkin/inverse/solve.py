@@ -126,8 +126,7 @@ def answered(
     shown, most = target_rounding.of_targets(arm, definition, target, (given, shown), single, rounding, lead)
     if examine:
         goals = Goals(arm, definition, target, each)
-        if not out.within.any(axis=1).all():
-            out = legal_postures.with_legal_postures(goals, out)
+        out = legal_postures.with_legal_postures(goals, out)
         if most.max(initial=0.0) > near_itself.ROUNDED:
             out = near_itself.stand(goals, out, most)
         if arm.keep_out:

@@ -20,6 +20,7 @@ from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
 from armkin.inverse.run.edges import AT_ONCE, decided
+from armkin.inverse.run.folds import Doubted, tell
 from armkin.inverse.run.workers import shared
 from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
@@ -65,10 +66,10 @@ def solve(
     target, rounding = np.empty_like(given), np.zeros(N)
     tip = None if one is None else position(arm, one)
 
-    def part(rows: slice) -> list[NDArray[np.intp]]:
+    def part(rows: slice) -> list[Doubted]:
         """Some rows, by a thread of its own; returns those on an edge."""
         workspace: list[NDArray[Any]] = []
-        left: list[NDArray[np.intp]] = []
+        left: list[Doubted] = []
         for start in range(rows.start, rows.stop, step):
             some = slice(start, min(start + step, rows.stop))
             goal, columns, close = given[some], None, near[some] if one is None else one
@@ -86,16 +87,21 @@ def solve(
                 first = goal[:, 0] if columns is None else cast("Array", columns[9])
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
-            left.append(start + _keep(goals, runner.axes, out.part(some), found, close, there))
+            edge = _keep(goals, runner.axes, out.part(some), found, close, there)
+            if len(edge.rows):
+                left.append(edge._replace(rows=start + edge.rows))
         return left
 
     parts = [part(slice(0, N))] if workers == 1 else shared(part, N, workers, step, step)
-    edge = np.concatenate([np.empty(0, np.intp), *(rows for one_part in parts for rows in one_part)])
+    doubted = [some for one_part in parts for some in one_part]
     out.complete[...] = geometry.complete
+    edge = np.concatenate([np.empty(0, np.intp), *(some.rows for some in doubted)])
     if geometry.doubts is None:
-        if examine and len(edge):
+        if examine and doubted:
+            goals = Goals(arm, task, target, near)
+            edge = edge if geometry.ends else tell(goals, runner, out, Doubted.joined(doubted))
             for start in range(0, len(edge), AT_ONCE):
-                out = decided(Goals(arm, task, target, near), runner, out, edge[start : start + AT_ONCE])
+                out = decided(goals, runner, out, edge[start : start + AT_ONCE])
         edge = edge[:0]
     return Solved(out, math.prod(runner.axes), target, rounding, edge)
 
@@ -107,7 +113,7 @@ def _keep(
     found: list[Array],
     near: Array,
     there: NDArray[np.intp] | None,
-) -> NDArray[np.intp]:
+) -> Doubted:
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
     targets on an edge.
 
@@ -115,7 +121,8 @@ def _keep(
     """
     arm = goals.arm
     doubt: Any  # flags
-    *values, miss, doubt, _ = found
+    free: Any
+    *values, miss, doubt, free = found
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
     miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
@@ -138,14 +145,30 @@ def _keep(
     part.valid[...] = True if full else valid.T
     part.within[...] = part.valid if within is valid else within.T
     part.branch[...] = _every_branch(B, arrays.CHUNK)[:N]
-    doubted = _on_edge(doubt, miss, None if full else valid)
+    on_edge = _on_edge(doubt, miss, None if full else valid)
     if there is not None and len(there):
-        doubted = np.union1d(doubted, near_itself.take(goals, part, there))
+        on_edge = np.union1d(on_edge, near_itself.take(goals, part, there))
+    doubted = _doubted(on_edge, part, (miss.reshape(shape), doubt, free), there)
     if not full:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
         pack(part, count)
     return doubted
+
+
+def _doubted(
+    rows: NDArray[np.intp], part: Batch, columns: tuple[Any, Any, Any], there: NDArray[np.intp] | None
+) -> Doubted:
+    """Rows of a part on an edge; columns: squared residuals, edge and free of all branches; there: `_keep`."""
+    N, B, n = part.q.shape
+    if not len(rows):
+        return Doubted(rows, np.empty((0, B, n)), np.empty((0, B)), np.empty((0, B), bool), np.empty(0, bool))
+    lead = np.broadcast_shapes(*(np.shape(x) for x in columns))[:-1]
+    miss, edge, free = (np.broadcast_to(x, (*lead, N))[..., rows].reshape(B, -1).T for x in columns)
+    plain: Bool = np.asarray(~(free > 0.0).any(axis=1))
+    if there is not None and len(there):
+        plain &= np.isin(rows, there, invert=True)
+    return Doubted(rows, part.q[rows], miss, edge > 0.0, plain)
 
 
 def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> NDArray[np.intp]:

@@ -37,7 +37,8 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         """Further candidates: none, those that were found are all."""
         return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64), np.zeros(len(rows), bool)
 
-    rows = np.flatnonzero(((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR)) & ~out.within.any(axis=1))
+    rows = np.flatnonzero((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR))
+    rows = rows[~out.within[rows].any(axis=1)]
     if not len(rows):
         return out
     for k in rows[_may_be_legal(goals, out, rows)]:

@@ -1,0 +1,203 @@
+"""Targets on an edge whose branches stand alone or meet in pairs: two Jacobians a pair tell which.
+
+Most targets that a closed form doubts are a fold's two branches some 1e-4 rad apart. Between them the residual along
+the lost direction is a cubic: both its zeros and its slopes there are known, the slopes from the Jacobians bordered by
+that direction. Where the cubic leaves no doubt, what it tells is what `singular.local_structure` would; all other
+targets are left to `singular.components`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armkin.formula.arrays import Array, Bool
+from armkin.forward import tip_and_jacobian
+from armkin.inverse.answers.batch import Batch, Goals, write
+from armkin.inverse.answers.solutions import Status
+from armkin.inverse.closed.candidates import Recorded, as_rows
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import (
+    ACCEPTED,
+    CLOSE_BY,
+    CLOSED,
+    CURVATURE,
+    FOLD_WAY,
+    FOLDED,
+    HIGH,
+    NEARBY,
+    SAME,
+    SEED,
+    SOLUTION,
+)
+from armkin.inverse.tasks.residuals import task_jacobian
+from armkin.model.units import radian_or_reach
+
+SURELY = 1.02  # times SOLUTION or its inverse: what lies between is looked at closely
+SYMMETRIC = 0.2  # most that the slopes at a pair's ends differ by, in parts of their size
+APART = 10.0 * SAME  # [rad, reaches] two branches closer than this are looked at closely
+
+
+class Doubted(NamedTuple):
+    """K targets on an edge, as the formulas have them: rows of the batch (K,), candidates q (K, B, n), squared
+    residuals miss (K, B), and which candidates are on an edge (K, B).
+
+    plain: (K,) whether no joint is free, and `near` is elsewhere.
+    """
+
+    rows: NDArray[np.intp]
+    q: Array
+    miss: Array
+    edge: Bool
+    plain: Bool
+
+    @classmethod
+    def joined(cls, parts: list[Doubted]) -> Doubted:
+        """Those of several parts of a batch; at least one."""
+        return parts[0] if len(parts) == 1 else cls(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def tell(goals: Goals, runner: Recorded, out: Batch, at: Doubted) -> NDArray[np.intp]:
+    """Write what the doubted targets are that can be told; returns the rows of those that are left.
+
+    What stands alone is in the batch already, but for what misses a little; of two branches that meet the first is
+    listed, as the target has it alone.
+    """
+    there = at.miss <= SOLUTION**2
+    moved = there & (at.miss >= CLOSED**2)
+    # what misses a little more may be a branch
+    far = at.miss > np.where(at.edge, SEED**2, NEARBY**2)
+    told: Bool = np.asarray(at.plain & there.any(axis=1) & (there | far).all(axis=1))
+    k, b = np.nonzero(moved & told[:, None])
+    if len(k):
+        at.q[k, b], size = newton.correct(goals.arm, goals.task, at.q[k, b], goals.target[at.rows[k]], steps=3)
+        told[k[size >= CLOSED]] = False
+    second = _pairs(goals, at, there & (at.edge | (at.miss > ACCEPTED**2)), told)
+    meets = second.any(axis=1)
+    some = np.flatnonzero(told & (meets | (there & (at.miss > ACCEPTED**2)).any(axis=1)))
+    if len(some):
+        rows, meets, there = at.rows[some], meets[some], there[some] & ~second[some]
+        if meets.any():
+            at.q[some[meets]] = as_rows(runner.in_numbers(goals.target[rows[meets]]), meets.sum())[:, :, : goals.arm.n]
+        order = np.argsort(~there, axis=1, kind="stable")
+        valid = np.take_along_axis(there, order, axis=1)
+        q = np.where(valid[:, :, None], np.take_along_axis(at.q[some], order[:, :, None], axis=1), np.nan)
+        write(goals.arm, out, rows, q, valid, order, goals.near[rows])
+        out.status[rows] = np.where(meets, Status.BOUNDARY, Status.EXACT)
+    return at.rows[~told]
+
+
+def _pairs(goals: Goals, at: Doubted, asked: Bool, told: Bool) -> Bool:
+    """Which of the branches that are asked (K, B) are the second ones of two that meet; takes those targets from told
+    (K,) that the curvature does not tell."""
+    second, asked = np.zeros(asked.shape, bool), asked & told[:, None]
+    k, b = np.nonzero(asked)
+    if not len(k):
+        return second
+    q = at.q[k, b]
+    inverse, beside = _inverses(goals, q)
+    weak = (inverse * inverse).sum(axis=(1, 2)) * FOLDED**2 >= 1.0
+    number = np.empty(asked.shape, int)
+    number[k, b] = np.arange(len(k))
+    row, i, j = np.nonzero(np.triu(asked[:, :, None] & asked[:, None], 1))
+    i, j = number[row, i], number[row, j]
+    way = newton.difference(goals.arm, q[j], q[i])
+    close = np.abs(way).max(axis=1) < CLOSE_BY
+    i, j, way = i[close], j[close], way[close]
+    many = np.bincount(np.concatenate([i, j]), minlength=len(k))
+    told[k[many > 1]] = False
+    lone = np.flatnonzero(weak & (many == 0) & told[k])
+    if len(lone):
+        told[k[lone[~_alone(goals, q[lone], inverse[lone], beside[lone])]]] = False
+    if len(i):
+        ends = inverse[j] if not beside.shape[2] else _inverses(goals, q[j], beside[i])[0]
+        alone, meet = _cubic(way, inverse[i], ends)
+        told[k[i[~(alone | meet)]]] = False
+        j = j[meet]
+        second[k[j], b[j]] = True
+    return second
+
+
+def _inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Array, Array]:
+    """Inverses (M, rows, rows) of the Jacobians at q (M, n), scaled as in `newton.scaled`.
+
+    A Jacobian with a row more than columns has one beside these, (M, rows, 1): by default the direction of the target
+    that no joint moves the tool in.
+    """
+    arm, task = goals.arm, goals.task
+    T, slopes = tip_and_jacobian(arm, q)
+    J = task_jacobian(task, slopes, T) * radian_or_reach(arm)
+    J[:, : task.position] /= arm.reach
+    M, rows, n = J.shape
+    if rows == n:
+        return newton.nudged(np.linalg.inv, J), np.empty((M, rows, 0))
+    if beside is None:
+        any_ = np.broadcast_to(np.sqrt(np.arange(1.0, rows + 1))[:, None], (M, rows, 1))
+        beside = _unit(newton.nudged(np.linalg.inv, np.concatenate([J, any_], axis=2))[:, n:]).swapaxes(1, 2)
+    return newton.nudged(np.linalg.inv, np.concatenate([J, beside], axis=2)), beside
+
+
+def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
+    """Of P pairs, `way` (P, n) apart, with the inverses of their Jacobians: which stand alone, and which meet, (P,).
+
+    g along u is zero at both ends; a curve that keeps all other numbers of the target has the slope 1 / (v' J^-1 u).
+    """
+    far = np.sqrt((way * way).sum(axis=1))
+    v = _tangents(way / np.maximum(far, APART)[:, None], first)
+    u = _unit(v @ first)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lost, other = first @ u.swapaxes(1, 2), second @ u.swapaxes(1, 2)
+        rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ other)[:, 0, 0]
+        size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / far, np.abs(rise + fall)
+        # the fourth derivative is taken for as large as that of the sharpest fold
+        plain = _single(first, lost) & (far > APART) & (uneven < SYMMETRIC * size)
+        alone = plain & (0.125 * far * size - CURVATURE * far**4 / 384.0 > SURELY * SOLUTION)
+        # as far as the residual of two that meet may be 2 SOLUTION
+        end = far + 2.0 * np.sqrt(SOLUTION / bend)
+        straight = 6.0 * uneven / far**2 * end + 0.5 * CURVATURE * end**2 < SYMMETRIC * bend
+        # and the direction that no joint moves the tool in
+        across = np.abs(other[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
+        meet = plain & straight & (0.125 * far * (size + across) < SOLUTION / SURELY)
+    return np.asarray(alone), np.asarray(meet)
+
+
+def _alone(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
+    """Which weak postures (M, n), with no other close by, are isolated roots: g is too steep to turn before it passes
+    `SOLUTION`."""
+    n = q.shape[1]
+    # of J^-1 a column is nearly the lost direction v, that of the largest size the most
+    moved = inverse[:, :n]
+    largest = (moved * moved).sum(axis=1).argmax(axis=1)
+    v = np.take_along_axis(moved, largest[:, None, None], axis=2)
+    v = _unit((moved @ (moved.swapaxes(1, 2) @ v)).swapaxes(1, 2))[:, 0]
+    way = FOLD_WAY * v * radian_or_reach(goals.arm)
+    ends, _ = _inverses(goals, np.concatenate([q + way, q - way]), np.concatenate([beside, beside]))
+    v = _tangents(v, inverse)
+    u = _unit(v @ inverse)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lost, at_ends = inverse @ u.swapaxes(1, 2), ends @ np.concatenate([u, u]).swapaxes(1, 2)
+        slope = np.abs(1.0 / (v @ lost)[:, 0, 0])
+        ahead, behind = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
+        bend, passed = np.abs(ahead - behind) / (2.0 * FOLD_WAY), 2.0 * SOLUTION / slope
+        steep = slope**2 > SURELY * 2.0 * SOLUTION * (bend + CURVATURE * passed)
+    return np.asarray(_single(inverse, lost) & (passed < FOLD_WAY) & steep)
+
+
+def _tangents(v: Array, inverse: Array) -> Array:
+    """Directions of joints (M, n) as rows (M, 1, rows): what stands beside the joints does not move."""
+    out = np.zeros((len(v), 1, inverse.shape[1]))
+    out[:, 0, : v.shape[1]] = v
+    return out
+
+
+def _unit(rows: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(rows / np.sqrt((rows * rows).sum(axis=2, keepdims=True)))
+
+
+def _single(inverse: Array, lost: Array) -> Bool:
+    """Whether one direction alone is lost, by an upper bound of what the others make of inverses; lost: J^-1 u."""
+    rest = (inverse * inverse).sum(axis=(1, 2)) - (lost * lost).sum(axis=(1, 2))
+    return np.asarray(rest * HIGH**2 < 1.0)
