@@ -1,6 +1,6 @@
-"""How many deliberate errors the quick tests catch: 22 mutants over the rooms, one at a time, in a copy of the tree.
+"""How many deliberate errors the quick tests catch: 32 mutants over the rooms, one at a time, in a copy of the tree.
 
-    python tests/bench/mutants.py [NUMBER ...]    # all, or only these; prints "caught 20 of 22"
+    python tests/bench/mutants.py [NUMBER ...]    # all, or only these; prints "caught 30 of 32"
 
 A mutant is caught if a quick test of its room fails (`-m "not slow and not emulator"`); what survives there is run
 against the room's slow tests, too. Signs, off by one, swapped units, dropped checks.
@@ -60,6 +60,19 @@ MUTANTS = [
     Mutant("compiled/toolchain.py", "return owner and not", "return not", "compiled"),
     Mutant("cli/exit_codes.py", "LINK = 1, 2, 3, 4, 5", "LINK = 1, 2, 4, 3, 5",
            "cli/test_cli_errors.py cli/test_cli_commands.py"),
+    Mutant("motion/timing/limit_jerk.py", "(2 * accel / np.asarray", "(accel / np.asarray", "motion"),
+    Mutant("keep_out/proof.py", "(apart[:-1] + apart[1:] - moved) / 2", "(apart[:-1] + apart[1:]) / 2", "keep_out"),
+    Mutant("motion/tool_path/geometry.py", "omega - np.cross(w, omega) / 2", "omega + np.cross(w, omega) / 2",
+           "motion"),
+    Mutant("path_file/svg_shapes.py", "0.0) if kind == \"skewX\" else", "0.0) if kind == \"skewY\" else", "path_file"),
+    Mutant("board/grbl/gcode.py", "max(60 * speed, SLOWEST)", "max(speed, SLOWEST)", "board"),
+    Mutant("board/feetech/packet.py", "bytes([~sum(body) & 0xFF])", "bytes([sum(body) & 0xFF])",
+           "board/test_feetech_bus.py"),
+    Mutant("robot_file/urdf.py", "(cr, sr), (cp, sp), (cy, sy)", "(cy, sy), (cp, sp), (cr, sr)", "robot_file"),
+    Mutant("forward.py", "arrays.cross(z, lever)", "arrays.cross(lever, z)", "inverse/test_kinematics.py"),
+    Mutant("inverse/choose_branch.py", "not branch.within_limits, hit, turned", "not branch.within_limits, turned, hit",
+           "keep_out inverse/test_turns.py"),
+    Mutant("columns/parts.py", "if before.get(name) != self.job.get(name)", "if name not in before", "columns"),
 ]  # fmt: skip
 QUICK = ["-m", "not slow and not emulator"]
 

@@ -7,13 +7,15 @@ import sys
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
+_WIDTH = 10  # of the bar: with counts in millions the time left, at the end, still fits 80 columns
+
 
 class Bar:
     """One line that is drawn anew, and gone at the end."""
 
     def __init__(self, what: str, console: Console) -> None:
         self.what = what
-        columns = (BarColumn(24), TextColumn("{task.fields[said]}"))
+        columns = (BarColumn(_WIDTH), TextColumn("{task.fields[said]}"))
         self._drawn = Progress(*columns, console=console, auto_refresh=False, transient=True)
         self._task: TaskID = self._drawn.add_task("", total=None, said="")
         self._drawn.start()

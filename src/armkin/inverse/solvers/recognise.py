@@ -60,7 +60,14 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
 
 
 def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:
-    """Solver class of an arm, why it applies, and whether it guarantees all branches."""
+    """Solver class of an arm, why it applies, and whether it guarantees all branches.
+
+    task: by default the arm's own. Raises UsageError if it does not fit the arm.
+
+    >>> import armkin
+    >>> armkin.method(armkin.load("three_dof"))
+    ('elbow', 'joints 2 and 3 are parallel', True)
+    """
     geometry = solver(actual(arm), task)[1]
     return geometry.name, geometry.why, geometry.complete
 
