@@ -38,8 +38,8 @@ def time_law(
     q: (N, n) [rad | mm], N at least 5; s: (N,) the parameter of the samples, increasing, by default their numbers.
     speed, accel: fractions of max_speed and max_accel; tool_speed: [mm/s]; jerk: [rad/s3 | mm/s3], by a moving
     average; hold: see `armkin.path`. The result is sampled at will: `duration`, `q(t)`, `qd(t)`, `qdd(t)`
-    (Pham and Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018). Raises UsageError for
-    samples that are no way, or an arm without rates.
+    (Pham and Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018).
+    Raises UsageError for samples that are no way, or an arm without rates.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("three_dof")
