@@ -244,6 +244,18 @@ def test_an_output_file_that_may_not_be_written(tmp_path: Path, monkeypatch: pyt
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_batch_in_a_folder_that_may_not_be_written_has_nothing_to_go_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    (tmp_path / "rows.csv").write_text("1,2,3\n" * 200_000)
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    result = run("fk", DOF, "--batch", tmp_path / "rows.csv", "--out", tmp_path / "out.csv")
+    assert result == (1, "", f"error: {tmp_path / 'out.csv'}: cannot write: Permission denied\n")
+
+
 def test_a_bug_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     from armkin.cli import inputs
 

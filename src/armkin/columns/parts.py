@@ -163,6 +163,8 @@ class Parts:
             yield
         except OSError as error:
             why = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else error.strerror or error
+            if not self.folder.exists():
+                raise FileError(f"{self.path}: cannot write: {why}", file=self.path) from None
             raise UnfinishedError(
                 f"{self.path}: cannot write: {why}; what is finished stays in {self.path}.parts",
                 file=self.path,
