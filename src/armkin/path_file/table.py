@@ -31,17 +31,7 @@ def parse(raw: bytes, name: str) -> PathFile:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise PathFileError(f"{name}: is not UTF-8 text", file=name) from None
-    lines = csv.reader(io.StringIO(text))
-    filled = (
-        (number, row)
-        for number, row in enumerate(lines, 1)
-        if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
-    )
-    try:
-        rows = list(islice(filled, MOST_POINTS + 2))  # a header, and one too many
-    except csv.Error as error:
-        line = lines.line_num
-        raise PathFileError(f"{name}:{line}: no row of numbers: {error}", file=name, line=line) from None
+    rows = _filled(text, name)
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
     header: list[str] | None = None
@@ -79,6 +69,21 @@ def parse(raw: bytes, name: str) -> PathFile:
     return PathFile.model_construct(moves=moves, corners="tolerance" if smooth else None).read_from(
         Source(name, places, rows=True)
     )
+
+
+def _filled(text: str, name: str) -> list[tuple[int, list[str]]]:
+    """Rows that are neither empty nor a comment, with their numbers: at most a header, and one too many."""
+    lines = csv.reader(io.StringIO(text))
+    filled = (
+        (number, row)
+        for number, row in enumerate(lines, 1)
+        if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
+    )
+    try:
+        return list(islice(filled, MOST_POINTS + 2))
+    except csv.Error as error:
+        line = lines.line_num
+        raise PathFileError(f"{name}:{line}: no row of numbers: {error}", file=name, line=line) from None
 
 
 def _move(header: list[str] | None, values: list[float], *, first: bool, where: tuple[str, int]) -> Move:
