@@ -180,7 +180,7 @@ class BoardActions:
         board.grip_value(wanted)
         assume = request_checks.flag(fields, "assume")
         self.check_file()
-        self.thread.submit("grip", lambda machine: self._grip(machine, wanted, assume))
+        self.thread.submit("grip", lambda machine: _grip(self.thread.board, wanted, assume))
         return {}
 
     def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -222,22 +222,14 @@ class BoardActions:
 
     def run(self, machine: Backend, goals: Array, speed: float) -> None:
         """Move through joint values (w, n), stopping at each."""
-        self.prepare(machine)
+        _prepare(machine)
         plan = machine.plan(machine.counts(), goals, speed=speed)
         self.thread.parts = [plan.trajectory]
         machine.run([plan], self._progress)
 
-    def prepare(self, machine: Backend) -> None:
-        """Switch the motors on; LinkError if the position is lost."""
-        if machine.position() == "lost" and not machine.port.simulated:
-            raise LinkError(
-                "the arm's position is lost: home it, or put it in its home pose and say so; it was not moved"
-            )
-        machine.prepare()
-
     def _run_program(self, machine: Backend, speed: float) -> None:
         """Every part is planned and laid out before the first one moves: the gripper's moves stand between them."""
-        self.prepare(machine)
+        _prepare(machine)
         plan = self.program(machine.joints(), speed)
         path_run.check_gripper(plan, self.thread.board)
         path_run.check_pauses(plan, answers=False)
@@ -248,16 +240,6 @@ class BoardActions:
         self.thread.parts = [part.trajectory for part in parts]
         path_run.follow(self.thread.board, plan, parts, self._progress)
 
-    def _grip(self, machine: Backend, value: str | float, assume: bool) -> None:
-        board = self.thread.board
-        known = board.grip_known()
-        if not known and not assume:
-            raise LinkError(
-                "the gripper's position is lost: say first that it stands open\n"
-                "a servo jumps there at once, at its full speed: keep your fingers out"
-            )
-        board.grip(value, None if known else "open")
-
     def _jog(self, machine: Backend, joint: int, percent: float) -> None:
         board = self.thread.board
         rate = board.ready_to_jog(joint, percent / 100 * float(self.arm.max_speed[joint]))
@@ -267,7 +249,7 @@ class BoardActions:
         """Line after line along an axis; each is planned to its rest, and held on its way when nobody asks for it."""
         from armkin.motion.jog_line import jog_line
 
-        self.prepare(machine)
+        _prepare(machine)
         why = ""
         while not why and self._held_down():
             plan, why = jog_line(self.arm, machine.joints(), axis, frame, share)
@@ -304,6 +286,24 @@ class BoardActions:
 def _press(fields: Fields) -> int:
     """Which press of a jog's button, counted by the page."""
     return request_checks.whole(fields, "press", 2**31)
+
+
+def _prepare(machine: Backend) -> None:
+    """Switch the motors on; LinkError if the position is lost."""
+    if machine.position() == "lost" and not machine.port.simulated:
+        raise LinkError("the arm's position is lost: home it, or put it in its home pose and say so; it was not moved")
+    machine.prepare()
+
+
+def _grip(board: Board, value: str | float, assume: bool) -> None:
+    """Move the gripper; assume: it stands open now, if nothing is known of it."""
+    known = board.grip_known()
+    if not known and not assume:
+        raise LinkError(
+            "the gripper's position is lost: say first that it stands open\n"
+            "a servo jumps there at once, at its full speed: keep your fingers out"
+        )
+    board.grip(value, None if known else "open")
 
 
 def _home(board: Board) -> None:
