@@ -15,7 +15,7 @@ from armkin.export.c.text import part
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.elimination.choose_variable import Kind
-from armkin.inverse.elimination.merge import _WEIGHTS, MOST
+from armkin.inverse.elimination.merge import MOST, weights
 from armkin.inverse.elimination.method import Elimination
 from armkin.inverse.elimination.passes import REGULAR, TILT, shaken_goal
 from armkin.inverse.elimination.roots import STEADY
@@ -107,7 +107,7 @@ def candidates(
         _array("from_tool", frame(inverse(loop.tool))),
         _array("loop_links", np.concatenate([frame(link) for link in loop.links])),
         _flags("loop_slides", loop.prismatic),
-        _array("weights", _WEIGHTS),
+        _array("weights", weights(5 if task.orientation == "axis" else 6)),
         _array("shakes", SHAKES[:passes]),
         _array("shaking", moves),
         "",

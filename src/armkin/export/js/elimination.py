@@ -11,7 +11,7 @@ import numpy as np
 
 from armkin.export.c.elimination import BRANCHES, frame, moves_of, pencil_arrays, pencils_of, plans_of
 from armkin.formula import c_and_js_code, recording
-from armkin.inverse.elimination.merge import _WEIGHTS
+from armkin.inverse.elimination.merge import weights
 from armkin.inverse.elimination.method import Elimination
 from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, EQUAL_ROOTS, SHAKES, TWIN_ROOTS, UPRIGHT
 from armkin.inverse.solvers import tool_axis
@@ -44,7 +44,7 @@ def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
         "fromTool": _array(frame(inverse(loop.tool))),
         "links": _arrays([frame(link) for link in loop.links]),
         "slides": _flags(loop.prismatic),
-        "weights": _array(_WEIGHTS),
+        "weights": _array(weights(5 if task.orientation == "axis" else 6)),
         "shakes": _array(SHAKES[: len(kinds[0])]),
         "shaking": _arrays(moves_of(len(kinds[0]))),
         "plan": repr(plans),

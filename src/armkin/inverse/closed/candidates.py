@@ -119,6 +119,8 @@ class Recorded:
         candidate is far from its target. near: (N, n). Also of which targets (N,) these may not lead to all.
         """
         q, miss = self._all_round(target, near)
+        if not (lost.any() or (q[:, 1:] != q[:, :1]).any()):  # nothing that a formula leaves free: no curve, no meeting
+            return q[:, 0, :0], np.zeros(0, np.int64), np.zeros_like(lost)
         exact = np.where((miss <= ACCEPTED**2)[..., None], q, np.nan)
         kept, held = four_bars.one_a_circuit(self.arm, exact, near)
         known: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)

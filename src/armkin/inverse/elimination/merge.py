@@ -44,6 +44,11 @@ def concatenate(parts: list[Answers]) -> Answers:
     )
 
 
+def weights(joints: int) -> Array:
+    """The weights (2, 6) of `projection` for the first joints of six, of which the others are dropped."""
+    return _WEIGHTS * (np.arange(6) < joints)
+
+
 def projection(prismatic: Bool, q: Array) -> Array:
     """One number for each joint vector (..., n), n <= 6, equal for equal poses of the joints, else hardly ever."""
     cosine, sine = np.where(prismatic, q, np.cos(q)), np.where(prismatic, q, np.sin(q))

@@ -15,6 +15,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.subproblems import Candidates, Prefer
+from armkin.inverse.elimination.merge import projection
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import from_links
 
@@ -47,7 +48,9 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
         pose.write(pose_of(list(goal.T)), T)
         found = solve_rows(T)
         guesses = None if found.guesses is None else found.guesses[:, :, :5]
-        return found._replace(q=found.q[:, :, :5], guesses=guesses)
+        q = found.q[:, :, :5]
+        order = projection(arm.prismatic, q).argsort(axis=1)
+        return found._replace(q=np.take_along_axis(q, order[:, :, None], axis=1), guesses=guesses)
 
     return Geometry(
         inner.name,
