@@ -34,5 +34,7 @@ def of_port(key: str) -> str:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if os.access(folder, os.W_OK):
                 return str(folder / key)
-    user = str(os.getuid()) if sys.platform != "win32" else "user"  # on Windows the folder is the user's own
+    user = "user"  # on Windows the folder is the user's own
+    if sys.platform != "win32":
+        user = str(os.getuid())
     return os.path.join(tempfile.gettempdir(), f"armkin-{user}-{key}")

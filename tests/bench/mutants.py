@@ -71,7 +71,7 @@ MUTANTS = [
     Mutant("robot_file/urdf.py", "(cr, sr), (cp, sp), (cy, sy)", "(cy, sy), (cp, sp), (cr, sr)", "robot_file"),
     Mutant("forward.py", "arrays.cross(z, lever)", "arrays.cross(lever, z)", "inverse/test_kinematics.py"),
     Mutant("inverse/choose_branch.py", "not branch.within_limits, hit, turned", "not branch.within_limits, turned, hit",
-           "keep_out inverse/test_turns.py"),
+           "keep_out inverse/test_position_first.py"),
     Mutant("columns/parts.py", "if before.get(name) != self.job.get(name)", "if name not in before", "columns"),
 ]  # fmt: skip
 QUICK = ["-m", "not slow and not emulator"]

@@ -3,6 +3,8 @@
 import itertools
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 import armkin
 from armkin import Status
 from armkin.forward import fk
+from armkin.inverse import choose_branch
 from command_line import run
 
 ARMS = "so101", "labvolt_5150", "moveo", "cobra600"
@@ -119,6 +122,17 @@ def test_a_position_out_of_reach_exits_3_with_the_closest_posture() -> None:
     assert done.code == 3
     assert (done.json["status"], done.json["best"]) == ("unreachable", None)
     assert done.json["closest"]["distance_mm"] == pytest.approx(472.3562, abs=1e-3)
+
+
+def test_free_comes_before_near_in_rotation() -> None:
+    request: Any = SimpleNamespace(position_first=True)
+
+    def row(hits: tuple[str, ...], residual_deg: float, motion: float, within_limits: bool = True) -> Any:
+        return SimpleNamespace(within_limits=within_limits, hits=hits, residual_deg=residual_deg, motion=motion)
+
+    rows = [row((), 5.0, 90.0), row((), 9.0, 10.0), row(("floor",), 0.0, 1.0), row((), 0.0, 0.0, within_limits=False)]
+    ranks = [choose_branch._rank(request, item) for item in rows]
+    assert ranks == sorted(set(ranks))
 
 
 def test_an_exact_answer_that_hits_something_comes_after_a_free_one(tmp_path: Path) -> None:

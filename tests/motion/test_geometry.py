@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.inverse.tasks.fitting import task_for
-from armkin.motion.tool_path.geometry import arc, spot
+from armkin.motion.tool_path.geometry import arc, blend, line, spot, turn
 
 TASK = task_for(armkin.load("three_dof"))
 
@@ -31,3 +31,15 @@ def test_an_arc_goes_through_its_points_once_and_no_farther(degrees: float, way:
     shares = np.linspace(0.0, 1.0, 41)
     expected = np.array([on_circle(0.3 + share * angle) for share in shares])
     np.testing.assert_allclose(piece.targets(shares * piece.length), expected, atol=1e-8)
+
+
+def test_a_rounded_corner_turns_the_tool_on_as_the_next_line_does() -> None:
+    """Position and orientation both leave a blend in the direction in which the next piece goes on."""
+    task = task_for(armkin.load("ur5e"))
+    places = [np.eye(4), np.eye(4), np.eye(4)]
+    for place, xyz, rpy in zip(places, ([300, 0, 300], [400, 0, 300], [400, 100, 300]), (0.0, 0.9, -0.8), strict=True):
+        place[:3, 3] = xyz
+        place[:3, :3] = turn(np.array([rpy, 0.4 * rpy**2, 0.3]))
+    spots = [spot(task, place) for place in places]
+    _, rounded, after, _ = blend(task, line(task, *spots[:2]), line(task, *spots[1:]), 30.0, 100.0)
+    np.testing.assert_allclose(rounded.direction(rounded.length), after.direction(0.0), atol=1e-4)

@@ -94,7 +94,7 @@ def loads(text: bytes | str, kind: Kind = ROBOT_FILE) -> Document:
     text: bytes in UTF-8 (a byte order mark is accepted) or text; kind: what messages call it
     returns: mappings as dict, sequences as tuple, scalars as str, int, float and bool
     """
-    return _build(_parse(_decode(text, kind)), kind)
+    return _build(_parse(_decode(text, kind), kind), kind)
 
 
 def _decode(raw: bytes | str, kind: Kind) -> str:
@@ -129,7 +129,7 @@ def _is_text(code: int) -> bool:
     return not 0xD800 <= code <= 0xDFFF
 
 
-def _parse(text: str) -> Iterator[Any]:
+def _parse(text: str, kind: Kind) -> Iterator[Any]:
     """Parser events, with syntax errors told in our words."""
     try:
         yield from yaml.parse(text, Loader=_LOADER)
@@ -146,6 +146,8 @@ def _parse(text: str) -> Iterator[Any]:
         if character and character in "%@`":
             raise StrictYamlError(line, f"text cannot begin with {character}; put it in quotes") from None
         problem = str(error.problem)
+        if problem.startswith("exceeded maximum nesting depth"):  # libyaml's own bound, 1,000, which it reads ahead to
+            raise StrictYamlError(line, _too_deep(kind)) from None
         begin = error.context_mark.line + 1 if error.context_mark else line
         where = f" ({error.context} that begins on line {begin})" if begin < line else ""
         hint = "check the colon and space after keys, the indentation, brackets and quotes"
@@ -155,6 +157,10 @@ def _parse(text: str) -> Iterator[Any]:
         raise StrictYamlError(line, f"not YAML: {problem}{where}; {hint}") from None
     except yaml.YAMLError as error:  # the reader's: a character that YAML has no place for
         raise StrictYamlError(0, f"not YAML: {' '.join(str(error).split())}") from None
+
+
+def _too_deep(kind: Kind) -> str:
+    return f"nested more than {MAX_DEPTH} deep; a {kind.name} never is"
 
 
 class _Node:
@@ -199,7 +205,7 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
             if awaits_key:
                 raise StrictYamlError(line, "a key must be a word, not a list or mapping")
             if len(stack) >= MAX_DEPTH:
-                raise StrictYamlError(line, f"nested more than {MAX_DEPTH} deep; a {kind.name} never is")
+                raise StrictYamlError(line, _too_deep(kind))
             path = parent.value_path() if parent else ()
             lines.setdefault(path, line)
             stack.append(_Node(path, isinstance(event, yaml.MappingStartEvent)))
