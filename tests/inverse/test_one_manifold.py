@@ -7,12 +7,16 @@ import pytest
 
 import armkin
 from armkin.inverse.closed import crossings
+from armkin.inverse.numeric import newton
 
 # The wrist 0.001 degrees off straight, its centre all but on axis 1: two directions are nearly lost
 BESIDE = [-5.660692012689249e-06, -8.204135961199831e-06, 524.75, np.pi / 2, -3.1415681650441143, 3.1415661793087657]
 # A Puma whose joints 1 to 3 are within 1e-5 rad of a fold: the manifold is short, and both its ends are known
 SHORT = [1.5836968407619585, -0.8901812286952255, 1.617829428444212, -2.8485155934616904, 2.8328757558239435,
          -1.8342311940795621]  # fmt: skip
+
+FOLD = [-0.7854146633121711, -np.pi, 262.375, np.pi / 2, -3.141510855987255, -2.356194490192345]
+ARCS = [2.3561944911768986, 1.5707963336752944, 1.5707963305306343, -3.141592650653632, -np.pi, -1.167432798680643e-10]
 
 
 @pytest.mark.parametrize("others", [0, 60])
@@ -31,6 +35,47 @@ def test_a_wrist_beside_straight_is_listed_once_a_shoulder(others: int) -> None:
     assert len(rows) == 2
     np.testing.assert_array_equal(rows[0], BESIDE)
     assert rows[1][2] == pytest.approx(-BESIDE[2])
+
+
+def test_a_curve_that_does_not_pass_its_posture_tells_nothing_of_it() -> None:
+    """A shoulder's fold 0.005 degrees from a straight wrist: Newton's method found the wrist's curve 6e-5 rad beside.
+
+    Each branch was there twice, as two roots, and exact.
+    """
+    arm = armkin.load("stanford")
+    T = armkin.fk(arm, FOLD)
+    found = armkin.ik(arm, T)
+    assert found.status == armkin.Status.BOUNDARY
+    assert found.valid.sum() == 4
+    apart = newton.distances(arm, found.q[None, found.valid], found.q[None, found.valid])[0]
+    assert (apart + np.eye(4) > 0.1).all()
+
+
+def test_manifolds_on_both_sides_of_a_straight_wrist_are_rows_of_their_own() -> None:
+    """A wrist 2e-8 rad off straight: its two arcs of 340 degrees end where the least residual is above 1e-9.
+
+    One of three such pairs was one row.
+    """
+    arm = armkin.load("puma560")
+    T = armkin.fk(arm, ARCS)
+    found = armkin.ik(arm, T)
+    assert found.status == armkin.Status.SINGULAR
+    assert found.complete
+    assert found.valid.sum() == 7
+    a, b = found.q[found.valid][3:5]
+    np.testing.assert_allclose(np.abs(newton.difference(arm, a, b)), [0, 0, 0, np.pi, 0, np.pi], atol=1e-6)
+    t = np.linspace(0.0, 2.0 * np.pi, 361)[:, None]
+    way = a + t * np.array([0.0, 0.0, 0.0, 1.0, 0.0, -1.0])
+    goals = np.broadcast_to(T, (len(way), 4, 4))
+    # with joint 4 held where it is, the others leave what they cannot take away
+    across = way + 0.0
+    for _ in range(12):
+        r, J = newton.scaled(arm, found.task, across, goals)
+        step = np.linalg.pinv(np.delete(J, 3, axis=2), rcond=1e-10) @ r[:, :, None]
+        across += np.insert(step[:, :, 0], 3, 0.0, axis=1)
+    size = newton.missing(arm, found.task, across, goals)
+    assert (size[:181].max() > 2e-9) & (size[180:].max() > 2e-9)
+    assert np.median(size) < 5e-10
 
 
 def test_nothing_is_sought_that_crosses_a_manifold_of_which_all_is_known(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,6 +27,7 @@ Bool = NDArray[np.bool_]
 
 SOLVES = 1e-9  # residual in lengths of the arm's reach and in rad that makes a posture a solution
 CLOSE = 0.2  # [rad, sizes] branches this close may be one
+PARTS = np.arange(1, 180) / 180.0  # of a way from one to the other: what parts two manifolds may be 3 degrees wide
 
 
 # ---- postures ----------------------------------------------------------------------------------------------
@@ -285,7 +286,7 @@ def _straight(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
     for flip in itertools.product((False, True), repeat=a.shape[1]):
         k = np.flatnonzero(~out & ~(np.array(flip) & ~half).any(axis=1))
         way, one = d[k] - 2 * np.pi * np.sign(d[k]) * np.array(flip), np.ones(len(k), bool)
-        for part in (0.25, 0.5, 0.75) if len(k) else ():
+        for part in PARTS if len(k) else ():
             q = a[k] + part * way * unit
             there = across(screw, goals.take(k), q)
             one &= np.abs((there - q) / unit).max(axis=1) <= 1e-4  # as far as roots of high order are off

@@ -18,7 +18,7 @@ from armkin.inverse.closed import crossings, four_bars
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, spin
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, SEED, SHAKE, TURNED
+from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, ROUNDING, SEED, SHAKE, TURNED
 from armkin.inverse.tasks.task import Task, moved
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 FEW = 8  # targets that plain Python does sooner than arrays
 FREED = 24  # values tried for joints that a target leaves free
-CLOSER = 14  # times that the best of these is sought four times closer: to 1e-8 rad
+CLOSER = 7  # times that the best of these is sought sixteen times closer: to 1e-9 rad
 BESIDE_ROUND = 0.37  # of a step between them: so far from `near` they begin
 SHAKEN = 8  # moves of a target to where nothing is free
 
@@ -148,24 +148,25 @@ class Recorded:
         q, miss = self._all_round(target, near)
         return np.where((miss <= ACCEPTED**2)[..., None], q, np.nan)
 
-    def best_shift(self, target: Array, near: Array, loose: Bool) -> Array:
+    def best_shift(self, target: Array, near: Array, loose: Bool) -> tuple[Array, Bool]:
         """How far from `near` the free joints of targets are best: (N, 1), [rad, parts of the reach].
 
         Where none of the values all round solves the target by a loose candidate (N, B), they are sought closer and
-        closer about the best one.
+        closer about the best one; also of which targets (N,) that is so.
         """
         shift, apart = self._steps(), 2.0 * np.pi / FREED
-        best, open_ = np.zeros((len(target), 1)), np.arange(len(target))
-        for _ in range(CLOSER):
+        best, open_, single = np.zeros((len(target), 1)), np.arange(len(target)), np.zeros(len(target), bool)
+        for closer in range(CLOSER):
+            single[open_] = closer > 0
             _, miss = self._shifted(target[open_], near[open_], best[open_, None] + shift)
             size = np.where(loose[open_, None], miss, np.inf).min(axis=2)
             best[open_] += shift[size.argmin(axis=1)]
-            open_ = open_[~(size.min(axis=1) <= ACCEPTED**2)]
+            open_ = open_[~(size.min(axis=1) <= (ROUNDING if closer else ACCEPTED) ** 2)]
             if not len(open_):
                 break
-            apart /= 4
-            shift = apart * np.arange(-4.0, 5.0)[:, None]
-        return best
+            apart /= 16
+            shift = apart * np.arange(-16.0, 17.0)[:, None]
+        return best, single
 
     def _steps(self) -> Any:
         """Values of a joint all round, as steps from `near` [rad]: (FREED, 1)."""

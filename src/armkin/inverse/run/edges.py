@@ -148,9 +148,12 @@ def _doubts(goals: Goals, runner: Recorded, rows: NDArray[np.intp]) -> _Doubts:
         changed = ~((apart.max(axis=2) < SAME) | plain[part])
         lost = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
         if len(lost):  # solutions for some values of the free joints alone, or for one
-            best = close[lost] + runner.best_shift(goal[lost], close[lost], changed[lost])
+            shift, single = runner.best_shift(goal[lost], close[lost], changed[lost])
+            best = close[lost] + shift
             first[lost], second[lost], solved = _at_two(runner, goal[lost], best, best + FOLD_WAY)
             out.narrow[part[lost]] = solved[1].any(axis=1)
+            single &= ~out.narrow[part[lost]]
+            out.free[part[lost]], second[lost[single]] = ~single, np.nan  # one value alone is no freedom
         out.first[part] = np.where(plain[part][:, :, None], out.first[part], first)
         out.other[part], out.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
         apart = np.minimum(apart, np.abs(apart - 2 * np.pi))[:, :, list(runner.geometry.ends)]

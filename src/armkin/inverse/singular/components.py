@@ -299,10 +299,9 @@ class _Groups:
         q, joints = self.at.q, self.which[k, b]
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         # (two postures of it, each off by as much as a double root)
-        mine: Bool = self.moves[k, b][:, None] & (held < 3 * TURNED) & (self.lost.sigma[k] < SOLUTION) & self.open[k]
+        moving = self.moves[k, b] & ~self.ended[k, b]  # of others all that is on them is one with them
+        mine: Bool = moving[:, None] & (held < 3 * TURNED) & (self.lost.sigma[k] < SOLUTION) & self.open[k]
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
-        mine &= ~(far & self.ended[k, b][:, None])  # all that is on such a one is one with it
-        far &= mine
         some = np.flatnonzero(far.any(axis=1))
         if len(some):
             at, goal = q[k[some], b[some]], target[k[some]]
@@ -391,7 +390,7 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
     rests: Bool = np.zeros(size.shape, bool)
     lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)
     if (lost.nullity[:, 1:] > 1).any():
-        q, label, size, rests = meetings.ways_out(goals, q, label, size, lost.V, lost.nullity, OWN)
+        q, label, size, rests = meetings.ways_out(goals, q, label, size, lost, OWN)
         if wider := q.shape[1] - sure.shape[1]:
             sure, simple = np.pad(sure, ((0, 0), (0, wider), (0, 0))), np.pad(simple, ((0, 0), (0, wider)))
             lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)

@@ -163,6 +163,8 @@ def _follow(
     n = q.shape[1]
     start = _Curve(q[rows], target[rows], U[rows, :, n - 1 :], V[rows, -1], w[rows], out.span[rows])
     on, alone, x, g = _polynomials(arm, task, start)
+    # where another curve is near, that may be the one which Newton's method found
+    on &= np.abs(x[0]).max(axis=1) <= 4.0 * (SMOOTH * start.span + SOLUTION / np.maximum(out.second[rows], TINY))
     some = rows[on]
     out.x[:, some], out.g[:, some], out.alone[some] = x[:, on], g[:, on], alone[on]
     _decide(out, some)

@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.forward import fk
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, GROWTH, HIGH, SOLUTION
+from armkin.inverse.numeric.tolerances import ACCEPTED, BENT, FOLD_WAY, GROWTH, HIGH, SOLUTION
 from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
+from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
 
@@ -24,28 +26,31 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 BOW = 0.1  # of its length: a curve is no farther off its chord
+TURN = np.linspace(0.0, np.pi, 256, endpoint=False)
+ROUND = np.stack([np.cos(TURN) ** 2, np.cos(TURN) * np.sin(TURN), np.sin(TURN) ** 2], axis=1)  # of quadratic forms
+ALL_ROUND = 5.0 * BENT  # [1/rad] curvature in all directions: a residual has passed `SOLUTION` 1e-3 rad away
 
 Int = NDArray[np.int64]
 
 
 def ways_out(
-    goals: Goals, q: Array, label: Int, size: Array, V: Array, nullity: Int, none: int
+    goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost, none: int
 ) -> tuple[Array, Int, Array, Bool]:
     """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those that meet.
 
     The first of a target, `near`, stays where it is. Others that no self-motion leaves stay, too: roots of
-    high order, and postures of surfaces. V, nullity: what they lose, (K, M, n, n) and (K, M). none: the label
-    of what is no candidate. Also which of them (K, M) rest: no push takes them along a self-motion.
+    high order, and postures of surfaces. lost: what they lose. none: the label of what is no candidate. Also which of
+    them (K, M) rest: no push takes them along a self-motion.
     """
     arm, task, target, _ = goals
-    k, b = np.nonzero((size[:, 1:] <= SOLUTION) & (nullity[:, 1:] > 1))
+    k, b = np.nonzero((size[:, 1:] <= SOLUTION) & (lost.nullity[:, 1:] > 1))
     b += 1
-    V, nullity = V[k, b], nullity[k, b]
+    at, nullity = lost.weak.of(lost.place[k, b]), lost.nullity[k, b]
     rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / HIGH)
     _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
-    at, row = q[k[first], b[first]], k[first]
+    row = k[first]
     most = np.maximum(ACCEPTED, 2.0 * size[row, b[first]])
-    who, there, rests = _steps_out(arm, task, at, V[first], nullity[first], target[row], most)
+    who, there, rests = _steps_out(arm, task, q[row, b[first]], at.of(first), nullity[first], target[row], most)
     size[k, b] = np.where(np.isin(same.reshape(-1), who), np.inf, size[k, b])
     order = np.argsort(row[who], kind="stable")
     who, there = who[order], there[order]
@@ -60,19 +65,44 @@ def ways_out(
     return np.concatenate([q, more], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1), resting
 
 
+def _bends_away(arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array) -> Bool:
+    """Which postures (M, n) that lose two directions no curve leaves: (M,).
+
+    As far as t along a lost direction v the residual is t^2 / 2 times u . f''(v, v), for both lost left vectors u: two
+    quadratic forms of v (docs/solution.md). Where they have no zero in common, it grows all round.
+    """
+    n, out = arm.n, np.zeros(len(q), bool)
+    rows = np.flatnonzero((nullity == 2) & (at.r.shape[1] == n))
+    if not len(rows):
+        return out
+    u, V, unit = at.U[rows][:, :, n - 2 :], at.V[rows], radian_or_reach(arm)
+    ways = np.stack([V[:, n - 2], V[:, n - 1], V[:, n - 2] + V[:, n - 1]])  # (3, m, n)
+    ends = q[rows] + np.multiply.outer([FOLD_WAY, -FOLD_WAY], ways * unit)
+    goal = np.concatenate([target[rows]] * 6)
+    r = residual(task, fk(arm, ends.reshape(-1, n)), ends.reshape(-1, n), goal, arm.reach).reshape(2, 3, len(rows), n)
+    bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * u).sum(axis=2) / FOLD_WAY**2  # (3, m, 2)
+    forms = np.stack([bent[0], bent[2] - bent[0] - bent[1], bent[1]])
+    size = np.linalg.norm(np.tensordot(ROUND, forms, axes=1), axis=2)
+    # half a step from the next of these directions a form differs by twice its largest value at most
+    out[rows] = size.min(axis=0) > ALL_ROUND + 2.0 * TURN[1] * size.max(axis=0)
+    return out
+
+
 def _steps_out(
-    arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array, most: Array
+    arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array, most: Array
 ) -> tuple[Int, Array, Bool]:
     """Postures (m, n) on self-motions that leave meetings (M, n), a long step off, and whose: (m,).
 
     most: (M,) residual of what counts as on one: points beside a self-motion of double roots have more. Also which
     meetings (M,) all pushes fall back to.
     """
-    rests = ~on_surface(arm, task, q, V, target)
-    rows = np.flatnonzero(rests)
+    rests = _bends_away(arm, task, q, at, nullity, target)
+    open_ = np.flatnonzero(~rests)
+    rests[open_] = ~on_surface(arm, task, q[open_], at.V[open_], target[open_])
+    rows = open_[rests[open_]]
     if not len(rows):
         return rows, np.zeros((0, arm.n)), rests
-    who, push = null_directions(arm.n, V[rows], nullity[rows])
+    who, push = null_directions(arm.n, at.V[rows], nullity[rows])
     who = rows[who]
     there, size, grown = pushed(arm, task, q[who], np.full(len(who), 10 * STEP), push, target[who])
     rests[who[grown <= GROWTH]] = False
