@@ -110,6 +110,25 @@ def test_circles_and_helices() -> None:
     assert value.normal == [0, 0, 1]
 
 
+@pytest.mark.parametrize("end", ["0.00001", "-0.00003"])
+def test_a_circle_whose_end_is_rounded_is_that_circle(end: str) -> None:
+    """Of an inch's rounding: three points, two of them beside each other across the circle, were on another one."""
+    kind, value = moves(f"G0 X10.00004 Y0\nG3 X10 Y{end} I-7 J7")[-1]
+    assert kind == "circle"
+    assert value.centre == pytest.approx([3, 7, 0], abs=1e-4)
+    assert value.turns == pytest.approx(1, abs=1e-5)
+
+
+@pytest.mark.parametrize("comment", ["", "(a move)", " (a) "])
+def test_a_checksum_counts_the_comments_before_it(comment: str) -> None:
+    line, check = f"N1 G1{comment} X5", 0
+    for byte in line.encode():
+        check ^= byte
+    assert ends(f"G0 X1\n{line}*{check} ; and none behind * it") == [[1, 0, 0], [5, 0, 0]]
+    with pytest.raises(PathFileError, match=r"t\.gcode:2: its checksum is"):
+        ends(f"G0 X1\n{line}*{check ^ 1}")
+
+
 def test_events_and_speeds() -> None:
     text = "G0 X1\nM3 S1000\nG1 X2 F120\nX3 F240\nM4\nG4 P0.5\nG4 S2\nM5\nM0\nG0 X4\nG28"
     file = gcode.parse(text.encode(), "t.nc", AS_IT_IS, Wishes(grip_by="M3"))

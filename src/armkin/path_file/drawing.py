@@ -12,6 +12,7 @@ from armkin.path_file.model import LEAST_TOOL_SPEED, Arc, Circle, Move, PathFile
 Point = tuple[float, float, float]
 LARGEST = 1e6  # [mm] of a coordinate
 _FULL = 2 * math.pi
+_THREE_POINTS = 1.6 * math.pi  # [rad] beyond, a rounded end beside the start makes them another circle's
 _NO_ARC = 1e-6  # [mm]
 
 
@@ -90,7 +91,7 @@ class Pen:
             self.line(b, speed, line)
             return
         base = [x - o for x, o in zip(a, out, strict=True)]
-        if abs(rise) < _NO_ARC and abs(angle) < _FULL - 1e-6:
+        if abs(rise) < _NO_ARC and abs(angle) < _THREE_POINTS:
             across = _cross(normal, (out[0], out[1], out[2]))
             end = math.dist(base, b)  # it may differ a little from the radius at the start
             half, mean = angle / 2, (radius + end) / 2 / radius

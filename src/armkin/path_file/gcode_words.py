@@ -45,18 +45,17 @@ def lines(text: str, name: str) -> Iterator[tuple[int, str]]:
         if not line or line.isspace():
             continue
         if "*" in line:
-            line = _checked(line, name, number)
+            line = _checked(line, raw, name, number)
         yield number, line
 
 
-def _checked(line: str, name: str, number: int) -> str:
-    """A line without its checksum: the exclusive or of all bytes before the star."""
+def _checked(line: str, raw: str, name: str, number: int) -> str:
+    """A line without its comments and its checksum: the exclusive or of all bytes before the star, comments too."""
     found = _CHECKSUM.search(line)
     if found is None:
         raise wrong(name, number, f"'{line[line.index('*') :].strip()[:20]}' is no checksum: * and a number up to 255")
-    body = line[: found.start()]
-    total = 0
-    for byte in body.encode("utf-8", "replace"):
+    body, total = line[: found.start()], 0
+    for byte in raw[: raw.split(";", 1)[0].rindex("*")].encode("utf-8", "replace"):
         total ^= byte
     if total != int(found[1]):
         raise wrong(name, number, f"its checksum is {total}, and it says *{found[1]}: the line was damaged")
