@@ -279,6 +279,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "motion/test_dense.py": (
         "test_dense_points_are_one_curve_within_the_measure",
         "test_dense_points_through_a_wrist_singularity_keep_tolerance_and_limits",
+        "test_noise_in_tight_bends_takes_little_time",
         "test_lines_between_tight_bends_are_as_fast_as_on_a_far_finer_grid",
         "test_tangles_of_tiny_chords_are_planned_within_the_tolerance",
         "test_the_order_of_what_says_how_corners_are_passed",

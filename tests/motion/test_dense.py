@@ -337,9 +337,29 @@ def test_noise_in_a_tight_bend_is_no_corner() -> None:
     for seed in range(5):
         noise = np.random.default_rng(seed).uniform(-0.02, 0.02, way.shape)
         found += int(fitting.corners(way + noise, 0.05).sum())
-    assert found <= 20  # 42 where it is seen from afar alone
+    assert found <= 1  # 42 where it is seen from afar alone
     sharp = np.concatenate([np.linspace([0, 0], [10, 0], 100), np.linspace([10, 0], [10, 10], 100)[1:]])
     assert np.flatnonzero(fitting.corners(sharp, 0.05)).tolist() == [99]
+
+
+def loops(count: int, noise: float = 0.0) -> np.ndarray:
+    """A closed curve of five harmonics with bends of 1 mm, where 600 points are 0.05 mm apart."""
+    c = np.random.default_rng(4).normal(size=(4, 5)) * 40 / np.arange(1, 6) ** 1.6
+    a = np.arange(1, 6)[:, None] * np.linspace(0, 2 * np.pi, count)
+    xy = np.stack([c[0] @ np.cos(a) + c[1] @ np.sin(a), c[2] @ np.cos(a) + c[3] @ np.sin(a)])
+    exact = CENTRE - [0, 40, 0] + np.pad(60 * xy / np.hypot(*xy).max(), ((0, 1), (0, 0))).T
+    return np.asarray(exact + np.random.default_rng(19).uniform(-noise, noise, exact.shape))
+
+
+def test_noise_in_tight_bends_takes_little_time(three_dof: Arm) -> None:
+    """1.059 of the smooth curve's time: four points of a bend were corners, with sides of 0.05 mm to be rounded in."""
+    points = loops(600, 0.02)
+    plan = armkin.path(three_dof, points, corners="tolerance")
+    assert plan.deviation <= plan.tolerance
+    assert on_path(plan) <= 1.04 * on_path(armkin.path(three_dof, loops(20_000), corners="tolerance"))
+    way, at = tips(plan), 0
+    for point in points:  # in order: each behind the first place where the one before it is passed
+        at += int(np.flatnonzero(np.linalg.norm(way[at:] - point, axis=1) <= plan.tolerance + 1e-3)[0])
 
 
 def test_noise_in_a_cusp_is_no_row_of_corners() -> None:
@@ -351,7 +371,7 @@ def test_noise_in_a_cusp_is_no_row_of_corners() -> None:
     for seed in range(5):
         noise = np.random.default_rng(seed).uniform(-0.02, 0.02, cusp.shape)
         found += int(fitting.corners(cusp + noise, 0.05).sum())
-    assert found <= 10
+    assert found <= 1
 
 
 @pytest.mark.parametrize("seed", [6, 51, 54, 93])

@@ -20,6 +20,7 @@ from armkin.motion.tool_path.least_knots import Rows, least_knots
 
 REVERSAL = np.deg2rad(160.0)  # a larger one is a stop
 _SCALES = (4.0, 16.0)  # tolerances: from so far off a corner is still one, and a recorder's noise is none
+_ALIKE = 0.1  # [rad] turns that differ by less are the same
 _BETWEEN = 6  # places of each cubic that are held to its chords in the end
 _TRIES = 5  # after which a curve that leaves its chords is given up
 
@@ -53,8 +54,11 @@ def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
     stop: (N,) points that nothing is seen beyond, and which are corners in any case, but for the ends.
     """
     found = np.zeros(len(y), bool)
-    sharp = np.flatnonzero(turns(y) > CORNER) + 1
+    near = turns(y)
+    sharp = np.flatnonzero(near > CORNER) + 1
     length = np.linalg.norm(np.diff(y, axis=0), axis=1)
+    told = np.minimum(length[sharp - 1], length[sharp]) >= _SCALES[0] * tolerance
+    alike = np.ones(len(sharp), bool)
     u = np.concatenate([[0.0], np.cumsum(length)])
     ends = np.array([0, len(y) - 1]) if stop is None else np.flatnonzero(stop)
     for off in _SCALES if len(sharp) else ():
@@ -63,11 +67,11 @@ def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
         after = np.minimum(u[sharp] + np.maximum(off * tolerance, length[sharp]), u[ends[next_]])
         sides = [np.stack([np.interp(at, u, y[:, k]) for k in range(y.shape[1])], axis=1) for at in (before, after)]
         far = turns(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
-        sharp = sharp[far > CORNER]
-    # nearer to each other than the points are known they are a tight bend and noise, if a curve passes them
-    apart = np.diff(u[sharp], prepend=-np.inf, append=np.inf) > tolerance
-    sharp = sharp[apart[:-1] & apart[1:]]
-    found[sharp] = True
+        alike = (alike & (np.abs(far - near[sharp - 1]) < _ALIKE))[far > CORNER]
+        sharp, told = sharp[far > CORNER], told[far > CORNER]
+    # beside chords too short to tell a direction one that is not as sharp from near as from afar is a tight bend and
+    # noise, if a curve passes it
+    found[sharp[told | alike]] = True
     found[ends[1:-1]] = True
     return found
 
