@@ -26,17 +26,17 @@ ARM = arms.load("robots/three_dof.yaml")
 class Stalling(SimPort):
     """A computer that does nothing for `seconds` behind the MOTION frame with this number; what was sent is kept."""
 
-    def __init__(self, board: SimBoard, frame: int = -1, seconds: float = 0.0) -> None:
+    def __init__(self, board: SimBoard, frame: int = -1, seconds: float = 0.0, again: int = -1) -> None:
         super().__init__(board)
         self.sent: list[bytes] = []
-        self._frame, self._seconds = frame, seconds
+        self._frames, self._seconds = (frame, again), seconds
 
     def write(self, data: bytes) -> None:
         super().write(data)
         if payload_of(data)[0] != Type.MOTION:
             return
         self.sent.append(data)
-        if len(self.sent) == self._frame:
+        if len(self.sent) in self._frames:
             for _ in range(round(1000 * self._seconds)):
                 self.board.advance(0.001)
                 self._now += 0.001
@@ -93,6 +93,24 @@ def test_a_stall_in_the_beginning_goes_on_from_there(rows: list[list[float]]) ->
     assert machine.counts() == at
     again = next(payload_of(data) for data in port.sent if payload_of(data)[1] == 0)  # of a new session
     assert again[6:18] != bytes(12), "what is left, not all of it"
+
+
+def test_two_stalls_lose_none_of_several_moves() -> None:
+    """The second one comes before the board has heard of all that was left at the first."""
+    rows = [[20, 90, -90], [20, 70, -90], [0, 90, -90], [-20, 60, -60]]
+    for again in (40, 48, 66, 75, 92):
+        port, shown = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 4, 0.4, again), list[float]()
+        machine = machine_on(port)
+        plans, at = list[Any](), machine.counts()
+        for row in rows:
+            plans.append(machine.plan(at, np.deg2rad([row])))
+            at = tuple(plans[-1].end.tolist())
+        machine.run(iter(plans), lambda done, total, shown=shown: shown.append(done))
+        assert machine.counts() == at
+        assert shown == sorted(shown)
+        assert sum(payload_of(data)[1] == 0 for data in port.sent) == 2  # sessions
+        late = shown[-1] - sum(plan.duration for plan in plans)
+        assert 0 < late < 0.3, "what is left of a move begins at rest, and takes a little longer"
 
 
 @pytest.mark.parametrize(("load", "sessions"), [(0.0, 1), (1.5, 0)])

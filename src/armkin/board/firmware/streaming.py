@@ -52,31 +52,40 @@ class _UnderWay:
     """The moves of which the board may still do a part, in order."""
 
     def __init__(self) -> None:
-        self._moves: deque[tuple[int, Cut, int]] = deque()  # frames before each, its plan, its number there
+        self._moves: deque[tuple[int, float, Cut, int]] = deque()  # frames before each, seconds, its plan, its number
 
-    def add(self, frames: int, plan: Cut, number: int, taken: int) -> None:
-        """Add a move behind so many frames; those before the one of which the board took a frame last are done."""
-        self._moves.append((frames, plan, number))
+    def add(self, frames: int, seconds: float, plan: Cut, number: int, taken: int) -> None:
+        """Add a move of a plan behind so many frames, the plan behind so many seconds.
+
+        taken: frames that the board took; of moves before the last such frame's nothing is left.
+        """
+        self._moves.append((frames, seconds, plan, number))
         self._forget(taken)
 
     def _forget(self, taken: int) -> None:
         while len(self._moves) > 1 and self._moves[1][0] < taken:
             self._moves.popleft()
 
-    def left(self, session: Session, axes: Sequence[int], lay: Lay, *, first: bool) -> Sequence[Cut] | None:
-        """What is left for an arm whose queue ran dry; None unless that was in a move's beginning.
+    def left(
+        self, session: Session, axes: Sequence[int], lay: Lay, *, first: bool
+    ) -> tuple[Sequence[Cut], float] | None:
+        """What is left for an arm whose queue ran dry, and the seconds done; None unless in a move's beginning.
 
         first: whether it may be the first move of all. None, too, if somebody may have come near the arm since.
         """
+        if not self._moves:
+            return None
         began, status = session.port.now(), _at_rest(session)
         self._forget(session.taken)
-        frames, plan, number = self._moves[0]
+        frames, seconds, plan, number = self._moves[0]
         if not all(status.known >> axis & 1 for axis in axes) or (frames == 0 and not first):
             return None
-        plans = [plan, *(plan for _, plan, k in islice(self._moves, 1, None) if k == 0)]
+        plans = [plan, *(plan for *_, plan, k in islice(self._moves, 1, None) if k == 0)]
         found = left_of(plans, number, [status.counts[axis] for axis in axes], lay)
         stood = session.deaf + session.port.now() - began
-        return None if found is None or found[1] > _BEGINNING or stood > _STOOD else found[0]
+        if found is None or found[1].seconds > _BEGINNING or stood > _STOOD:
+            return None
+        return found[0], seconds + found[1].done
 
 
 def carry_out(
@@ -91,7 +100,7 @@ def carry_out(
     """
     end: Counts | None = None
     total = begun = done = 0.0
-    source, under_way = iter(plans), _UnderWay()
+    under_way = _UnderWay()
 
     def frames(plans: Iterable[Cut | None], least: float) -> Iterator[Batch | None]:
         nonlocal end, total, begun
@@ -100,9 +109,9 @@ def carry_out(
             if plan is None:
                 yield None
                 continue
-            total += plan.duration
+            before, total = total, total + plan.duration
             for k, move in enumerate(plan.moves(lambda: _pieces(session))):
-                under_way.add(given, plan, k, session.taken)
+                under_way.add(given, before, plan, k, session.taken)
                 for batch in batches(session, move, axes, plan.clock, least):
                     given += 1
                     begun += batch.seconds
@@ -114,7 +123,7 @@ def carry_out(
         done = max(done, min(begun - left, total))  # what is left is an estimate: never backwards
         progress(done, total)
 
-    least, todo = 0.0, source
+    least, todo = 0.0, iter(plans)
     while True:
         session.attend()
         try:
@@ -125,10 +134,10 @@ def carry_out(
             if left is None:
                 raise
         session.reopen()
-        total = begun = done = 0.0
+        begun = total = left[1]
         # a line of which it is known by now is given a bad one's lead, then four times that, and then the longest
         least = min(max(_LEAD_BAD, 4 * least), _LEAD_MOST) if session.line.damaged else _LEAD_MOST
-        under_way, todo = _UnderWay(), chain(left, source)
+        under_way, todo = _UnderWay(), chain(left[0], todo)
 
 
 def _at_rest(session: Session) -> Status:

@@ -40,19 +40,19 @@ def onwards(part: Cut, place: Place, here: Array) -> Trajectory:
 
 def left_of(
     plans: Sequence[Cut], move: int, counts: Sequence[int], lay: Callable[[Trajectory, np.ndarray], Cut]
-) -> tuple[Sequence[Cut], float] | None:
-    """What is left of plans for an arm at rest on a move of the first, and the seconds since that move began.
+) -> tuple[Sequence[Cut], Place] | None:
+    """What is left of plans for an arm at rest on a move of the first, and where on that it stands.
 
     counts: where it stands; lay: a trajectory from there as a plan for its board. None: it does not stand on that move.
     """
     first, here = plans[0], np.array(counts, dtype=np.int64)
     if move == 0 and (here == first.start).all():
-        return plans, 0.0
+        return plans, Place(0, 0, 0.0, 0.0)
     place = next((p for p in places_on([first], here) if p.stretch == move), None)
     if place is None:
         return None
     left = onwards(first, place, joints(first.trajectory.arm, here))
-    return [lay(left, here), *plans[1:]], place.seconds
+    return [lay(left, here), *plans[1:]], place
 
 
 def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
