@@ -10,8 +10,11 @@ import armkin
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 
-WRISTS = {"three_dof": False, "puma560": True, "ur5e": False, "irb120": True}  # whether the forearm's end is its wrist
+# whether the forearm's end is its wrist; of the last two a target prescribes sums of joints
+WRISTS = {"three_dof": False, "puma560": True, "ur5e": False, "irb120": True, "labvolt_5150": False, "ra02": False}
 COUNT = 48
+BESIDE = np.geomspace(1e-8, 1e-3, COUNT)
+ROOT = 3e-8  # [rad] how far rounding of a target parts the two branches of a fold that are one
 
 
 def beside_folds(arm: armkin.Arm) -> np.ndarray:
@@ -19,7 +22,7 @@ def beside_folds(arm: armkin.Arm) -> np.ndarray:
     rng = np.random.default_rng(11)
     q = rng.uniform(-np.pi, np.pi, (COUNT, arm.n))
     x, y = (arm.link[3] @ arm.link[4])[:2, 3] if WRISTS[arm.name] else (1.0, 0.0)
-    q[:, 2] = np.geomspace(1e-8, 1e-3, COUNT) * rng.choice([-1.0, 1.0], COUNT) - np.arctan2(y, x)
+    q[:, 2] = BESIDE * rng.choice([-1.0, 1.0], COUNT) - np.arctan2(y, x)
     return np.asarray(targets_of(task_for(arm), armkin.fk(arm, q), q))
 
 
@@ -34,11 +37,14 @@ def test_merging_branches_are_told_without_python(name: str, monkeypatch: pytest
     assert {0, 1} <= set(found.status.tolist())
     for field in ("status", "valid", "within_limits", "branch", "free", "complete"):
         assert np.array_equal(getattr(found, field), getattr(expected, field)), field
-    np.testing.assert_allclose(found.q, expected.q, rtol=0, atol=1e-12)
-    alone = [fast.ik(one) for one in target]
-    assert [int(one.status) for one in alone] == expected.status.tolist()
-    for one, q in zip(alone, expected.q, strict=True):
-        np.testing.assert_allclose(one.q, q, rtol=0, atol=1e-12)
+    # before a sum of joints is taken off a target is rounded otherwise
+    off = np.full(COUNT, 1e-12)
+    if len(task_for(arm).sums):
+        off += np.minimum(ROOT, ROOT**2 / BESIDE)
+    for q in (found.q, np.stack([fast.ik(one).q for one in target])):
+        assert np.array_equal(np.isnan(q), np.isnan(expected.q))
+        assert (np.nan_to_num(np.abs(q - expected.q)).max(axis=(1, 2)) < off).all()
+    np.testing.assert_array_equal([fast.ik(one).status for one in target], expected.status)
 
 
 def test_a_posture_on_a_fold_that_near_has_stays() -> None:

@@ -131,8 +131,8 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
 def _judges(arm: Arm, task: Task, geometry: Geometry) -> bool:
     """Whether parts/folds.c can tell what branches on an edge are: of closed forms that list all of them, as many
     numbers as joints."""
-    rows = 6 if task.orientation == "full" else task.position
-    plain = task.orientation != "axis" and not len(task.sums) and rows == arm.n > 1
+    rows = 6 if task.orientation == "full" else task.position + len(task.sums)
+    plain = task.orientation != "axis" and rows == arm.n > 1
     return plain and geometry.pairs is not None and not geometry.ends and geometry.doubts is None
 
 
@@ -152,6 +152,9 @@ def _of_folds(arm: Arm, task: Task) -> dict[str, str]:
     tables |= {"fit": local_structure.TO_POWERS, "last": local_structure.TO_LAST}
     named |= {name: ", ".join(number(float(v)) for v in table.ravel()) for name, table in tables.items()}
     named["nodes_count"] = str(local_structure.NODES)
+    sums = [[*row, offset] for row, offset in zip(task.sums.tolist(), task.offsets.tolist(), strict=True)]
+    named["weights"] = ", ".join("{" + ", ".join(map(number, row)) + "}" for row in sums)
+    named["sums"] = str(len(sums))
     return named | {"unit": ", ".join(number(unit) for unit in radian_or_reach(arm).tolist())}
 
 

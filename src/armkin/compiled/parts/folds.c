@@ -8,12 +8,28 @@ typedef struct {
     int weak, turns;
 } arm_branch;
 
-/* What a pose (16 numbers) misses of a target: lengths in reaches, then the rotation vector [rad]. */
-ARM_SELDOM static void arm_residual(const double *T, const double *goal, double *r)
+#if @sums@
+/* Weights of the joints in the sums that a target prescribes, and offsets. */
+static const double arm_sums[@sums@][ARM_JOINTS + 1] = {@weights@};
+#endif
+
+/* What a pose (16 numbers) at joint values q, so far apart, misses of a target: lengths in reaches, then sums of joints or
+   the rotation vector [rad]. */
+ARM_SELDOM static void arm_residual(const double *T, const double *goal, const double *q, int apart, double *r)
 {
     int k;
+    (void)q, (void)apart;
     for (k = 0; k < @position@; k++)
         r[k] = (goal[(@first@ + k) * ARM_LANES] - T[(4 * k + 3) * ARM_POINTS]) / @reach@;
+#if @sums@
+    for (k = 0; k < @sums@; k++) {
+        double angle = goal[(@position@ + k) * ARM_LANES] - arm_sums[k][ARM_JOINTS];
+        int j;
+        for (j = 0; j < ARM_JOINTS; j++)
+            angle -= arm_sums[k][j] * q[j * apart];
+        r[@position@ + k] = angle - ARM_TURN * rint(angle / ARM_TURN);
+    }
+#endif
 #if @full@
     {
         double C[3][3], sine = 0.0, cosine;
@@ -33,6 +49,17 @@ ARM_SELDOM static void arm_residual(const double *T, const double *goal, double 
                 r[k] *= atan2(sine, cosine) / sine;
     }
 #endif
+}
+
+/* An entry of the Jacobian, lengths in reaches; slope: as `arm_slope` leaves it. */
+ARM_SELDOM static double arm_entry(const double *slope, int k, int j)
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+#if @sums@
+    if (k >= @position@)
+        return arm_sums[k - @position@][j] * unit[j];
+#endif
+    return slope[(k * ARM_JOINTS + j) * ARM_POINTS] * unit[j] / (k < @position@ ? @reach@ : 1.0);
 }
 
 /* One-sided Jacobi rotations (Hestenes 1958): the columns of A become those of U S, V those of the right vectors. */
@@ -79,7 +106,7 @@ ARM_SELDOM static void arm_both_ways(const double *q, const double *goal, const 
             at[j * ARM_POINTS + i] = q[j * ARM_LANES] + away[i][j] * unit[j];
     arm_pose(at, T, 2);
     for (i = 0; i < 2; i++) {
-        arm_residual(T + i, goal, missed);
+        arm_residual(T + i, goal, at + i, ARM_POINTS, missed);
         for (j = 0; j < ARM_JOINTS; j++)
             for (f[i][j] = 0.0, k = 0; k < ARM_JOINTS; k++)
                 f[i][j] += (r[k] - missed[k]) * U[j][k];
@@ -150,14 +177,13 @@ ARM_SELDOM static int arm_second_order(const double *q, const double *goal, cons
 @followed@/* Whether a branch is told; slope: its `arm_slope`, T: its pose. */
 ARM_SELDOM static int arm_told(const double *q, const double *goal, const double *T, const double *slope, arm_branch *out)
 {
-    static const double unit[ARM_JOINTS] = {@unit@};
     double A[ARM_JOINTS][ARM_JOINTS], V[ARM_JOINTS][ARM_JOINTS], S[ARM_JOINTS], r[ARM_JOINTS], swap;
     int a, k, j, place, last = ARM_JOINTS - 1;
-    arm_residual(T, goal, r);
+    arm_residual(T, goal, q, ARM_LANES, r);
     for (out->miss = 0.0, k = 0; k < ARM_JOINTS; k++) {
         out->miss += r[k] * r[k];
         for (j = 0; j < ARM_JOINTS; j++)
-            A[j][k] = slope[(k * ARM_JOINTS + j) * ARM_POINTS] * unit[j] / (k < @position@ ? @reach@ : 1.0);
+            A[j][k] = arm_entry(slope, k, j);
     }
     out->miss = sqrt(out->miss);
     if (!(out->miss < @closed@)) /* a branch that misses by more wants a correction */

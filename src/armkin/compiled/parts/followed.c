@@ -26,19 +26,18 @@ ARM_SELDOM static int arm_inverse(double M[ARM_JOINTS + 1][2 * (ARM_JOINTS + 1)]
 
 /* A Newton step of a node at t towards the curve, on the Jacobian bordered by u and v; g: the residual that is left along u.
    Returns how long the step is, infinite where there is none. */
-ARM_SELDOM static double arm_to_curve(const double *T, const double *slope, const double *goal, const double *u, const double *v,
-    double t, double *away, double *g)
+ARM_SELDOM static double arm_to_curve(const double *T, const double *slope, const double *goal, const double *q, const double *u,
+    const double *v, double t, double *away, double *g)
 {
-    static const double unit[ARM_JOINTS] = {@unit@};
     const int n = ARM_JOINTS, size = ARM_JOINTS + 1;
     double M[ARM_JOINTS + 1][2 * (ARM_JOINTS + 1)] = {{0.0}}, r[ARM_JOINTS + 1], longest = 0.0, across = 0.0, left = 0.0;
     int j, k;
-    arm_residual(T, goal, r);
+    arm_residual(T, goal, q, ARM_POINTS, r);
     for (r[n] = t, k = 0; k < n; k++) {
         r[n] -= v[k] * away[k];
         M[k][n] = u[k], M[n][k] = v[k];
         for (j = 0; j < n; j++)
-            M[k][j] = slope[(k * n + j) * ARM_POINTS] * unit[j] / (k < @position@ ? @reach@ : 1.0);
+            M[k][j] = arm_entry(slope, k, j);
     }
     for (k = 0; k < size; k++)
         M[k][size + k] = 1.0;
@@ -82,7 +81,8 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
             const double t = node[i] * out->span;
             if (there[i])
                 continue;
-            there[i] = arm_to_curve(T + i, slope + i, goal, u, out->v, t, away[i], &away[i][ARM_JOINTS]) < @arrived@;
+            there[i] = arm_to_curve(T + i, slope + i, goal, at + i, u, out->v, t, away[i], &away[i][ARM_JOINTS])
+                < @arrived@;
             open -= there[i];
             for (j = 0; j < ARM_JOINTS; j++)
                 if (!(fabs(away[i][j]) < 3.0 * fabs(t)))
