@@ -75,7 +75,7 @@ def tell(goals: Goals, runner: Recorded, out: Batch, at: Doubted) -> NDArray[np.
         at.q[k, b], size = newton.correct(goals.arm, goals.task, at.q[k, b], goals.target[at.rows[k]], steps=3)
         told[k[size >= CLOSED]] = False
     second = _pairs(goals, at, there & (at.edge | (at.miss > ACCEPTED**2)), told)
-    meets = second.any(axis=1)
+    meets: Bool = np.asarray(second.any(axis=1))
     some = np.flatnonzero(told & (meets | (there & (at.miss > ACCEPTED**2)).any(axis=1)))
     if len(some):
         rows, meets, there = at.rows[some], meets[some], there[some] & ~second[some]
