@@ -205,8 +205,10 @@ def _second_order(
         cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
         quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * h**2) + n * h * off
         third = (6.0 * cubic + 12.0 * quartic) / h**3
-        turns = (far <= h) & (third * far < 0.2 * size) & (sigma**2 < 2.0 * SOLUTION * (size - third * far))
-        alone = (near <= h) & (sigma**2 > 2.0 * SOLUTION * (size + third * near))
+        # what lies beyond h decides nothing, and its product may be no number
+        bends, leans = third * np.minimum(far, h), third * np.minimum(near, h)
+        turns = (far <= h) & (bends < 0.2 * size) & (sigma**2 < 2.0 * SOLUTION * (size - bends))
+        alone = (near <= h) & (sigma**2 > 2.0 * SOLUTION * (size + leans))
         bent = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(more, axis=2).max(axis=0) + off
         new = ~out.known & (turns | alone) & (bent < 0.1 * h) & close
         out.known[new], out.boundary[new] = True, turns[new]
