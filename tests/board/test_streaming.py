@@ -95,22 +95,21 @@ def test_a_stall_in_the_beginning_goes_on_from_there(rows: list[list[float]]) ->
     assert again[6:18] != bytes(12), "what is left, not all of it"
 
 
-def test_two_stalls_lose_none_of_several_moves() -> None:
+@pytest.mark.parametrize("again", [48, 92])
+def test_two_stalls_lose_none_of_several_moves(again: int) -> None:
     """The second one comes before the board has heard of all that was left at the first."""
-    rows = [[20, 90, -90], [20, 70, -90], [0, 90, -90], [-20, 60, -60]]
-    for again in (40, 48, 66, 75, 92):
-        port, shown = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 4, 0.4, again), list[float]()
-        machine = machine_on(port)
-        plans, at = list[Any](), machine.counts()
-        for row in rows:
-            plans.append(machine.plan(at, np.deg2rad([row])))
-            at = tuple(plans[-1].end.tolist())
-        machine.run(iter(plans), lambda done, total, shown=shown: shown.append(done))
-        assert machine.counts() == at
-        assert shown == sorted(shown)
-        assert sum(payload_of(data)[1] == 0 for data in port.sent) == 2  # sessions
-        late = shown[-1] - sum(plan.duration for plan in plans)
-        assert 0 < late < 0.3, "what is left of a move begins at rest, and takes a little longer"
+    port, shown = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 4, 0.4, again), list[float]()
+    machine = machine_on(port)
+    plans, at = list[Any](), machine.counts()
+    for row in [[20, 90, -90], [20, 70, -90], [0, 90, -90], [-20, 60, -60]]:
+        plans.append(machine.plan(at, np.deg2rad([row])))
+        at = tuple(plans[-1].end.tolist())
+    machine.run(iter(plans), lambda done, total: shown.append(done))
+    assert machine.counts() == at
+    assert shown == sorted(shown)
+    assert sum(payload_of(data)[1] == 0 for data in port.sent) == 2  # sessions
+    late = shown[-1] - sum(plan.duration for plan in plans)
+    assert 0 < late < 0.3, "what is left of a move begins at rest, and takes a little longer"
 
 
 @pytest.mark.parametrize(("load", "sessions"), [(0.0, 1), (1.5, 0)])
