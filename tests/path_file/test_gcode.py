@@ -163,6 +163,12 @@ def test_s_is_noted_where_nothing_takes_it() -> None:
     assert words("M106 S100") == ["M106", "S"]
 
 
+def test_a_program_has_as_many_points_as_any_path() -> None:
+    """A million lines took minutes and gigabytes, as no other kind of file may."""
+    with pytest.raises(PathFileError, match=r"t\.gcode:120001: is beyond 120000 points: give the program in parts"):
+        ends("G1 X1\nX2\n" * 65_000)
+
+
 def test_a_cycle_that_ends_leaves_the_motion_as_it_was() -> None:
     one, other = (
         gcode.parse(f"G0 X1\nG1 X2 F60{word}\nX3".encode(), "t", AS_IT_IS, Wishes()) for word in ("\nG80", "")

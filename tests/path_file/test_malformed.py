@@ -61,3 +61,18 @@ def test_a_cell_without_end_is_refused_with_its_line() -> None:
     """Python's own reader of CSV gives up at 131,072 characters: an internal error."""
     with pytest.raises(PathFileError, match=r"^t:2: no row of numbers: field larger than"):
         table.parse(b"1,2,3\n" + b"9" * 200_000 + b",1,2\n", "t")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x,y,w\n390,80,300\n", "t.csv:1: column w is unknown beside those of a target: x, y, z"),  # w was taken for z
+        ("q1,x,y,z\n1,390,80,300\n", "t.csv:1: column q1 is unknown"),
+        ("x,y,z,\n390,80,300,\n", "t.csv:1: column without a name is unknown"),
+        ("x,y,z\n390,80,300\n1e300,80,300\n", "t.csv:3: '1e300' is beyond 1e+07"),  # was an internal error
+    ],
+)
+def test_a_table_s_columns_and_numbers_are_those_of_a_path(text: str, said: str) -> None:
+    with pytest.raises(PathFileError) as found:
+        table.parse(text.encode(), "t.csv")
+    assert str(found.value).startswith(said)

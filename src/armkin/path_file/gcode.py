@@ -12,7 +12,7 @@ from armkin.errors import PathFileError
 from armkin.path_file import gcode_arcs
 from armkin.path_file.drawing import LARGEST, Pen, Placing, Point, Wishes
 from armkin.path_file.gcode_words import PLAIN, Words, lines, words_of, wrong
-from armkin.path_file.model import PathFile
+from armkin.path_file.model import MOST_POINTS, PathFile
 
 AXES = "XYZ"
 INCH = 25.4
@@ -64,6 +64,7 @@ class _Program:
         self.systems = {number: [0.0, 0.0, 0.0] for number in range(1, 7)}
         self.local, self.shift = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]  # G52, G92
         self.held: bool | None = None
+        self.points = 0
         self.ignored: Counter[str] = Counter()
         self.first: dict[str, int] = {}
         self.line, self.words = 0, Words()
@@ -281,7 +282,7 @@ class _Program:
         if not self.drawn:
             self.pen.jump(self.at, self.line)
         self.pen.arc(self.at, centre, goal, normal, angle, speed, self.line)
-        self.at, self.drawn = goal, True
+        self._drawn_to(goal)
 
     def _straight(self, goal: Point, word: str) -> None:
         """A line by G0 or G1; to the first point, a joint move."""
@@ -290,7 +291,12 @@ class _Program:
             self.pen.jump(goal, self.line)
         elif goal != self.at:
             self.pen.line(goal, speed, self.line)
-        self.at, self.drawn = goal, True
+        self._drawn_to(goal)
+
+    def _drawn_to(self, goal: Point) -> None:
+        self.at, self.drawn, self.points = goal, True, self.points + 1
+        if self.points > MOST_POINTS:
+            raise self._wrong(f"is beyond {MOST_POINTS} points: give the program in parts")
 
     def _speed(self, word: str) -> float | None:
         """The tool's speed [mm/s]; None: as fast as the joints go."""

@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-Number = Annotated[float, Field(ge=-1e7, le=1e7)]
+LARGEST = 1e7  # of a number
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Values = Annotated[list[Number], Field(min_length=1, max_length=16)]
 Triple = Annotated[list[Number], Field(min_length=2, max_length=3)]
 MOST_POINTS = 120_000  # of a polyline or a spline, and of a CSV file

@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 from armkin.errors import PathFileError
-from armkin.path_file.model import LEAST_TOOL_SPEED, MOST_POINTS, Move, PathFile, Source
+from armkin.path_file.model import LARGEST, LEAST_TOOL_SPEED, MOST_POINTS, Move, PathFile, Source
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
@@ -42,6 +42,12 @@ def parse(raw: bytes, name: str) -> PathFile:
         doubled = sorted({key for key in header if header.count(key) > 1})
         if doubled:
             raise PathFileError(f"{name}:1: column {doubled[0]} stands twice in the header", file=name)
+        strange = [key for key in header if key not in _TARGETS + _OPTIONS]
+        if strange and len(strange) < len(header) - sum(key in _OPTIONS for key in header):
+            raise PathFileError(
+                f"{name}:1: column {strange[0] or 'without a name'} is unknown beside those of a target: "
+                f"{', '.join(_TARGETS + _OPTIONS)}", file=name, line=1,
+            )  # fmt: skip
     if len(rows) > MOST_POINTS:
         raise PathFileError(
             f"{name}: has more than {MOST_POINTS} rows, and a path no more: give it in parts", file=name
@@ -51,11 +57,11 @@ def parse(raw: bytes, name: str) -> PathFile:
     for number, row in rows:
         values = [_value(cell) for cell in row]
         empty = {i for i in spared if i < len(row) and not row[i].strip()}
-        bad = [i for i, v in enumerate(values) if v is None and i not in empty]
+        bad = [i for i, v in enumerate(values) if (v is None or abs(v) > LARGEST) and i not in empty]
         if bad or len(values) != len(header or values):
             wrong = row[bad[0]] if bad else None
             what = (
-                f"'{wrong[:40]}' is no number"
+                f"'{wrong[:40]}' is {'no number' if values[bad[0]] is None else f'beyond {LARGEST:g}'}"
                 if wrong is not None
                 else f"{len(values)} cells, {len(header or [])} columns"
             )
