@@ -126,7 +126,9 @@ def answered(
     shown, most = target_rounding.of_targets(arm, definition, target, (given, shown), single, rounding, lead)
     if examine:
         goals = Goals(arm, definition, target, each)
-        out = legal_postures.with_legal_postures(goals, out)
+        edge = np.flatnonzero((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR))
+        if len(illegal := edge[~out.within[edge].any(axis=1)]):
+            out = legal_postures.with_legal_postures(goals, out, illegal)
         if most.max(initial=0.0) > near_itself.ROUNDED:
             out = near_itself.stand(goals, out, most)
         if arm.keep_out:

@@ -99,7 +99,8 @@ def solve(
     if geometry.doubts is None:
         if examine and doubted:
             goals = Goals(arm, task, target, near)
-            edge = edge if geometry.ends else tell(goals, runner, out, Doubted.joined(doubted))
+            if any(some.plain.any() for some in doubted) and not geometry.ends:
+                edge = tell(goals, runner, out, Doubted.joined(doubted))
             for start in range(0, len(edge), AT_ONCE):
                 out = decided(goals, runner, out, edge[start : start + AT_ONCE])
         edge = edge[:0]
@@ -148,27 +149,17 @@ def _keep(
     on_edge = _on_edge(doubt, miss, None if full else valid)
     if there is not None and len(there):
         on_edge = np.union1d(on_edge, near_itself.take(goals, part, there))
-    doubted = _doubted(on_edge, part, (miss.reshape(shape), doubt, free), there)
+    flags = (np.broadcast_to(x, shape)[..., on_edge].reshape(B, -1).T for x in (miss.reshape(shape), doubt, free))
+    off, edge, loose = flags if len(on_edge) else np.empty((3, 0, B))
+    plain: Bool = np.asarray(~(loose > 0.0).any(axis=1))
+    if there is not None and len(there):
+        plain &= np.isin(on_edge, there, invert=True)
+    doubted = Doubted(on_edge, part.q[on_edge], off, edge > 0.0, plain)
     if not full:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
         pack(part, count)
     return doubted
-
-
-def _doubted(
-    rows: NDArray[np.intp], part: Batch, columns: tuple[Any, Any, Any], there: NDArray[np.intp] | None
-) -> Doubted:
-    """Rows of a part on an edge; columns: squared residuals, edge and free of all branches; there: `_keep`."""
-    N, B, n = part.q.shape
-    if not len(rows):
-        return Doubted(rows, np.empty((0, B, n)), np.empty((0, B)), np.empty((0, B), bool), np.empty(0, bool))
-    lead = np.broadcast_shapes(*(np.shape(x) for x in columns))[:-1]
-    miss, edge, free = (np.broadcast_to(x, (*lead, N))[..., rows].reshape(B, -1).T for x in columns)
-    plain: Bool = np.asarray(~(free > 0.0).any(axis=1))
-    if there is not None and len(there):
-        plain &= np.isin(rows, there, invert=True)
-    return Doubted(rows, part.q[rows], miss, edge > 0.0, plain)
 
 
 def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> NDArray[np.intp]:

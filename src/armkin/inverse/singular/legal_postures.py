@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.answers.closest import thorough
-from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, CLOSED, SAME, SOLUTION
@@ -25,8 +24,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def with_legal_postures(goals: Goals, out: Batch) -> Batch:
-    """The same branches, with legal ones for targets on an edge that have none, where such a posture is found.
+def with_legal_postures(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Batch:
+    """The same branches, with legal ones for targets rows on an edge that have none, where such a posture is found.
 
     goals, out: N targets and their branches. The legal posture takes the place of the one that it shares a self-motion
     with, as `near` would.
@@ -37,10 +36,6 @@ def with_legal_postures(goals: Goals, out: Batch) -> Batch:
         """Further candidates: none, those that were found are all."""
         return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64), np.zeros(len(rows), bool)
 
-    rows = np.flatnonzero((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR))
-    rows = rows[~out.within[rows].any(axis=1)]
-    if not len(rows):
-        return out
     for k in rows[_may_be_legal(goals, out, rows)]:
         q = out.q[k, out.valid[k]]
         at_limit = _at_limits(arm, q).all(axis=1).any()
