@@ -204,8 +204,8 @@ def interval_deviations(arm: Arm, route: Route, path: Knots, before: tuple[Knots
         known, distances = before
         at = np.searchsorted(path.s, known.s)
         at += (np.diff(known.s, prepend=-1.0) == 0) & (path.s[np.minimum(at + 1, len(path.s) - 1)] == known.s)
-        same = (at[1:] == at[:-1] + 1) & (path.d[at[1:]] == known.d[1:]).all(axis=1)
-        same = np.flatnonzero(same & (path.d[at[:-1]] == known.d[:-1]).all(axis=1))
+        alike = (path.d.T.take(at, axis=1) == known.d.T).all(axis=0)
+        same = np.flatnonzero((at[1:] == at[:-1] + 1) & alike[1:] & alike[:-1])
         off[at[same]], open_[at[same]] = distances[same], False
     some = np.flatnonzero(open_)
     for part in (some[i : i + _BLOCK] for i in range(0, len(some), _BLOCK)):

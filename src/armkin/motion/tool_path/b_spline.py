@@ -18,6 +18,7 @@ from armkin.formula.arrays import Array, Bool
 Int = NDArray[np.intp]
 _RIDGE = 1e-7  # weight of the control polygon's bend, where points are too few to determine a curve
 _ENDS = 1e6  # weight of a curve's ends, which it passes
+_DENSE = 16  # blocks: so few are solved as one system
 _THIRDS = np.arange(4) / 3
 _TO_POWERS = np.linalg.inv(np.vander(_THIRDS, increasing=True))  # values at thirds -> coefficients
 
@@ -154,9 +155,11 @@ def _block_tridiagonal(D: Array, U: Array, b: Array) -> Array:
 
     D: (M, k, k); U: (M - 1, k, k) blocks beside the diagonal; b: (M, k, d) -> (M, k, d).
     """
-    if len(D) == 1:
-        return np.asarray(np.linalg.solve(D, b))
     k, m = D.shape[1], len(D) // 2  # size of blocks, blocks that go
+    if len(D) <= _DENSE:
+        whole, i = np.zeros((len(D), k, len(D), k)), np.arange(len(D))
+        whole[i, :, i], whole[i[:-1], :, i[1:]], whole[i[1:], :, i[:-1]] = D, U, U.swapaxes(1, 2)
+        return np.asarray(np.linalg.solve(whole.reshape(len(D) * k, -1), b.reshape(len(D) * k, -1)).reshape(b.shape))
     left, right = U[0::2], np.zeros((m, k, k))
     going = U[1::2]
     right[: len(going)] = going

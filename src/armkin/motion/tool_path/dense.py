@@ -158,9 +158,9 @@ def _block(
     still = np.where(moving, 0.0, y[0] / weights(task))
 
     def at(v: Array) -> tuple[Array, Array]:
-        values, slopes = np.repeat(still[None], len(v), axis=0), np.zeros((len(v), len(still)))
-        values[:, moving], slopes[:, moving] = (each / scale for each in curve.values(v))
-        return values, slopes
+        values, slopes = np.repeat(still[:, None], len(v), axis=1), np.zeros((len(still), len(v)))
+        values[moving], slopes[moving] = (each.T / scale[:, None] for each in curve.values(v))
+        return values.T, slopes.T
 
     whole, length = unit_speed(task, spots.at(numbers[0]), at, curve.begin)
     given, bends, spans = length(curve.at), length(curve.bends), length(curve.begin)

@@ -81,6 +81,7 @@ def fitted(y: Array, tolerance: float, stop: Bool | None = None) -> Fitted:
 
     stop: (N,) where the way rests, the ends among them: there it stays a corner.
     """
+    y = np.asfortranarray(y)  # numpy works on long runs of numbers
     chords = Chords(y, corners(y, tolerance, stop))
     stop = np.zeros(len(y), bool) if stop is None else stop
     used, parts = np.ones(len(y) - 1, bool), []

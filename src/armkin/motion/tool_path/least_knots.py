@@ -61,11 +61,11 @@ class Rows:
         edge = np.append(True, curve[1:] != curve[:-1])
         return Rows(
             u,
-            chords.y[numbers] + share[:, None] * chords.step[numbers],
+            np.asfortranarray(chords.y[numbers] + share[:, None] * chords.step[numbers]),  # long runs of numbers
             curve,
             _SPARE * np.where(given, tolerance, _CHORD * tolerance + chords.sagitta[numbers]),
             heavy,
-            np.where(given[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None]),
+            np.asfortranarray(np.where(given[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])),
             np.where(given, numbers + (share == 1), -1),
             numbers,
             share * chords.length[numbers],
@@ -75,7 +75,7 @@ class Rows:
 
     def part(self, some: Int) -> Rows:
         """Those of some curves, all rows of each."""
-        taken = {field.name: getattr(self, field.name)[some] for field in fields(self)}
+        taken = {field.name: getattr(self, field.name).T.take(some, axis=-1).T for field in fields(self)}
         taken["curve"] = np.unique(taken["curve"], return_inverse=True)[1]
         return Rows(**taken)
 
@@ -172,8 +172,9 @@ def _astray(rows: Rows, layout: Layout, miss: Array, weight: Array) -> Bool:
     inside = where == layout.interval[b]
     a, b, where = a[inside], b[inside], where[inside]
     M = len(layout.begin)
-    like = np.bincount(where, (miss[a] * miss[b]).sum(axis=1), M)
-    size = np.bincount(where, (miss[a] ** 2).sum(axis=1), M)
+    one, next_ = (miss.T.take(some, axis=1) for some in (a, b))
+    like = np.bincount(where, (one * next_).sum(axis=0), M)
+    size = np.bincount(where, (one**2).sum(axis=0), M)
     many = np.bincount(where, minlength=M)
     weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # these miss the others for a few
     return np.asarray(
