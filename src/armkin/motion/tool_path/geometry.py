@@ -318,9 +318,10 @@ def unit_speed(
     y0, d0, d1 = y[:-1, moving], left[:, moving] * h[:, None], right[:, moving] * h[:, None]  # left, right: dy/ds
     chord = y[1:, moving] - y0
     powers = np.stack([y0.T, d0.T, (3 * chord - 2 * d0 - d1).T, (d0 + d1 - 2 * chord).T])  # (4, d, intervals)
+    inner = s[1:-1]
 
     def along(x: Array) -> Array:
-        i = np.clip(np.searchsorted(s, x, side="right") - 1, 0, len(h) - 1)
+        i = inner.searchsorted(x, side="right")
         f = (x - s.take(i)) / h.take(i)
         c0, c1, c2, c3 = powers.take(i, axis=2)
         out = np.repeat(still[:, None], len(x), axis=1)
