@@ -96,18 +96,20 @@ def _pairs(goals: Goals, at: Doubted, asked: Bool, told: Bool) -> Bool:
     k, b = np.nonzero(asked)
     if not len(k):
         return second
-    q = at.q[k, b]
-    inverse, beside = _inverses(goals, q)
-    weak = (inverse * inverse).sum(axis=(1, 2)) * FOLDED**2 >= 1.0
-    number = np.empty(asked.shape, int)
+    q, number = at.q[k, b], np.empty(asked.shape, int)
     number[k, b] = np.arange(len(k))
     row, i, j = np.nonzero(np.triu(asked[:, :, None] & asked[:, None], 1))
     i, j = number[row, i], number[row, j]
     way = newton.difference(goals.arm, q[j], q[i])
-    close = np.abs(way).max(axis=1) < CLOSE_BY
+    size = np.abs(way).max(axis=1)
+    close = size < CLOSE_BY
+    many = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
+    told[k[many > 1]] = told[k[i[size < APART]]] = False
+    if not told[k].all():  # no Jacobians of those
+        return _pairs(goals, at, asked, told)
     i, j, way = i[close], j[close], way[close]
-    many = np.bincount(np.concatenate([i, j]), minlength=len(k))
-    told[k[many > 1]] = False
+    inverse, beside = _inverses(goals, q)
+    weak = (inverse * inverse).sum(axis=(1, 2)) * FOLDED**2 >= 1.0
     lone = np.flatnonzero(weak & (many == 0) & told[k])
     if len(lone):
         told[k[lone[~_alone(goals, q[lone], inverse[lone], beside[lone])]]] = False
