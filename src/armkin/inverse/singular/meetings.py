@@ -29,6 +29,8 @@ BOW = 0.1  # of its length: a curve is no farther off its chord
 TURN = np.linspace(0.0, np.pi, 256, endpoint=False)
 ROUND = np.stack([np.cos(TURN) ** 2, np.cos(TURN) * np.sin(TURN), np.sin(TURN) ** 2], axis=1)  # of quadratic forms
 ALL_ROUND = 5.0 * BENT  # [1/rad] curvature in all directions: a residual has passed `SOLUTION` 1e-3 rad away
+THIRD = 0.03  # singular value of the third direction, which bends the curves by its inverse
+SPREAD = 5.0  # times that in some direction: no surface of solutions, and the zeros are clear
 
 Int = NDArray[np.int64]
 
@@ -65,16 +67,21 @@ def ways_out(
     return np.concatenate([q, more], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1), resting
 
 
-def _bends_away(arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array) -> Bool:
-    """Which postures (M, n) that lose two directions no curve leaves: (M,).
+def _tangents(
+    arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array
+) -> tuple[Bool, Int, Array]:
+    """Of which postures (M, n) the directions of curves are known, and these: whose (m,), and which (m, n).
 
     As far as t along a lost direction v the residual is t^2 / 2 times u . f''(v, v), for both lost left vectors u: two
-    quadratic forms of v (docs/solution.md). Where they have no zero in common, it grows all round.
+    quadratic forms of v (docs/solution.md). Curves leave along their common zeros; where there is none, it grows all
+    round, and where they are nothing but zero they do not tell.
     """
-    n, out = arm.n, np.zeros(len(q), bool)
-    rows = np.flatnonzero((nullity == 2) & (at.r.shape[1] == n))
+    n, known = arm.n, np.zeros(len(q), bool)
+    if at.r.shape[1] == n > 2:
+        known = (nullity == 2) & (at.S[:, n - 3] > THIRD)
+    rows = np.flatnonzero(known)
     if not len(rows):
-        return out
+        return known, rows, np.zeros((0, n))
     u, V, unit = at.U[rows][:, :, n - 2 :], at.V[rows], radian_or_reach(arm)
     ways = np.stack([V[:, n - 2], V[:, n - 1], V[:, n - 2] + V[:, n - 1]])  # (3, m, n)
     ends = q[rows] + np.multiply.outer([FOLD_WAY, -FOLD_WAY], ways * unit)
@@ -83,9 +90,13 @@ def _bends_away(arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int,
     bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * u).sum(axis=2) / FOLD_WAY**2  # (3, m, 2)
     forms = np.stack([bent[0], bent[2] - bent[0] - bent[1], bent[1]])
     size = np.linalg.norm(np.tensordot(ROUND, forms, axes=1), axis=2)
+    most = size.max(axis=0)
+    known[rows] = most > SPREAD * ALL_ROUND
     # half a step from the next of these directions a form differs by twice its largest value at most
-    out[rows] = size.min(axis=0) > ALL_ROUND + 2.0 * TURN[1] * size.max(axis=0)
-    return out
+    zero = (size <= ALL_ROUND + 2.0 * TURN[1] * most) & known[rows]
+    zero &= (size <= np.roll(size, 1, axis=0)) & (size < np.roll(size, -1, axis=0))
+    k, who = np.nonzero(zero)
+    return known, rows[who], np.cos(TURN[k])[:, None] * V[who, n - 2] + np.sin(TURN[k])[:, None] * V[who, n - 1]
 
 
 def _steps_out(
@@ -96,14 +107,15 @@ def _steps_out(
     most: (M,) residual of what counts as on one: points beside a self-motion of double roots have more. Also which
     meetings (M,) all pushes fall back to.
     """
-    rests = _bends_away(arm, task, q, at, nullity, target)
-    open_ = np.flatnonzero(~rests)
+    known, who, push = _tangents(arm, task, q, at, nullity, target)
+    rests, open_ = known.copy(), np.flatnonzero(~known)
     rests[open_] = ~on_surface(arm, task, q[open_], at.V[open_], target[open_])
     rows = open_[rests[open_]]
-    if not len(rows):
-        return rows, np.zeros((0, arm.n)), rests
-    who, push = null_directions(arm.n, at.V[rows], nullity[rows])
-    who = rows[who]
+    if len(rows):
+        others, further = null_directions(arm.n, at.V[rows], nullity[rows])
+        who, push = np.concatenate([who, rows[others]]), np.concatenate([push, further])
+    if not len(who):
+        return who, push, rests
     there, size, grown = pushed(arm, task, q[who], np.full(len(who), 10 * STEP), push, target[who])
     rests[who[grown <= GROWTH]] = False
     unit, way = radian_or_reach(arm), newton.difference(arm, there, q[who])
