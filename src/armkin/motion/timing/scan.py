@@ -89,30 +89,33 @@ def back(keep: Array, gain: Array) -> tuple[Array, Array]:
     return e[:, ::-1], np.where(keep > 0, gain * e, np.inf)[:, ::-1]
 
 
-def scan(y: Array, least: Least) -> Array:
-    """y'[0] = y[0], y'[i+1] = min(y[i+1], least_i(y'[i])), not below 0.
+def scan(top: Array, least: Least, known: Array | None = None) -> Array:
+    """y[0] = top[0], y[i+1] = min(top[i+1], least_i(y[i])), not below 0.
 
-    Where y is reached from the y before it, nothing has to be done: in most intervals. Runs that begin where it is
-    not are followed side by side, as long as there are many.
+    known: such a y of another top and least, which differ in some intervals. Where y is what comes there from the y
+    before it, nothing has to be done: in most intervals. Runs that begin where it is not are followed side by side,
+    as long as there are many.
     """
-    out = y.copy()
-    first = np.append(0, np.cumsum(np.bincount(least.at, minlength=len(y) - 1)))  # of each interval's other functions
+    out = (top if known is None else known).copy()
+    out[0] = top[0]
+    first = np.append(0, np.cumsum(np.bincount(least.at, minlength=len(top) - 1)))  # of each interval's other functions
     for _ in range(_TIMES):
-        k = (~(least.values(out[:-1]) >= out[1:])).nonzero()[0]
+        found = least.values(out[:-1])
+        k = (np.minimum(top[1:], np.where(found > 0.0, found, 0.0)) != out[1:]).nonzero()[0]
         heads = k[np.diff(k, prepend=-2) > 1]  # the run of a first one passes those next to it
         if len(heads) <= _TOGETHER:
             break
-        _side_by_side(out, least, first, heads)
+        _side_by_side(out, least, first, heads, top)
     done = 0
     for begin in k.tolist():
         if begin >= done:
-            done = _follow(out, least, first, begin)
+            done = _follow(out, least, first, begin, top)
     return out
 
 
-def _side_by_side(y: Array, least: Least, first: Int, heads: Int) -> None:
-    """Follow runs from places (r,), each up to where y is reached again, and write those that no other one passes."""
-    k, now, run, top, end = heads, y[heads], np.arange(len(heads)), y, len(y) - 1
+def _side_by_side(y: Array, least: Least, first: Int, heads: Int, top: Array) -> None:
+    """Follow runs from places (r,), each up to where y is what comes there; write those that no other one passes."""
+    k, now, run, end = heads, y[heads], np.arange(len(heads)), len(y) - 1
     ends = np.full(len(heads), end)
     found: list[tuple[Int, Int, Array]] = []
     while len(k):
@@ -123,11 +126,11 @@ def _side_by_side(y: Array, least: Least, first: Int, heads: Int) -> None:
             some = (count > i).nonzero()[0]
             row = begin[some] + i
             value[some] = np.minimum(value[some], least.slope[row] * now[some] + least.level[row])
-        now = np.where(value > 0.0, value, 0.0)
         k = k + 1
-        lower = now < top[k]
-        ends[run[~lower]] = k[~lower]
-        k, now, run = k[lower], now[lower], run[lower]
+        now = np.minimum(top[k], np.where(value > 0.0, value, 0.0))
+        other = now != y[k]
+        ends[run[~other]] = k[~other]
+        k, now, run = k[other], now[other], run[other]
         found.append((run, k, now))
         inside = k < end
         k, now, run = k[inside], now[inside], run[inside]
@@ -151,15 +154,15 @@ def _lists(least: Least, some: slice) -> dict[int, list[tuple[float, float]]]:
     return more
 
 
-def _follow(y: Array, least: Least, first: Int, k: int) -> int:
-    """Lower y[k+1], ... up to some place where what comes there is no lower, and return that."""
+def _follow(y: Array, least: Least, first: Int, k: int, most: Array) -> int:
+    """Put right y[k+1], ... up to some place where it is what comes there, and return that."""
     now, size = float(y[k]), _FEWEST
     while True:
         end = min(k + size, len(y) - 1)
-        most, found = y[k + 1 : end + 1].tolist(), []
+        tops, last, found = most[k + 1 : end + 1].tolist(), y[end], []
         rows = (each[k:end].tolist() for each in least[:4])
         more = _lists(least, slice(first[k], first[end]))
-        for i, top, a0, b0, a1, b1 in zip(range(k, end), most, *rows, strict=True):
+        for i, top, a0, b0, a1, b1 in zip(range(k, end), tops, *rows, strict=True):
             value, other = a0 * now + b0, a1 * now + b1
             if other < value:
                 value = other
@@ -171,6 +174,6 @@ def _follow(y: Array, least: Least, first: Int, k: int) -> int:
             now = top if top < value else value if value > 0.0 else 0.0
             found.append(now)
         y[k + 1 : end + 1] = found
-        if now == most[-1] or end == len(y) - 1:
+        if now == last or end == len(y) - 1:
             return end
         k, size = end, min(2 * size, _MOST)

@@ -103,7 +103,7 @@ class Fastest:
             behind, forth = self._functions(at)
             self.behind, self.ahead = self.behind.put(M - 1 - at[::-1], behind), self.ahead.put(at, forth)
         self.beta = scan(np.minimum(self.beta, self.cap)[::-1], self.behind)[::-1]
-        self.x = scan(self.beta, self.ahead)
+        self.x = scan(self.beta, self.ahead, self.x)
 
     def _functions(self, some: Some) -> tuple[Least, Least]:
         """What the next x, and the one before it, are at most, in some of the intervals; the cap sinks to suit."""
