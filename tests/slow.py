@@ -195,6 +195,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_reach_is_the_same_bytes_on_a_cluster",
     ),
     "export/test_c.py": (),
+    "export/test_c_singular.py": (),
     "export/test_js.py": (),
     "export/test_words.py": ("test_a_table_is_the_same_arm",),
     "firmware/test_analyser.py": (),

@@ -57,7 +57,13 @@ class Exported:
             _fields_ = (("q", number * arm.n), ("branch", ctypes.c_int), ("within", ctypes.c_int), ("residual", number))
 
         self._found, self._edge = (Solution * 64)(), ctypes.c_int()
-        self._ik, self._best = (code[f"{prefix}_{name}"] for name in ("ik", "best"))
+        self._ik, self._best, self._fk = (code[f"{prefix}_{name}"] for name in ("ik", "best", "fk"))
+
+    def fk(self, q: np.ndarray) -> np.ndarray:
+        """The tool's pose (4, 4), in the export's own precision."""
+        out, values = np.empty((4, 4), self.real), np.ascontiguousarray(q, self.real)
+        self._fk(ctypes.c_void_p(values.ctypes.data), ctypes.c_void_p(out.ctypes.data))
+        return out.astype(float)
 
     def ik(self, target: np.ndarray, near: np.ndarray) -> tuple[int, bool, np.ndarray, int]:
         """How many branches, or -1; whether the target is at an edge; their joint values (count, n); the best one."""

@@ -235,7 +235,7 @@ def _rows(
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64], Bool]:
             """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.
 
-            They say nothing of a corner of the workspace, beside which no target is reached, and of self-motions.
+            They say nothing of an end of the workspace, beside which no target is reached, and of self-motions.
             """
             found = solve(around(arm, task, target).reshape(-1, *target.shape[1:])).q
             found = found.reshape(len(target), -1, arm.n)
