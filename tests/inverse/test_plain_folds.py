@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.inverse.run import chunks, edges
+from armkin.inverse.run import chunks, edges, folds
 from armkin.inverse.singular import components, local_structure
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
@@ -88,7 +88,7 @@ def test_what_two_jacobians_tell_is_what_examining_finds(
     name: str, task: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arm = armkin.load(name)
-    which, tell, told = task_for(arm, task), chunks.tell, 0
+    which, tell, told = task_for(arm, task), folds.tell, 0
     rng = np.random.default_rng(12)
     q = np.concatenate([beside_folds(arm, 80), rng.uniform(-np.pi, np.pi, (40, arm.n))])
     q[80:110, arm.n - 2] = rng.choice([-1.0, 1.0], 30) * np.geomspace(1e-6, 1e-3, 30)
