@@ -11,9 +11,12 @@ import re
 import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from armkin.cli.commands import COMMANDS
 from command_line import ROOT, run
@@ -119,3 +122,20 @@ def test_the_gate_runs_the_readmes_own_test_command() -> None:
     for needed in ("python3-venv", "gcc-avr", "libsimavr-dev", "gcc-arm-none-eabi", "chromium", "frama-c-base"):
         assert needed in tests
     assert "pytest" in tests
+
+
+def test_the_first_screen_has_a_picture_that_moves() -> None:
+    """scripts/moving_picture.py makes it: a round of the tip, in at most 600 kB, its first frame the round's beginning."""
+    name = re.search(r"\]\((docs/\S+\.gif)\)", README.read_text(encoding="utf-8")[:1500])
+    assert name is not None
+    picture = ROOT / name[1]
+    assert picture.stat().st_size <= 600_000
+    with Image.open(picture) as shown:
+        frames = []
+        for k in range(getattr(shown, "n_frames", 1)):
+            shown.seek(k)
+            frames.append(np.asarray(shown.convert("L"), float))
+    assert len(frames) >= 24
+    assert min(np.abs(b - a).mean() for a, b in pairwise(frames)) > 0.05  # the arm moves from each to the next
+    opposite = np.abs(frames[len(frames) // 2] - frames[0]).mean()
+    assert np.abs(frames[-1] - frames[0]).mean() < 0.5 * opposite  # and the last leads to the first
