@@ -16,11 +16,11 @@ import tempfile
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 ROOT = Path(__file__).parents[1]
 FRAMES, PERIOD = 48, 4.0  # and seconds a round
-SIZE, WIDTH = {"width": 1180, "height": 640}, 800  # of the window; of the picture, in pixels
+SIZE, WIDTH = ViewportSize(width=1180, height=640), 800  # of the window; of the picture, in pixels
 CENTRE, RADIUS = (-540.0, -330.0, 480.0), 130.0  # of the tip's circle [mm], which leans towards the base
 POSTURE = "20,-70,80,-60,70,10"  # [deg], where the loop begins
 

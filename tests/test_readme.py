@@ -125,7 +125,7 @@ def test_the_gate_runs_the_readmes_own_test_command() -> None:
 
 
 def test_the_first_screen_has_a_picture_that_moves() -> None:
-    """scripts/moving_picture.py makes it: a round of the tip, in at most 600 kB, its first frame the round's beginning."""
+    """scripts/moving_picture.py makes it: a round of the tip, in at most 600 kB."""
     name = re.search(r"\]\((docs/\S+\.gif)\)", README.read_text(encoding="utf-8")[:1500])
     assert name is not None
     picture = ROOT / name[1]
