@@ -64,7 +64,6 @@ def _cam(rng: np.random.Generator) -> str:
     inch = rng.random() < 0.5
     k = 1 / 25.4 if inch else 1.0
     out = ["%", "O1001 (POCKET)", "G17 G40 G49 G80 G90 " + ("G20" if inch else "G21"), "T1 M6", "S12000 M3", "G54"]
-    out = [line for line in out if not line.startswith("O")]
     out.append(f"G0 X{_n(10 * k, 4)} Y{_n(10 * k, 4)}")
     out += [f"Z{_n(5 * k, 4)}", f"G1 Z{_n(-1 * k, 4)} F{_n(300 * k, 1)}"]
     for _ in range(int(rng.integers(2, 9))):

@@ -163,6 +163,13 @@ def test_s_is_noted_where_nothing_takes_it() -> None:
     assert words("M106 S100") == ["M106", "S"]
 
 
+def test_the_number_of_a_cam_program_is_noted_and_a_macro_of_that_letter_refused() -> None:
+    file = gcode.parse(b"%\nO1001 (pocket)\nG0 X1\nG1 X2 F60\nM30\n%", "t", AS_IT_IS, Wishes())
+    assert file.notes == ("O is ignored (line 2)",)
+    with pytest.raises(PathFileError, match="t:1: 'SUB' is no word"):
+        gcode.parse(b"O100 SUB\nG0 X1\nG1 X2 F60", "t", AS_IT_IS, Wishes())
+
+
 def test_a_program_has_as_many_points_as_any_path() -> None:
     """A million lines took minutes and gigabytes, as no other kind of file may."""
     with pytest.raises(PathFileError, match=r"t\.gcode:120001: is beyond 120000 points: give the program in parts"):

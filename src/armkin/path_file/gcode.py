@@ -155,7 +155,7 @@ class _Program:
                 codes.append(code)
             elif letter == "M":
                 m_codes.append(number)
-            elif letter in "TE":
+            elif letter in "TEO":  # O: the number that a CAM program has on its first line
                 self._ignore(letter)
             elif letter in values:
                 raise self._wrong(f"{letter} stands twice on one line")
