@@ -172,7 +172,7 @@ def test_the_number_of_a_cam_program_is_noted_and_a_macro_of_that_letter_refused
 
 def test_a_program_has_as_many_points_as_any_path() -> None:
     """A million lines took minutes and gigabytes, as no other kind of file may."""
-    with pytest.raises(PathFileError, match=r"t\.gcode:120001: is beyond 120000 points: give the program in parts"):
+    with pytest.raises(PathFileError, match=r"t\.gcode:120003: is behind 120000 points, and a path has no more"):
         ends("G1 X1\nX2\n" * 65_000)
 
 

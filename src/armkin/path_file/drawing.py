@@ -59,6 +59,7 @@ class Pen:
         self.placing = placing
         self.moves: list[Move] = []
         self.lines: list[int] = []  # of the file, where each move begins
+        self.points = 0  # that lines and arcs lead to
         self._open: list[Sequence[float]] | None = None  # of the drawing: placed in the end
         self._drawn: list[list[Sequence[float]]] = []
         self._speed: float | None = None
@@ -76,11 +77,13 @@ class Pen:
             self._open, self._speed = opened, speed
             self._drawn.append(opened)
         self._open.append(p)
+        self.points += 1
 
     def arc(
         self, a: Point, centre: Point, b: Point, normal: Point, angle: float, speed: float | None, line: int
     ) -> None:
         """An arc or helix from a to b about an axis, by an angle [rad] (positive: right-handed)."""
+        self.points += 1
         own = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
         rise = sum(n * (y - x) for n, x, y in zip(normal, a, b, strict=True))
         out = [x - c for x, c in zip(a, centre, strict=True)]

@@ -64,7 +64,6 @@ class _Program:
         self.systems = {number: [0.0, 0.0, 0.0] for number in range(1, 7)}
         self.local, self.shift = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]  # G52, G92
         self.held: bool | None = None
-        self.points = 0
         self.ignored: Counter[str] = Counter()
         self.first: dict[str, int] = {}
         self.line, self.words = 0, Words()
@@ -72,6 +71,8 @@ class _Program:
     def run(self, program: Iterable[tuple[int, str]]) -> None:
         """Read lines until the program's end."""
         for self.line, text in program:
+            if self.pen.points > MOST_POINTS:
+                raise self._wrong(f"is behind {MOST_POINTS} points, and a path has no more: give the program in parts")
             plain = PLAIN.fullmatch(text)
             if plain is not None and self._plain(*plain.groups()):
                 continue
@@ -254,12 +255,8 @@ class _Program:
         for k, number in enumerate(axes):
             if number is not None:
                 value = number * self.unit
-                if machine:
-                    goal[k] = value
-                elif self.absolute:
-                    goal[k] = zero[k] + self.local[k] + self.shift[k] + value
-                else:
-                    goal[k] += value
+                start = zero[k] + self.local[k] + self.shift[k] if self.absolute else goal[k]
+                goal[k] = value if machine else start + value
                 if not abs(goal[k]) <= LARGEST:
                     raise self._wrong(f"{AXES[k]}{value:g} is farther away than {LARGEST:g} mm")
         return goal[0], goal[1], goal[2]
@@ -282,7 +279,7 @@ class _Program:
         if not self.drawn:
             self.pen.jump(self.at, self.line)
         self.pen.arc(self.at, centre, goal, normal, angle, speed, self.line)
-        self._drawn_to(goal)
+        self.at, self.drawn = goal, True
 
     def _straight(self, goal: Point, word: str) -> None:
         """A line by G0 or G1; to the first point, a joint move."""
@@ -291,12 +288,7 @@ class _Program:
             self.pen.jump(goal, self.line)
         elif goal != self.at:
             self.pen.line(goal, speed, self.line)
-        self._drawn_to(goal)
-
-    def _drawn_to(self, goal: Point) -> None:
-        self.at, self.drawn, self.points = goal, True, self.points + 1
-        if self.points > MOST_POINTS:
-            raise self._wrong(f"is beyond {MOST_POINTS} points: give the program in parts")
+        self.at, self.drawn = goal, True
 
     def _speed(self, word: str) -> float | None:
         """The tool's speed [mm/s]; None: as fast as the joints go."""
