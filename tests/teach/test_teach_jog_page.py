@@ -15,12 +15,19 @@ window.pad = {id: 'Pad <b>1</b>', connected: true, mapping: 'standard', axes: [0
               buttons: Array.from({length: 17}, () => ({pressed: false}))};
 navigator.getGamepads = () => [window.pad, null];
 """
-# Signs of life that are a second late.
+# Signs of life that are a second late, counted.
 _LATE = """
 const ask = window.fetch;
+[window.begun, window.answered] = [0, 0];
 window.fetch = async (what, how) => {
-  if (String(what).endsWith('/api/jog_on')) await new Promise((done) => setTimeout(done, 1000));
-  return ask(what, how);
+  const late = String(what).endsWith('/api/jog_on');
+  if (late) {
+    window.begun++;
+    await new Promise((done) => setTimeout(done, 1000));
+  }
+  const answer = await ask(what, how);
+  if (late && answer.ok) window.answered++;
+  return answer;
 };
 """
 _AT = "document.querySelector('#position').textContent"
@@ -98,11 +105,15 @@ def test_a_jog_whose_signs_of_life_came_late_begins_no_other(browser: Browser) -
     with served(board="sim") as server, opened(browser, server.address, script=_LATE) as page:
         until(page, f"{_AT}.startsWith('It stands')")
         page.locator("#jog-up").focus()
-        with page.expect_response("**/api/jog_on") as late:
+        for _ in range(20):  # on a busy computer the jog may end before the page's clock gave a sign of life
+            page.evaluate("() => { document.querySelector('#arrived').textContent = ''; }")
             page.keyboard.down("Space")
             until(page, "document.querySelector('#arrived').textContent.startsWith('jog: done: let go')")
             stood = page.text_content("#position")
-        assert late.value.ok
+            if page.evaluate("begun > 0"):
+                break
+            page.keyboard.up("Space")
+        until(page, "begun > 0 && answered === begun")
         page.keyboard.down("Space")  # as a key that is held repeats itself
         page.wait_for_timeout(300)
         page.keyboard.up("Space")
