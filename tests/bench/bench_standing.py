@@ -1,9 +1,10 @@
 """An arm that stands at a posture and is asked for its own pose in few digits: how many joints' best branch moves.
 
-Half of the postures have joint 5 straight, half have every joint at multiples of 15 degrees. The pose is rounded to 6
-to 16 decimals of millimetres and cosines, to as many significant digits, and to float32; asked in numpy, from
-`armkin.compile` and of exported C, double and single (the general elimination is exported in double alone). A joint
-moves where it turns by more than 1e-5 rad.
+Half of the postures have joint 5 straight, half have every joint at multiples of 15 degrees, every fourth so that the
+rotation is one by right angles where the arm has such a posture. The pose is rounded to 6 to 16 decimals of millimetres
+and cosines, to as many significant digits, and to float32; asked in numpy, from `armkin.compile`, of exported C, double
+and single (the general elimination is exported in double alone), and of exported JavaScript. A joint moves where it
+turns by more than 1e-5 rad.
 
 python tests/bench/bench_standing.py [ROBOT...] [--poses 100] [--seed 0]
 """
@@ -23,10 +24,12 @@ from armkin.errors import UsageError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 from exported import Exported
+from exported_js import ask
 
 ARMS = ["ur5e", "puma560", "irb120", "jaco_j2n6s300", "fanuc_crx10ia", "ur10e", "xarm6", "kuka_kr6_r700", "thor", "ar4"]
 DIGITS = ["float32", *(f"{digits}{kind}" for kind in "fg" for digits in (6, 7, 8, 9, 10, 12, 14, 16))]
 MOVES = 1e-5  # [rad]
+RIGHT_ANGLES = 400  # postures that one is drawn from whose rotation is by right angles
 Best = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -35,7 +38,12 @@ def postures(arm: armkin.Arm, count: int, rng: np.random.Generator) -> np.ndarra
     q = rng.uniform(low, high, (count, arm.n))
     q[::2, 4] = 0.0
     q[1::2] = np.radians(15.0 * np.rint(np.degrees(q[1::2]) / 15.0))
-    return np.clip(q, low, high)
+    q = np.clip(q, low, high)
+    typed = np.radians(15.0 * np.rint(np.degrees(rng.uniform(low, high, (RIGHT_ANGLES * count, arm.n))) / 15.0))
+    R = armkin.fk(arm, typed := np.clip(typed, low, high))[:, :3, :3]
+    right = typed[(np.abs(R - np.rint(R)) < 1e-14).all(axis=(1, 2))][: count // 4]
+    q[1 : 1 + 4 * len(right) : 4] = right
+    return q
 
 
 def rounded(T: np.ndarray, digits: str) -> np.ndarray:
@@ -65,6 +73,15 @@ def in_c(code: Exported) -> Best:
     return best
 
 
+def in_js(arm: armkin.Arm, folder: Path) -> Best:
+    def best(T: np.ndarray, q: np.ndarray) -> np.ndarray:
+        told = ask(arm, folder, q, near=q, targets=np.asarray(T, float))["ik"]
+        nothing = [np.nan] * arm.n
+        return np.array([nothing if one["best"] is None else one["branches"][one["best"]]["joints"] for one in told])
+
+    return best
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robots", nargs="*", default=ARMS)
@@ -72,7 +89,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     rng = np.random.default_rng(given.seed)
-    print("robot | asked of | poses x digits | moved")
+    print("robot | asked of | poses x digits | moved | most [rad]")
     for name in given.robots:
         arm = armkin.load(name)
         fast = armkin.compile(armkin.load(name))
@@ -85,15 +102,17 @@ def main() -> None:
                     ways[words] = in_c(Exported(arm, Path(tempfile.mkdtemp(dir=folder)), single))  # a library a folder
                 except UsageError:  # the general elimination in float
                     continue
+            ways["JS"] = in_js(arm, Path(folder))
             for words, best in ways.items():
                 at = q.astype(np.float32).astype(float) if words == "C float" else q
                 T = armkin.fk(arm, at)
-                moved = {}
+                moved, worst = {}, 0.0
                 for digits in DIGITS:
                     off = np.abs(best(rounded(T, digits), at) - at).max(axis=1)
                     moved[digits] = int((~(off <= MOVES)).sum())
+                    worst = max(worst, float(np.nan_to_num(off, nan=np.inf).max()))
                 some = ", ".join(f"{count} at {digits}" for digits, count in moved.items() if count)
-                print(f"{name} | {words} | {given.poses} x {len(DIGITS)} | {some or 0}", flush=True)
+                print(f"{name} | {words} | {given.poses} x {len(DIGITS)} | {some or 0} | {worst:.1e}", flush=True)
 
 
 if __name__ == "__main__":

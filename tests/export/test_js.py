@@ -160,6 +160,18 @@ def test_the_arm_that_stands_at_its_target_stays(name: str, tmp_path: Path) -> N
     assert stood >= 30
 
 
+def test_a_rotation_by_right_angles_hides_its_rounding_but_the_position_shows_it(tmp_path: Path) -> None:
+    arm = armkin.load("puma560")
+    q = np.radians([[90, -75, 75, 60, 0, 30], [0, -40, -50, -45, 0, 135], [-90, 15, -105, 75, 0, 15]])
+    q = np.tile(q, (3, 1))
+    targets = goals_of(arm, q)
+    targets[:3], targets[3:6] = targets[:3].round(4), targets[3:6].round(5)
+    targets[6:] = targets[6:].astype(np.float32)
+    for near, answer in zip(q, ask(arm, tmp_path, q, near=q, targets=targets)["ik"], strict=True):
+        assert answer["best"] == 0
+        np.testing.assert_array_equal(answer["branches"][0]["joints"], near)
+
+
 def _with_rotation(target: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """A target whose rotation is made orthonormal, as the module reads it."""
     if target.ndim != 2:

@@ -28,7 +28,7 @@ from armkin.inverse.numeric.tolerances import (
     WEAK,
 )
 from armkin.inverse.singular import local_structure
-from armkin.inverse.singular.near_itself import ROOM
+from armkin.inverse.singular.near_itself import COARSE, ROOM
 from armkin.inverse.tasks.task import LARGEST
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
@@ -116,6 +116,7 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
         "goal": str(formulas.goal_size(task)),
         "accepted": number(accepted),
         "room": number(ROOM * arm.reach),
+        "coarse": number(COARSE * arm.reach),
         "close": ", ".join(number(THERE * unit) for unit in radian_or_reach(arm).tolist()),
         "slides": ", ".join(str(int(slides)) for slides in arm.prismatic.tolist()),
         "lowest": ", ".join(number(v - SLACK) for v in arm.lower.tolist()),

@@ -95,10 +95,14 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
             for (i = 0; i < count; i++)
                 doubt[i] |= 2 * (!(miss[b * ARM_LANES + i] <= @accepted@) & !(miss[b * ARM_LANES + i] > ARM_NEARBY));
         for (i = 0; i < count; i++) {
+            int close_by = 1;
             at_near[i] = 1;
-            for (j = 0; j < @position@; j++) /* where the tool is elsewhere, `near` is no solution */
-                at_near[i] &= fabs(goal[(@first@ + j) * ARM_LANES + i] - point[j * ARM_POINTS + i]) <= @room@;
-            doubt[i] |= 2 * wild[i];
+            for (j = 0; j < @position@; j++) { /* where the tool is elsewhere, `near` is no solution */
+                const double d = fabs(goal[(@first@ + j) * ARM_LANES + i] - point[j * ARM_POINTS + i]);
+                at_near[i] &= d <= @room@;
+                close_by &= d <= @coarse@;
+            }
+            doubt[i] |= 2 * (wild[i] | (close_by && !at_near[i] && arm_hides(goal + i)));
             meets[i] = 0;
             if (doubt[i] == 1 && !at_near[i] && (read || !unread[i])) {
                 meets[i] = arm_folds(goal + i, q + i, miss + i);

@@ -20,3 +20,12 @@ static void arm_gather(const double *target, double *goal, int *unread, int coun
 #undef ARM_G
     }
 }
+
+/* Whether a rotation is of whole numbers, so that it does not show whether its target is rounded. */
+ARM_INLINE int arm_hides(const double *goal)
+{
+    int k, whole = 1;
+    for (k = 0; k < 9; k++)
+        whole &= fabs(goal[k * ARM_LANES] - rint(goal[k * ARM_LANES])) <= ARM_ROUNDED;
+    return whole;
+}

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, FLOAT32, SOLUTION
+from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, FLOAT32, NO_LENGTH, SOLUTION
 from armkin.inverse.tasks.task import ROUNDED
 
 if TYPE_CHECKING:
@@ -26,10 +26,12 @@ if TYPE_CHECKING:
 # A rotation's defect is the symmetric part of its error, what `near` misses the antisymmetric one, of the same size:
 # the defect of nine rounded entries is less than a quarter of it in one case of 100,000, of a turn about one of the
 # base's axes, which has four, in one of 13. There the last digit that the entries have tells: an angle is off by less
-# than three halves of it, a position of as many digits, beside the reach, by some eleven.
+# than three halves of it, a position of as many digits, beside the reach, by some eleven. A rotation of whole numbers,
+# by right angles about the base's axes, shows nothing: only the position's last digit tells there.
 DEFECTS = 4.0
 HALVES = 12.0
 COARSEST = 5  # digits: a matrix of fewer is no rotation to that many
+PRINTED = 6  # digits at least that a position is printed with; zeros at its end show fewer
 BLOCK = 2_048  # rows of which all arrays fit the cache
 FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
 
@@ -73,7 +75,39 @@ def of_targets(
     rows = np.flatnonzero(defect > ROUNDED)
     if len(rows):
         most[rows] = np.maximum(most[rows], HALVES * last_place(numbers[rows, :3, :3]))
+    if task.orientation == "full" and len(rows := np.flatnonzero(of_right_angles(numbers))):
+        most[rows] = np.maximum(most[rows], _of_position(numbers[rows, :3, 3]) / arm.reach)
     return Rounding(known, SOLUTION + most)
+
+
+def of_right_angles(T: Array) -> Bool:
+    """Which poses (N, 4, 4) have a rotation of whole numbers, which shows no rounding."""
+    whole = np.abs(T[:, 0, 0] - np.rint(T[:, 0, 0])) <= ROUNDED  # tells nearly all others
+    rows = np.flatnonzero(whole)
+    if len(rows):
+        R = T[rows, :3, :3]
+        whole[rows] = (np.abs(R - np.rint(R)) <= ROUNDED).all(axis=(1, 2))
+    return whole
+
+
+def _of_position(p: Array) -> Array:
+    """How far positions (N, 3) [mm] may be off (N,), by their digits or as float32; 0 where they are exact.
+
+    Typed ones are: of fewer than six digits, and fewer than three decimals.
+    """
+    p = np.where(np.abs(p) < NO_LENGTH, 0.0, p)
+    size = np.floor(np.log10(np.maximum(np.abs(p), NO_LENGTH)))
+    half = np.zeros(len(p))
+    typed = _whole(p * 10.0 ** (FEWEST - 1)) & _whole(p * 10.0 ** (PRINTED - 2 - size))
+    left = np.flatnonzero(~typed.all(axis=1))
+    for digits in range(PRINTED, MOST):
+        here = _whole(p[left] * 10.0 ** (digits - 1 - size[left])).all(axis=1)
+        half[left[here]] = 0.5 * 10.0 ** (size[left[here]].max(axis=1) + 1 - digits)
+        left = left[~here]
+    single = left[(p[left] == p[left].astype(np.float32)).all(axis=1)]
+    half[single] = FLOAT32 * np.abs(p[single]).max(axis=1)
+    off: Array = 3.0**0.5 * half
+    return off
 
 
 def last_place(R: Array) -> Array:

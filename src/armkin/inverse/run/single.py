@@ -22,7 +22,7 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.whole_turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, NO_SIZE, THERE
-from armkin.inverse.singular.near_itself import ROOM
+from armkin.inverse.singular.near_itself import COARSE, ROOM
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
 from armkin.model.arm import actual
@@ -53,6 +53,7 @@ class OneTarget:
         self._run, self._off = runner.code.numbers(), rotation_check().numbers()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
         self._point, self._home, self._room = point_numbers(arm), arm.home, ROOM * arm.reach
+        self._coarse = COARSE * arm.reach if self.orientation == "full" else 0.0
         self._home_tip = self._point(*arm.home.tolist())
         self._close = [THERE * unit for unit in radian_or_reach(arm).tolist()]
         own, axes = runner.code.axes(), runner.axes
@@ -107,7 +108,10 @@ class OneTarget:
         if len(there) < self.count and sum(m > NEARBY**2 for m in misses) + len(there) < self.count:
             return None
         tip = self._home_tip if near is self._home else self._point(*near.tolist())
-        at_near = math.dist(point, tip[: self.position]) <= self._room
+        away = math.dist(point, tip[: self.position])
+        at_near = away <= self._room
+        if not at_near and away <= self._coarse and all(abs(x - round(x)) <= ROUNDED for x in goal[:9]):
+            return None  # `near` may solve it to within a rounding that its position alone shows
         return self._found(kept, near, values, there, off, at_near)
 
     def _stands(self, near: list[float]) -> bool:

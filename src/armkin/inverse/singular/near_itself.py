@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 AT_ONCE = 4096  # targets whose branches are compared with `near` together
 ROOM = 2.0 * SOLUTION  # [reaches] from the tool to a target that `near` might solve: twice the tolerance, for rounding
+COARSE = 1e4 * ROOM  # and to a pose that is rounded where its rotation does not show it, to six digits
 ROUNDED = 1.001 * SOLUTION  # residual that solves a rounded target, if it is more
 
 

@@ -27,21 +27,56 @@ static int arm_read(const arm_real *target, arm_real *goal)
         + goal[2] * (goal[3] * goal[7] - goal[4] * goal[6]) > 0;
 }
 
+/* By how much a position may be off that has three decimals or six digits, and eleven at most, or is of floats [mm]: half a
+   unit of the largest coordinate's last digit, in each coordinate. */
+static arm_real arm_last_place(const arm_real *target)
+{
+    arm_real largest = 0, half = 0;
+    int i, digits = 6, typed = 1, single = 1;
+    for (i = 0; i < 3; i++) {
+        const arm_real x = ARM_ABS(target[4 * i + 3]);
+        arm_real scale = 1;
+        int own = 6;
+        if (x < (arm_real)1e-9)
+            continue;
+        single &= (arm_real)(float)x == x;
+        while (x * scale < (arm_real)1e5)
+            scale *= 10;
+        typed &= ARM_ABS(100 * x - ARM_RINT(100 * x)) <= 100 * ARM_DECIMAL * x
+            && ARM_ABS(x * scale / 10 - ARM_RINT(x * scale / 10)) <= ARM_DECIMAL * x * scale;
+        half = x > largest ? (arm_real)0.5 / scale : half;
+        largest = x > largest ? x : largest;
+        for (; own < 12 && ARM_ABS(x * scale - ARM_RINT(x * scale)) > ARM_DECIMAL * x * scale; own++)
+            scale *= 10;
+        digits = own > digits ? own : digits;
+    }
+    if (typed || (digits == 12 && !single))
+        return 0;
+    half = digits == 12 ? ARM_FLOAT * largest : half;
+    for (; digits > 6 && digits < 12; digits--)
+        half /= 10;
+    return ARM_SQRT((arm_real)3) * half;
+}
+
 /* The square of what `near` may miss a target by, whose rotation tells how it was rounded: by how far it is from
-   orthonormal, and by the last digit of its entries (those below 1e-4 have few), or that they have single precision. */
+   orthonormal, and by the last digit of its entries (those below 1e-4 have few), or that they have single precision. One of whole numbers
+   shows nothing: there the position tells. */
 static arm_real arm_most(const arm_real *target)
 {
     arm_real defect = 0, half = 0, unit = (arm_real)1e5, missed;
-    int i, j, digits, single = 1, here = 0;
+    int i, j, digits, single = 1, whole = 1, here = 0;
     for (i = 0; i < 3; i++)
         for (j = 0; j < 3; j++) {
             const arm_real *u = target + i, *v = target + j;
             const arm_real off = ARM_ABS(u[0] * v[0] + u[4] * v[4] + u[8] * v[8] - (i == j ? 1 : 0));
             defect = off > defect ? off : defect;
             single &= (arm_real)(float)u[4 * j] == u[4 * j];
+            whole &= ARM_ABS(u[4 * j] - ARM_RINT(u[4 * j])) <= ARM_ROUNDED;
         }
-    if (!(defect > ARM_ROUNDED))
-        return ARM_SOLUTION;
+    if (!(defect > ARM_ROUNDED)) {
+        missed = ARM_SQRT(ARM_SOLUTION) + (whole ? arm_last_place(target) / @reach@ : 0);
+        return missed * missed;
+    }
     for (digits = 5; digits < 12 && !single && !here; digits++, unit *= 10) {
         for (here = 1, i = 0; i < 9; i++) {
             const arm_real x = ARM_ABS(target[4 * (i / 3) + i % 3]);

@@ -48,7 +48,30 @@ function read(target) {
   const z = goal[3] * goal[7] - goal[4] * goal[6];
   if (!(given <= ROTATION) || !(goal[0] * x + goal[1] * y + goal[2] * z > 0))
     throw new RangeError(`a target is no pose: its 3 x 3 part must be a rotation to ${ROTATION}`);
-  return given > ROUNDED ? Math.max(4 * given, 12 * lastPlace(flat)) : 0;
+  if (given > ROUNDED) return Math.max(4 * given, 12 * lastPlace(flat));
+  // a rotation of whole numbers shows nothing: there the position tells
+  const whole = goal.every((x, k) => k > 8 || Math.abs(x - Math.round(x)) <= ROUNDED);
+  return whole ? lastPlaceOfPosition([flat[3], flat[7], flat[11]]) / ARM.reach : 0;
+}
+
+/**
+ * By how much a position may be off that has three decimals or six digits, and eleven at most, or is of single precision
+ * [mm]: half a unit of the largest coordinate's last digit, in each coordinate.
+ * @param {number[]} point
+ */
+function lastPlaceOfPosition(point) {
+  const sizes = point.map(Math.abs).filter((x) => x >= 1e-9);
+  const last = (/** @type {number} */ x, /** @type {number} */ digits) => 10 ** (digits - 1 - Math.floor(Math.log10(x)));
+  if (sizes.every((x) => isDecimal(100 * x) && isDecimal(x * last(x, 5)))) return 0;
+  const largest = Math.max(...sizes);
+  for (let digits = 6; digits < 12; digits++)
+    if (sizes.every((x) => isDecimal(x * last(x, digits)))) return (Math.sqrt(3) * 0.5) / last(largest, digits);
+  return sizes.every((x) => Math.fround(x) === x) ? Math.sqrt(3) * 2 ** -24 * largest : 0;
+}
+
+/** Whether a number is whole but for rounding. @param {number} scaled */
+function isDecimal(scaled) {
+  return Math.abs(scaled - Math.round(scaled)) <= DECIMAL * scaled;
 }
 
 /** Half a unit of the last digit of a rotation's entries, or of single precision; 0 where of neither. @param {Float64Array} T */
@@ -56,10 +79,7 @@ function lastPlace(T) {
   const entries = [0, 1, 2, 4, 5, 6, 8, 9, 10].map((k) => Math.abs(T[k])).filter((x) => x >= 1e-4); // smaller ones have few
   if (entries.every((x) => Math.fround(x) === x)) return 2 ** -24;
   for (let digits = 5; digits < 12; digits++) {
-    const has = (/** @type {number} */ x) => {
-      const scaled = x * 10 ** (digits - 1 - Math.floor(Math.log10(x)));
-      return Math.abs(scaled - Math.round(scaled)) <= DECIMAL * scaled;
-    };
+    const has = (/** @type {number} */ x) => isDecimal(x * 10 ** (digits - 1 - Math.floor(Math.log10(x))));
     if (entries.every(has)) return 0.5 / 10 ** digits;
   }
   return 0;
