@@ -240,7 +240,7 @@ def test_coupled_joints_home_one_after_another(wrist: Arm) -> None:
 
 
 def test_a_joint_without_homing_is_named(three_dof: Arm) -> None:
-    with pytest.raises(UsageError, match="no homing: for q1, q2, q3"):
+    with pytest.raises(UsageError, match="has no homing for q1, q2, q3"):
         homing.searches(three_dof, configure(three_dof))
 
 

@@ -58,6 +58,7 @@ CASES: dict[str, tuple[int, list[str], bytes]] = {
     "one joint value too many": (2, ["fk", DOF, "1", "2", "3", "4"], b""),
     "a thousand joint values": (2, ["fk", DOF, *["1"] * 1000], b""),
     "joint values with commas": (2, ["fk", DOF, "1,2,3"], b""),
+    "joint values as a list": (2, ["fk", DOF, "[1, 2, 3]"], b""),
     "joint value with a comma": (2, ["fk", DOF, "1,", "2,", "3"], b""),
     "decimal comma": (2, ["fk", DOF, "1,5", "2", "3"], b""),
     "nan": (2, ["fk", DOF, "nan", "2", "3"], b""),
@@ -145,6 +146,12 @@ CASES: dict[str, tuple[int, list[str], bytes]] = {
     "out of a failed batch": (2, ["fk", DOF, "--batch", "-", "--out", "@/out.csv"], b"1,2,3\nx\n"),
     "out of a failed command": (2, ["fk", DOF, "1", "--out", "@/out.txt"], b""),
     "schema with an argument": (2, ["schema", "x"], b""),
+    "path with blended corners and no radius": (
+        2,
+        ["path", DOF, "--via", "390,80,300", "--via", "390,20,300", "--corners", "blend"],
+        b"",
+    ),
+    "flash of a simulated board": (2, ["flash", DOF, "--port", "sim"], b""),
 }
 
 

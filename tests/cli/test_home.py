@@ -63,7 +63,7 @@ def test_a_joint_without_a_switch_rests_at_home(tmp_path: Path) -> None:
     path = arm_with_switches(tmp_path, four=True)
     refused = run("home", path, "--port", "sim")
     assert refused.code == 2
-    assert "no homing: for q4" in refused.err
+    assert "has no homing for q4" in refused.err
     assert "--rest-at-home" in refused.err
     done = run("home", path, "--port", "sim", "--rest-at-home", "--json")
     assert done.code == 0
@@ -133,4 +133,4 @@ def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypat
 def test_home_without_switches_is_refused_by_name() -> None:
     done = run("home", THREE_DOF, "--port", "sim")
     assert done.code == 2
-    assert "no homing: for q1, q2, q3" in done.err
+    assert "has no homing for q1, q2, q3" in done.err

@@ -59,6 +59,8 @@ def _redundant(error: ArmkinError) -> str:
 
 def _incomplete(error: ArmkinError) -> str:
     """Where the lines to add are shown; what a shipped robot lacks is added to a copy of its file."""
+    if error.fields.get("needs") == "blend":
+        return "--blend 5 alone gives one, or blend: 5 at the head of the path file"
     if error.fields.get("undriven"):
         return "armkin info ROBOT shows lines to add"
     name = error.fields.get("robot_file")
@@ -81,7 +83,7 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     NoHomingError: lambda error: (
         "add --rest-at-home if these joints stand in their home pose"
         if error.fields.get("some")
-        else "give --assume-home to the next send"
+        else "without limit switches put the arm in its home pose, and give --assume-home to the next send"
     ),
     HomingIncompleteError: lambda error: (
         f"armkin home {error.fields['robot_file']} {' '.join(error.fields['joints'])}"

@@ -17,13 +17,11 @@ if TYPE_CHECKING:
 
 At = Annotated[
     str | None,
-    typer.Option("--at", metavar="X,Y,Z[,R,P,Y]", help="Of G-code, SVG: where the file's zero lies."),
+    typer.Option("--at", metavar="X,Y,Z[,R,P,Y]", help="G-code, SVG: where the file's zero lies."),
 ]
-Scale = Annotated[
-    str | None, typer.Option("--scale", metavar="K", help="Of G-code, SVG: times the file's millimetres.")
-]
+Scale = Annotated[str | None, typer.Option("--scale", metavar="K", help="G-code, SVG: factor of the file's lengths.")]
 Feed = Annotated[
-    str | None, typer.Option("--feed", metavar="MM/S", help="Of G-code, SVG: the tool's speed where it has no F.")
+    str | None, typer.Option("--feed", metavar="MM/S", help="G-code, SVG: speed of the tool where the file has no F.")
 ]
 Lift = Annotated[str | None, typer.Option("--lift", metavar="MM", help="SVG: height between strokes. [default: 5]")]
 GripBy = Annotated[

@@ -125,6 +125,8 @@ def of_pi(text: str) -> float | None:
 def _separator_hint(words: Sequence[str], names: Sequence[str]) -> str:
     if len(words) == 1 and words[0].lower().endswith(".csv"):
         return f"; rows of a file: --batch {words[0]}"
-    if len(words) == 1 and len(names) > 1 and len(words[0].replace(",", " ").split()) == len(names):
-        return "; separate them with spaces: " + " ".join(words[0].replace(",", " ").split())
+    if len(words) == 1 and len(names) > 1:
+        parts = words[0].strip("[]()").replace(",", " ").split()
+        if len(parts) == len(names):
+            return "; separate them with spaces: " + " ".join(parts)
     return ""

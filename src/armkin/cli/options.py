@@ -128,7 +128,7 @@ PositionFirst = Annotated[
     bool,
     typer.Option(
         "--position-first",
-        help="Of 4 or 5 joints asked for --task pose: the position exact, the rotation as near as it goes.",
+        help="With --task pose and 4 or 5 joints: the position exact, the rotation as near as it goes.",
     ),
 ]
 Lock = Annotated[

@@ -126,6 +126,10 @@ def answers(
     for answer in parsed:
         if answer["robot_sha256"] != arm.sha256:
             name = answer["robot_file"]
+            if answer.get("robot", arm.name) != arm.name:
+                raise FileError(
+                    f"the answer on standard input is of {answer['robot']}, and the command is for {arm.name}"
+                )
             raise FileError(f"the answer on standard input was computed with another {name}, or it has changed since")
     return arm, parsed
 

@@ -83,7 +83,8 @@ def corners_wished(file: PathFile, corners: str | None, blend: float | None) -> 
         return blend
     said = corners or file.corners
     if said == "blend" and file.blend is None:
-        raise UsageError("corners: blend needs a radius in mm: blend 5 alone, or blend: 5 at the head of the file")
+        advice = "blend=5, or blend: 5 at the head of the file"
+        raise UsageError("corners: blend needs a radius in mm", advice=advice, needs="blend")
     known: dict[str | None, float | None] = {"stop": 0.0, "blend": file.blend, "tolerance": None}
     if said is None:
         return "default" if file.blend is None else file.blend

@@ -75,8 +75,8 @@ def searches(
         wanted = [j for j in wanted if arm.homing[j] is not None]
     elif bare:
         raise NoHomingError(
-            f"no homing: for {', '.join(bare)} in {arm.path}: without a limit switch put the arm in its home pose",
-            advice="then Machine.prepare(assume=arm.home)",
+            f"{arm.path} has no homing for {', '.join(bare)}",
+            advice="without limit switches put the arm in its home pose, then Machine.prepare(assume=arm.home)",
             joints=bare,
             file=arm.path,
             some=len(bare) < len(wanted),

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from armkin.cli import completion, inputs, output, render
+from armkin.cli.board_link import SIM
 from armkin.cli.default_port import only, port_option
 from armkin.cli.options import Json
 from armkin.errors import UsageError
@@ -41,6 +42,8 @@ def flash(
     """
     from armkin.flash import image, upload
 
+    if port == SIM:
+        raise UsageError("flash needs a real board: sim, a board in this process, has its firmware")
     kind = _kind(robot, board)
     program = image(kind)
     port = port or _only_port(kind)

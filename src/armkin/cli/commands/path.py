@@ -13,7 +13,7 @@ from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.foreign_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import comma_separated, number, whole
-from armkin.cli.options import BranchName, Json, Lock, Near, Out, Robot, Scene, TaskName, Tool
+from armkin.cli.options import BranchName, Json, Lock, Near, Robot, Scene, TaskName, Tool
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -43,7 +43,8 @@ def path(
         bool, typer.Option("--dry-run", help="Plan and report; nothing moves, whatever --port says.")
     ] = False,
     tolerance: Annotated[
-        str | None, typer.Option("--tolerance", metavar="MM", help="Between plan and path. [default: 0.05]")
+        str | None,
+        typer.Option("--tolerance", metavar="MM", help="Greatest distance between plan and path. [default: 0.05]"),
     ] = None,
     blend: Annotated[
         str | None, typer.Option("--blend", metavar="MM", help="Radius that rounds corners; 0 stops in them.")
@@ -51,7 +52,9 @@ def path(
     corners: Annotated[
         str | None,
         typer.Option(
-            "--corners", metavar="stop|blend|tolerance", help="Corners; tolerance: dense points as one curve."
+            "--corners",
+            metavar="stop|blend|tolerance",
+            help="How corners are passed; tolerance: dense points as one curve.",
         ),
     ] = None,
     speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
@@ -81,7 +84,10 @@ def path(
     samples: Annotated[
         str | None, typer.Option("--samples", metavar="N", help="Targets solved at first. [default: one a mm]")
     ] = None,
-    out: Out = None,
+    out: Annotated[
+        str | None,
+        typer.Option("--out", "-o", metavar="FILE|-", help="The plan as CSV: joints over time; whole or not at all."),
+    ] = None,
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
     assume: Assume = None,
     resume: Resume = False,

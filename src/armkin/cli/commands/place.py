@@ -27,10 +27,12 @@ def place(
     ],
     area: Annotated[
         str | None,
-        typer.Option("--area", metavar="XMIN,XMAX,YMIN,YMAX", help="Of the places. [default: all that may reach]"),
+        typer.Option(
+            "--area", metavar="XMIN,XMAX,YMIN,YMAX", help="Where places may be. [default: all that may reach]"
+        ),
     ] = None,
-    step: Annotated[str, typer.Option("--step", metavar="MM", help="From place to place.")] = "50",
-    yaw: Annotated[str, typer.Option("--yaw", metavar="DEG", help="From yaw to yaw.")] = "15",
+    step: Annotated[str, typer.Option("--step", metavar="MM", help="Distance between places.")] = "50",
+    yaw: Annotated[str, typer.Option("--yaw", metavar="DEG", help="Angle between yaws of a place.")] = "15",
     z: Annotated[str, typer.Option("--z", metavar="MM", help="Height of the places.")] = "0",
     scene: Scene = None,
     compiled: Compiled = False,

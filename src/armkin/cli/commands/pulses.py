@@ -29,7 +29,7 @@ def pulses(
     ] = None,
     best: Annotated[
         bool,
-        typer.Option("--best", help="Of the pulses around the target, those whose tip is nearest to it."),
+        typer.Option("--best", help="The pulses whose tip is nearest to the target, not each motor's nearest pulse."),
     ] = False,
     scene: Scene = None,
     json: JsonLines = False,

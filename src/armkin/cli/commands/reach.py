@@ -19,8 +19,10 @@ def reach(
     robot: Robot,
     grid: Annotated[str, typer.Option("--grid", metavar="MM", help="Size of a cell.")] = "50",
     azimuths: Annotated[str, typer.Option("--azimuths", metavar="M", help="Cells of a ring about joint 1.")] = "36",
-    directions: Annotated[str, typer.Option("--directions", metavar="N", help="Of the tool's z axis.")] = "100",
-    rolls: Annotated[str, typer.Option("--rolls", metavar="L", help="Turns about it.")] = "12",
+    directions: Annotated[
+        str, typer.Option("--directions", metavar="N", help="Directions of the tool's z axis in each cell.")
+    ] = "100",
+    rolls: Annotated[str, typer.Option("--rolls", metavar="L", help="Turns about each direction.")] = "12",
     tool_down: Annotated[bool, typer.Option("--tool-down", help="Only with the tool's z axis straight down.")] = False,
     scene: Scene = None,
     workers: Workers = 1,

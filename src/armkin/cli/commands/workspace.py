@@ -35,7 +35,7 @@ def workspace(
             help="Evenly spaced poses instead: so many on every joint, or on each.",
         ),
     ] = None,
-    seed: Annotated[str, typer.Option("--seed", metavar="N", help="Of the random poses.")] = "0",
+    seed: Annotated[str, typer.Option("--seed", metavar="N", help="Seed of the random poses.")] = "0",
     measure: Annotated[
         list[str] | None,
         typer.Option("--measure", metavar="NAME", help="For each sample: manipulability, step_error. Repeatable."),
