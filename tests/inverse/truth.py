@@ -285,13 +285,19 @@ def _straight(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
     out = np.zeros(len(a), bool)
     for flip in itertools.product((False, True), repeat=a.shape[1]):
         k = np.flatnonzero(~out & ~(np.array(flip) & ~half).any(axis=1))
-        way, one = d[k] - 2 * np.pi * np.sign(d[k]) * np.array(flip), np.ones(len(k), bool)
-        for part in PARTS if len(k) else ():
-            q = a[k] + part * way * unit
-            there = across(screw, goals.take(k), q)
-            one &= np.abs((there - q) / unit).max(axis=1) <= 1e-4  # as far as roots of high order are off
-            one &= miss_of(arm, screw, goals.take(k), there) < 0.9 * SOLVES
-        out[k[one]] = True
+        for parts in (PARTS[44::45], PARTS):  # three part most of them
+            if not len(k):
+                break
+            way = d[k] - 2 * np.pi * np.sign(d[k]) * np.array(flip)
+            q = (a[k, None] + parts[:, None] * (way * unit)[:, None]).reshape(-1, a.shape[1])
+            along = goals.take(np.repeat(k, len(parts)))
+            one = miss_of(arm, screw, along, q) < 0.01  # of more the next 1e-4 rad or sizes make no solution
+            r = np.flatnonzero(one)
+            there = across(screw, along.take(r), q[r])
+            one[r] = np.abs((there - q[r]) / unit).max(axis=1) <= 1e-4  # as far as roots of high order are off
+            one[r] &= miss_of(arm, screw, along.take(r), there) < 0.9 * SOLVES
+            k = k[one.reshape(len(k), len(parts)).all(axis=1)]
+        out[k] = True
     return out
 
 
