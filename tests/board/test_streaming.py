@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.firmware import streaming
+from armkin.board.firmware import gripping, streaming
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.wire import framing
@@ -143,6 +143,28 @@ def test_after_a_second_somebody_may_be_near_the_arm() -> None:
     with pytest.raises(HeldError, match="keep its queue filled"):
         machine.run([plan])
     assert machine.counts() not in {(0, 0, 0), tuple(plan.end.tolist())}
+
+
+@pytest.mark.parametrize("frame", [1, 3, 6])
+def test_a_grip_goes_on_behind_a_stall(frame: int) -> None:
+    port, grip = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, 0.1), gripping.gripper_of(ARM.name, configure(ARM))
+    machine = machine_on(port)
+    gripping.prepare(machine, grip, None)
+    assert gripping.grip(machine, grip, grip.closed) == grip.closed
+    assert sum(payload_of(data)[1] == 0 for data in port.sent) == 1  # a new session
+
+
+@pytest.mark.parametrize(("frame", "seconds", "beginning"), [(4, 1.1, 0.7), (6, 0.1, 0.1)])
+def test_a_grip_is_held_after_a_second_and_behind_its_beginning(
+    monkeypatch: pytest.MonkeyPatch, frame: int, seconds: float, beginning: float
+) -> None:
+    monkeypatch.setattr(streaming, "_BEGINNING", beginning)
+    grip = gripping.gripper_of(ARM.name, configure(ARM))
+    machine = machine_on(Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, seconds))
+    gripping.prepare(machine, grip, None)
+    with pytest.raises(HeldError, match="keep its queue filled"):
+        gripping.grip(machine, grip, grip.closed)
+    assert machine.status.counts[grip.axis] not in {grip.open, grip.closed}
 
 
 def test_two_frames_fit_the_line() -> None:

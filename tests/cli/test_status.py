@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ import pytest
 from armkin.board.firmware.machine import Machine
 from armkin.board.sim.board import SimBoard
 from armkin.board_kinds import BOARDS
+from armkin.cli.commands import status
 from command_line import ROOT, THREE_DOF, run
 from sim_wire import plug_in
 
@@ -67,3 +70,18 @@ def test_watch_tells_each_change_once_and_ends_with_ctrl_c(monkeypatch: pytest.M
     watched = run("status", THREE_DOF, "--port", "COM3", "--watch", "--json")
     assert (watched.code, watched.err, asked) == (0, "", 5)
     assert [line["position"] for line in watched.lines] == ["known"]
+
+
+def test_a_watched_terminal_is_drawn_where_something_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = io.StringIO()
+    monkeypatch.setattr(screen, "isatty", lambda: True)
+    monkeypatch.setattr(sys, "stdout", screen)
+    status._watch(iter(["at 1\n"] * 50 + ["at 2\n"]))
+    assert screen.getvalue().count("at 1") == 1
+    assert screen.getvalue().count("at 2") <= 2  # and once more at the end
+
+
+def test_a_table_wider_than_a_terminal_stands_upright() -> None:
+    done = run("send", "so101", 20, 10, -30, 40, 0, "--port", "sim")
+    assert max(map(len, done.out.splitlines())) <= 80
+    assert "  shoulder_pan/deg    20.0391\n" in done.out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from pathlib import Path
 from typing import cast
 
@@ -10,7 +11,7 @@ import pytest
 
 from armkin.board.ports import Port
 from armkin.errors import LinkError, MissingExtraError
-from armkin.flash import boot_drive, images, intel_hex
+from armkin.flash import avrdude, boot_drive, images, intel_hex
 from armkin.flash.images import Image
 from armkin.flash.stk500v1 import Stk500v1
 from armkin.flash.uploading import upload
@@ -132,3 +133,18 @@ def test_an_answer_of_the_boot_loader_is_framed() -> None:
 def test_an_answer_of_the_boot_loader_that_is_damaged_is_refused(answer: str) -> None:
     with pytest.raises(LinkError, match=f"the boot loader answered {bytes.fromhex(answer).hex(' ')}"):
         Stk500v1(cast(Port, BootLoader(bytes.fromhex(answer)))).signature()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell plays avrdude")
+def test_avrdude_tells_how_far_it_is(tmp_path: Path) -> None:
+    program, bar, told = tmp_path / "avrdude", "#" * 50, list[float]()
+    program.write_text(
+        f'#!/bin/sh\nfor bar in Reading Writing Reading; do echo "$bar | {bar} |" >&2; sleep 0.05; done\n'
+    )
+    program.chmod(0o755)
+    avrdude.write(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex", told.append)
+    assert told == sorted(told)
+    assert (told[0], told[-1]) == (0.0, 1.0)
+    program.write_text(f'#!/bin/sh\necho "Reading | {bar} |\navrdude: error: no such port" >&2; exit 1\n')
+    with pytest.raises(LinkError, match=r"^avrdude: error: no such port$"):
+        avrdude.write(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex")

@@ -211,9 +211,10 @@ def where_text(arm: Arm, found: Mapping[str, Any]) -> str:
     if found["joints"] is None:
         why = found.get("lost_because")
         return f"{arm.name}: its position is lost{f' ({why})' if why else ''}\n"
-    rows = [["", *render.joint_headings(arm)], ["joints", *map(render.fixed, found["joints"])]]
     head = [f"{name}/{unit}" for name, unit in zip(motor_names(arm), pulse_units(arm), strict=True)]
-    pulses = [["", *head], ["pulses", *map(str, found["pulses"])]]
-    tool = [["", "x/mm", "y/mm", "z/mm"], ["tool", *map(render.fixed, found["position_mm"])]]
-    tables = [render.table(part) for part in (rows, pulses, tool)]
+    tables = [
+        render.row("joints", render.joint_headings(arm), [render.fixed(value) for value in found["joints"]]),
+        render.row("pulses", head, [str(value) for value in found["pulses"]]),
+        render.row("tool", ["x/mm", "y/mm", "z/mm"], [render.fixed(value) for value in found["position_mm"]]),
+    ]
     return "\n".join([f"{arm.name}: position {found['position']}", *tables, ""])

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
+_TERMINAL = 80  # columns
+
 
 def head(arm: Arm) -> Head:
     """What every JSON object begins with: the robot, its file as given and the file's hash; the scene's, too."""
@@ -109,6 +111,18 @@ def table(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,), indent: str
         ]
         lines.append((indent + "  ".join(cells)).rstrip())
     return "\n".join(lines)
+
+
+def row(title: str, names: Sequence[str], values: Sequence[str]) -> str:
+    """Values below their names, or beside them where that would be wider than a terminal.
+
+    >>> print(row("tool", ["x/mm", "y/mm"], ["110.053", "7.5"]))
+               x/mm  y/mm
+      tool  110.053   7.5
+    """
+    across = table([["", *names], [title, *values]])
+    narrow = max(map(len, across.splitlines())) <= _TERMINAL
+    return across if narrow else table([[title, ""], *zip(names, values, strict=True)])
 
 
 def pose_line(arm: Arm, values: Sequence[float]) -> str:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 from armkin.errors import LinkError
 
 _PROGRAMMERS = {"atmega328p": "arduino", "atmega2560": "wiring"}
+_BAR = 50  # marks of a bar of its
 _LONGEST = 120.0  # [s]; an Uno takes 7
 
 
@@ -17,17 +21,45 @@ def program() -> str | None:
     return shutil.which("avrdude")
 
 
-def write(program: str, chip: str, port: str, baud: int, image: Path) -> None:
-    """Write an image and compare it with what the flash then holds. Raises LinkError with avrdude's own words."""
-    command = [program, "-q", "-D", "-c", _PROGRAMMERS[chip], "-p", chip, "-P", port, "-b", str(baud)]
+def write(
+    program: str, chip: str, port: str, baud: int, image: Path, tick: Callable[[float], None] = lambda share: None
+) -> None:
+    """Write an image and compare it with what the flash then holds; tick: is told the share that is done.
+
+    Raises LinkError with avrdude's own words.
+    """
+    command = [program, "-D", "-c", _PROGRAMMERS[chip], "-p", chip, "-P", port, "-b", str(baud)]
+    command += ["-U", f"flash:w:{image}:i"]
     try:
-        done = subprocess.run(
-            [*command, "-U", f"flash:w:{image}:i"], capture_output=True, text=True, errors="replace", timeout=_LONGEST
-        )
-    except subprocess.TimeoutExpired:
-        raise LinkError(f"avrdude did not end within {_LONGEST:.0f} s") from None
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     except OSError as error:
         raise LinkError(f"avrdude does not start: {error.strerror}") from None
-    if done.returncode:
-        said = [line for line in done.stderr.splitlines() if "rror" in line and "ioctl" not in line]
-        raise LinkError(f"avrdude: {said[0] if said else done.stderr.strip()[-200:]}")
+    late = threading.Timer(_LONGEST, process.kill)
+    late.start()
+    with process:
+        try:
+            text = _listen(process, tick)
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            in_time = late.is_alive()
+            late.cancel()
+    if not in_time:
+        raise LinkError(f"avrdude did not end within {_LONGEST:.0f} s")
+    if process.returncode:
+        lines = [line for line in text.splitlines() if line.strip() and "#" not in line]
+        said = [line for line in lines if "rror" in line and "ioctl" not in line]
+        why = (said or lines[-1:] or ["it failed"])[0]
+        raise LinkError(f"avrdude: {why.removeprefix('avrdude').lstrip(': ')}")
+
+
+def _listen(process: subprocess.Popen[bytes], tick: Callable[[float], None]) -> str:
+    """What avrdude says until its end; it draws a bar while it writes, and one while it compares."""
+    assert process.stderr is not None
+    said = b""
+    while piece := os.read(process.stderr.fileno(), 4096):
+        said += piece
+        if b"#" in piece:
+            tick(min(1.0, said.partition(b"Writing |")[2].count(b"#") / (2 * _BAR)))
+    return said.decode(errors="replace")

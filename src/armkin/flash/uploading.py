@@ -28,7 +28,7 @@ _TO_BOOT_DRIVE = 1200  # baud: opening its port so sends a Pico to its boot driv
 _RESTART = 10.0  # [s] that a Pico may take to show its serial port again
 
 Loader = Stk500v1 | Stk500v2
-Tick = Callable[[int], None]
+Tick = Callable[[int, int], None]
 
 
 class Flashed(NamedTuple):
@@ -40,16 +40,17 @@ class Flashed(NamedTuple):
     firmware: str | None  # version, as the board says it
 
 
-def upload(image: Image, port: str, tick: Tick = lambda done: None) -> Flashed:
+def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> Flashed:
     """Write a board's image through a port (a Pico: or the folder of its boot drive), and ask the board what it is.
 
-    tick: is told the bytes written so far. Raises LinkError, saying what was written: a boot loader stays where it is,
-    so that the same command may be repeated.
+    tick: is told the bytes written and read back so far, and how many these will be. Raises LinkError, saying what was
+    written: a boot loader stays where it is, so that the same command may be repeated.
     """
     chip = BOARDS[image.kind].chip
     if chip not in _LOADERS:
         return _to_boot_drive(image, port, tick)
     flash = intel_hex.read(image.data.decode("ascii"))
+    total = 2 * len(flash)
     loader, link, baud = _loader(chip, image.kind, port)
     program = avrdude.program()
     try:
@@ -59,10 +60,10 @@ def upload(image: Image, port: str, tick: Tick = lambda done: None) -> Flashed:
         link.close()
     if program is not None:
         try:
-            avrdude.write(program, chip, port, baud, image.path)
+            avrdude.write(program, chip, port, baud, image.path, lambda share: tick(round(share * total), total))
         except LinkError as error:
             raise _cut(str(error), "some") from None
-        tick(len(flash))
+        tick(total, total)
     return Flashed(port, len(flash), "avrdude" if program else "armkin", _asked(image.kind, port))
 
 
@@ -103,10 +104,11 @@ def _write(loader: Loader, flash: bytes, tick: Tick) -> None:
     try:
         for at, page in pages:
             loader.write(at, page)
-            tick(min(at + size, len(flash)))
+            tick(min(at + size, len(flash)), 2 * len(flash))
         for at, page in pages:
             if loader.read(at, size) != page:
                 raise LinkError(f"the flash at byte {at} is not what was written")
+            tick(len(flash) + min(at + size, len(flash)), 2 * len(flash))
         loader.leave()
     except (LinkError, KeyboardInterrupt) as error:
         raise _cut(str(error) or "stopped", f"{at}") from None
@@ -126,7 +128,7 @@ def _to_boot_drive(image: Image, port: str, tick: Tick) -> Flashed:
         folder = boot_drive.appearing()
     before = {found.device for found in list_ports()}
     boot_drive.write(folder, image.path.name, image.data)
-    tick(len(image.data))
+    tick(len(image.data), len(image.data))
     end = time.monotonic() + _RESTART
     while time.monotonic() < end:
         new = [found.device for found in list_ports() if found.device == port or found.device not in before]

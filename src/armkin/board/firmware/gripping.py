@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
     from armkin.board.firmware.gripper_counts import Grip
     from armkin.board.firmware.machine import Machine
+    from armkin.board.firmware.segments.counts_to_segments import Move
 
 
 def gripper_of(name: str, configuration: Configuration) -> Grip:
@@ -63,13 +64,15 @@ def grip(machine: Machine, gripper: Grip, target: int) -> int:
     """Move the gripper to counts; where it stands then."""
     assert gripper.top is not None
     assert gripper.accel is not None
-    at = machine.status.counts[gripper.axis]
-    far = abs(target - at)
-    if far:
-        board = machine.configuration.board
+    top, accel, board = gripper.top, gripper.accel, machine.configuration.board
+
+    def lay(at: int) -> Move | None:
+        far = abs(target - at)
         clock, least = board.clock, board.min_interval
-        move = line([at], [target], gripper.top / far, gripper.accel / far, clock=clock, min_interval=least)
-        machine.run_axis(move, gripper.axis, board.clock)
+        return line([at], [target], top / far, accel / far, clock=clock, min_interval=least) if far else None
+
+    if machine.status.counts[gripper.axis] != target:
+        machine.run_axis(lay, gripper.axis, board.clock)
         machine.in_time()
         if not known(machine, gripper):
             raise GripperLostError("the board has lost the gripper's position on the way")

@@ -213,11 +213,10 @@ class Machine(Backend):
         if late := self.status.overruns:
             raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing()}")
 
-    def run_axis(self, move: Move, axis: int, clock: int) -> Status:
-        """Carry out the move of a single axis: the gripper."""
+    def run_axis(self, lay: Callable[[int], Move | None], axis: int, clock: int) -> Status:
+        """Carry out the move of a single axis, the gripper, that `lay` makes from counts; None: it is there."""
         try:
-            frames = streaming.batches(self.session, move, (axis,), clock)
-            self.status = streaming.stream(self.session, frames, lambda left: None)
+            self.status = streaming.carry_out_axis(self.session, lay, axis, self.status.counts[axis], clock)
         except DeviceError as error:
             raise resets_and_stops.explain(self, error) from None
         return self.status

@@ -140,6 +140,40 @@ def carry_out(
         under_way, todo = _UnderWay(), chain(left[0], todo)
 
 
+def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: int, at: int, clock: int) -> Status:
+    """Carry out the move of one axis that `lay` makes from the counts `at`; None: it stands at its end.
+
+    If its queue runs dry in its beginning, what is left follows once, as of `carry_out`.
+    """
+    least = 0.0
+    while (move := lay(at)) is not None:
+        session.attend()
+        try:
+            return stream(session, batches(session, move, (axis,), clock, least), lambda left: None)
+        except DeviceError as error:
+            if error.error != Error.DRY or least:
+                raise
+            began, status = session.port.now(), _at_rest(session)
+            stood, at = session.deaf + session.port.now() - began, status.counts[axis]
+            if not status.known >> axis & 1 or stood > _STOOD or _seconds_to(move, at, clock) > _BEGINNING:
+                raise
+        session.reopen()
+        least = _LEAD_MOST
+    return session.status()
+
+
+def _seconds_to(move: Move, count: int, clock: int) -> float:
+    """Seconds of the move of one axis until it is at a count."""
+    left, seconds = abs(count - int(move.start[0])) * protocol.STEP, 0.0
+    for segment in move.segments:
+        way = segment.ticks * abs(segment.rates[0])
+        seconds += _seconds([segment], clock) * min(1.0, left / max(way, 1))
+        left -= way
+        if left <= 0:
+            break
+    return seconds
+
+
 def _at_rest(session: Session) -> Status:
     """The status of an arm whose queue ran dry, and what it tells of the line."""
     status = session.rest()

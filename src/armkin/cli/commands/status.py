@@ -77,9 +77,12 @@ def _watch(texts: Iterator[str]) -> None:
     from rich.live import Live
     from rich.text import Text
 
+    before = ""
     with Live(auto_refresh=False) as live:
         for text in texts:
-            live.update(Text(text.rstrip()), refresh=True)
+            if text != before:  # drawing what stands there makes it flicker
+                live.update(Text(text.rstrip()), refresh=True)
+            before = text
 
 
 def _servos(found: dict[str, Any]) -> str:
