@@ -151,6 +151,8 @@ CASES: dict[str, tuple[int, list[str], bytes]] = {
         ["path", DOF, "--via", "390,80,300", "--via", "390,20,300", "--corners", "blend"],
         b"",
     ),
+    "no workers": (2, ["reach", DOF, "--workers", "0"], b""),
+    "a drawing's place in two numbers": (2, ["path", DOF, "a.nc", "--at", "300,0"], b""),
     "flash of a simulated board": (2, ["flash", DOF, "--port", "sim"], b""),
 }
 

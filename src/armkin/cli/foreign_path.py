@@ -55,7 +55,7 @@ def moves(
         raise UsageError(f"{file} needs --at X,Y,Z, for example --at 300,0,50: where its zero lies in the arm's frame")
     if grip_by not in (None, "M3", "M106"):
         raise UsageError(f"--grip-by: '{grip_by}' is neither M3 nor M106")
-    zero = comma_separated(at, _POSE[: 3 if at.count(",") == 2 else 6], "--at")
+    zero = comma_separated(at, _POSE[: 6 if at.count(",") > 2 else 3], "--at")
     factor = 1.0 if scale is None else number(scale, "--scale")
     if not 1e-6 <= factor <= 1e6:
         raise UsageError(f"--scale: '{scale}' must be from 1e-6 to 1e6")

@@ -40,7 +40,7 @@ def load(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
 
 def _six(tool: str) -> list[float]:
     """`--tool X,Y,Z[,R,P,Y]` as six numbers [mm, deg]."""
-    names = ("x", "y", "z", "roll", "pitch", "yaw")[: 3 if tool.count(",") == 2 else 6]
+    names = ("x", "y", "z", "roll", "pitch", "yaw")[: 6 if tool.count(",") > 2 else 3]
     return [*comma_separated(tool, names, "--tool"), 0.0, 0.0, 0.0][:6]
 
 

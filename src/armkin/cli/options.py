@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from armkin.cli import completion
+from armkin.cli.numbers import whole
 
 Robot = Annotated[
     str,
@@ -91,9 +92,21 @@ Compiled = Annotated[
         help="Run machine code that this computer's C compiler builds, in place of Python: for batches.",
     ),
 ]
+
+
+def _workers(text: str) -> int:
+    return whole(text, "--workers", 1, 1000)
+
+
 Workers = Annotated[
     int,
-    typer.Option("--workers", metavar="N", min=1, help="Processes that share the work, the same answers."),
+    typer.Option(
+        "--workers",
+        metavar="N",
+        parser=str,
+        callback=_workers,
+        help="Processes that share the work, the same answers.",
+    ),
 ]
 Target = Annotated[
     list[str] | None,
