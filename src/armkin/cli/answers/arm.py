@@ -29,7 +29,15 @@ class Violation(TypedDict):
     upper: Annotated[float | None, "null: unlimited"]
 
 
-Hit = TypedDict("Hit", {"body": str, "with": str, "depth_mm": float})
+Hit = TypedDict(
+    "Hit",
+    {
+        "body": Annotated[str, "of the arm: the joint's name that moves it, or base"],
+        "with": Annotated[str, "the keep-out's name, or another body's"],
+        "depth_mm": Annotated[float, "how far nearer than the clearance it is"],
+    },
+)
+Hit.__doc__ = "A pair that is too near."
 
 
 class Near(TypedDict):
@@ -43,7 +51,7 @@ class Frame(TypedDict):
     """A frame of the arm."""
 
     name: Annotated[str, "base, the joint's name, or tool"]
-    position_mm: list[float]
+    position_mm: Annotated[list[float], "in the base frame"]
     rotation: Annotated[list[list[float]], "3 x 3, row by row"]
 
 
@@ -55,9 +63,9 @@ class Fk(Head, Tooled, Near):
     position_mm: Annotated[list[float], "of the tool, in the base frame"]
     rotation: Annotated[list[list[float]], "3 x 3, row by row"]
     rpy_deg: Annotated[list[float], "roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll)"]
-    quaternion_wxyz: list[float]
-    within_limits: bool
-    violations: list[Violation]
+    quaternion_wxyz: Annotated[list[float], "the same, w first"]
+    within_limits: Annotated[bool, "whether every joint is"]
+    violations: Annotated[list[Violation], "joints outside, if any"]
     frames: Annotated[NotRequired[list[Frame]], "with --frames: base first, tool last"]
 
 
@@ -72,8 +80,8 @@ class PulsePositions(TypedDict):
 class Rounded(TypedDict):
     """Plain rounding, beside --best."""
 
-    pulses: list[int]
-    error_mm: float
+    pulses: Annotated[list[int], "each motor's nearest"]
+    error_mm: Annotated[float, "of the tool with these"]
 
 
 _From = TypedDict("_From", {"from": Annotated[list[float], "where `moves` begin [deg or mm]"]})
@@ -87,10 +95,10 @@ class Pulses(Head, _From, Near):
     joint_units: Annotated[list[str], "deg or mm"]
     resolution: Annotated[list[float], "what one pulse is worth at each joint [deg or mm]"]
     joints: Annotated[list[float], "as given [deg or mm]"]
-    pulses: list[int]
+    pulses: Annotated[list[int], "of every motor, counted from home"]
     moves: Annotated[list[int], "signed, from --from"]
     actual_joints: Annotated[list[float], "where the pulses put the joints [deg or mm]"]
-    position_mm: PulsePositions
+    position_mm: Annotated[PulsePositions, "of the tool"]
     error_mm: Annotated[float, "distance between the two positions"]
     within_limits: bool
     violations: list[Violation]
@@ -103,7 +111,7 @@ class Pulses(Head, _From, Near):
 class Workspace(Head, Tooled):
     """Where the tip can reach."""
 
-    samples: int
+    samples: Annotated[int, "postures looked at"]
     x_mm: Annotated[list[float], "[least, greatest]"]
     y_mm: Annotated[list[float], "[least, greatest]"]
     z_mm: Annotated[list[float], "[least, greatest]"]
@@ -115,30 +123,30 @@ class Workspace(Head, Tooled):
     method: Annotated[NotRequired[str], "how volume or area were found"]
     free_share: Annotated[NotRequired[float], "of the samples, those that hit nothing, where there are keep-outs"]
     measures: Annotated[dict[str, list[float]], "each of --measure: [least, greatest]"]
-    seconds: float
+    seconds: Annotated[float, "the computation took"]
 
 
 class Reach(Head):
     """Where the arm reaches, with which orientations."""
 
-    task: str
-    cells: int
+    task: Annotated[str, "what a target prescribes"]
+    cells: Annotated[int, "within the reach"]
     orientations: Annotated[int, "asked in each cell"]
     answers: Annotated[int, "cells times orientations"]
     solves: Annotated[int, "poses given to the solver"]
     method: Annotated[Literal["arcs", "poses"], "by arcs of joint 1 (and the last joint), or pose by pose"]
     reached: Annotated[int, "cells of which some orientation is reached"]
     volume_mm3: Annotated[float, "of these cells"]
-    seconds: float
+    seconds: Annotated[float, "the computation took"]
 
 
 class BestPlace(TypedDict):
     """Where to put a robot: its frame, in the frame of the targets."""
 
-    xyz: list[float]
-    yaw_deg: float
+    xyz: Annotated[list[float], "of the robot's frame [mm]"]
+    yaw_deg: Annotated[float, "turn of that frame about z"]
     reached: Annotated[int, "targets; of a path, points along it"]
-    of: int
+    of: Annotated[int, "targets, or points, in all"]
     margin_mm: Annotated[float, "to the nearest place of the grid, at this yaw, that does not reach all"]
     held: Annotated[NotRequired[dict[str, float]], "of a path: the redundant joint, and where it is held [deg]"]
 
@@ -146,9 +154,9 @@ class BestPlace(TypedDict):
 class PlannedPlace(TypedDict):
     """A place from which the path was planned."""
 
-    xyz: list[float]
-    yaw_deg: float
-    margin_mm: float
+    xyz: Annotated[list[float], "of the robot's frame [mm]"]
+    yaw_deg: Annotated[float, "turn of that frame about z"]
+    margin_mm: Annotated[float, "as of the best place"]
     duration_s: Annotated[float | None, "null: it cannot be planned from there"]
     refused: Annotated[str | None, "why"]
 
@@ -157,7 +165,7 @@ class PlacedRobot(Head):
     """The places of one robot."""
 
     best: BestPlace
-    places: int
+    places: Annotated[int, "looked at"]
     reach_all: Annotated[int, "places that reach all targets, or carry the whole path on one branch"]
     planned: NotRequired[Annotated[list[PlannedPlace], "the best places, where FILE is a path"]]
 
@@ -174,17 +182,17 @@ _Ends = TypedDict("_Ends", {"from": list[float], "to": list[float]})
 class Solver(TypedDict):
     """How targets are solved."""
 
-    method: str
-    why: str
-    complete: bool
+    method: Annotated[str, "the class of solution"]
+    why: Annotated[str, "why that class applies"]
+    complete: Annotated[bool, "no real branch is missing, as a rule; ik says it of each target"]
 
 
 class Solving(TypedDict):
     """What `ik` solves for, and how."""
 
     task: Annotated[str | None, "what ik solves for"]
-    target_labels: list[str]
-    target_units: list[str]
+    target_labels: Annotated[list[str], "names of a target's numbers"]
+    target_units: Annotated[list[str], "mm or deg, each number's"]
     solver: Solver | None
     ik_refuses: Annotated[str | None, "why there is no solver"]
     redundant: Annotated[NotRequired[str], "the joint that ik gives intervals of, where one is to spare"]
@@ -200,7 +208,7 @@ class BodyOf(TypedDict):
     """What a joint moves."""
 
     name: Annotated[str, "the joint's name, or base"]
-    radius_mm: float
+    radius_mm: Annotated[float, "of the capsules along it"]
     assumed: Annotated[bool, "no file states it: 2 % of the reach"]
     segments: Annotated[list[BodySegment], "in the frame that the body moves with: fk --frames has it"]
 
@@ -208,18 +216,18 @@ class BodyOf(TypedDict):
 class KeepOuts(TypedDict):
     """Bodies, and what they are held against; absent where there are no keep-outs."""
 
-    clearance_mm: NotRequired[float]
+    clearance_mm: NotRequired[Annotated[float, "kept from keep-outs"]]
     keep_out: Annotated[NotRequired[list[str]], "names of the keep-outs, self among them"]
-    bodies: NotRequired[list[BodyOf]]
+    bodies: NotRequired[Annotated[list[BodyOf], "the arm's, where there are keep-outs"]]
     pairs_left_out: Annotated[NotRequired[list[list[str]]], "bodies that overlap in every posture looked at"]
-    hits_at_home: NotRequired[list[Hit]]
+    hits_at_home: NotRequired[Annotated[list[Hit], "pairs too near in the home pose"]]
 
 
 class Info(Head, Solving, KeepOuts):
     """What a robot file says."""
 
     description: str
-    source: str
+    source: Annotated[str, "where the numbers come from"]
     convention: Literal["standard", "modified", "screws"]
     joint_units: Annotated[list[str], "deg or mm"]
     joints: Annotated[list[dict[str, Any]], "as in the robot file, with all defaults"]
@@ -227,7 +235,7 @@ class Info(Head, Solving, KeepOuts):
     base: Annotated[dict[str, list[float]], "xyz, rpy"]
     tool: Annotated[dict[str, list[float]], "xyz, rpy"]
     zero_pose: Annotated[dict[str, list[float]] | None, "xyz, rpy; convention screws"]
-    pitch_offset: float
+    pitch_offset: Annotated[float, "added to phi [deg]"]
     reach_mm: Annotated[float, "no point of the chain is farther from its first joint"]
     motors: Annotated[list[dict[str, Any]], "as in the robot file, with what the chain multiplies to"]
     one_to_one: Annotated[bool, "each joint has a motor of its own"]
@@ -245,7 +253,7 @@ class ShippedRobot(Head):
     joints: list[str]
     joint_types: Annotated[list[str], "revolute or prismatic"]
     task: str | None
-    target_labels: list[str]
+    target_labels: Annotated[list[str], "names of a target's numbers"]
     can: Annotated[dict[str, bool], "ik, pulses, simulate, send, home: as its file stands"]
     lacks: Annotated[dict[str, list[str]], "what each of them lacks, in words"]
     compared: Annotated[str, "what its geometry was compared with: a maker's figure, or only a URDF"]
@@ -307,8 +315,8 @@ class Errors(TypedDict):
 class Flagged(TypedDict):
     """A row that does not fit the others."""
 
-    row: int
-    off_mm: float
+    row: Annotated[int, "its number"]
+    off_mm: Annotated[float, "from the corrected arm"]
 
 
 class Correction(TypedDict):
@@ -323,17 +331,17 @@ class Correction(TypedDict):
 class Calibrate(Head):
     """A corrected robot file from measured tips."""
 
-    rows: int
+    rows: Annotated[int, "that were measured"]
     level: Annotated[str, "how much is corrected, in words"]
-    corrected: list[str]
-    before: Errors
-    after: Errors
-    noise_mm: float
-    flagged: list[Flagged]
+    corrected: Annotated[list[str], "kinds of numbers: base, zeros, ..."]
+    before: Annotated[Errors, "of the robot file as given"]
+    after: Annotated[Errors, "of the corrected one"]
+    noise_mm: Annotated[float, "of a measured coordinate, estimated"]
+    flagged: Annotated[list[Flagged], "rows that were left out"]
     corrections: list[Correction]
     unseen: Annotated[list[str], "what these rows do not show"]
     held: Annotated[list[str], "why something was not corrected"]
-    out: str | None
+    out: Annotated[str | None, "file that was written"]
 
 
 class Suggested(Head):

@@ -16,7 +16,7 @@ class Branch(Near):
     """One branch, modulo whole turns: the legal copy nearest to --near."""
 
     joints: Annotated[list[float], "[deg or mm]"]
-    name: str
+    name: Annotated[str, "left, elbow up, ...; branch 1, ... where a class has no names"]
     within_limits: bool
     violations: list[Violation]
     residual_mm: Annotated[float, "distance between the tool and the target"]
@@ -31,8 +31,8 @@ class Closest(Near):
 
     joints: Annotated[list[float], "[deg or mm]"]
     position_mm: Annotated[list[float], "of the tool"]
-    distance_mm: float
-    angle_deg: float
+    distance_mm: Annotated[float, "from the tool to the target"]
+    angle_deg: Annotated[float, "between them, where the task has one"]
     converged: Annotated[bool, "false: the search ended at its bound"]
     branch: Annotated[str | None, "the branch it is, where only the branch asked for will not do"]
 
@@ -40,7 +40,7 @@ class Closest(Near):
 class Ik(Head, Tooled):
     """All joint values that reach a target."""
 
-    task: str
+    task: Annotated[str, "what the target prescribes"]
     target: Annotated[list[float], "as given [mm, deg]"]
     target_labels: Annotated[list[str], "names of its numbers"]
     near: Annotated[list[float], "the pose to stay close to [deg or mm]"]
@@ -54,7 +54,7 @@ class Ik(Head, Tooled):
     complete: Annotated[bool, "every isolated real branch is guaranteed to be found"]
     joint_units: Annotated[list[str], "deg or mm"]
     branch_count: Annotated[int, "found, listed or not"]
-    branches_within_limits: int
+    branches_within_limits: Annotated[int, "of these, how many may be taken"]
     branches: Annotated[
         list[Branch],
         "within limits first, then without hits, residual_deg (--position-first), motion; all with --all-branches",

@@ -17,19 +17,19 @@ class Send(Head, Tooled):
     """`send`: the plan, and where the arm stands after it."""
 
     port: str
-    waypoints: int
+    waypoints: Annotated[int, "that it went through"]
     start_joints: Annotated[list[float], "[deg or mm]"]
     joints: Annotated[list[float] | None, "where the board says that it stands [deg or mm]"]
     joint_units: Annotated[list[str], "deg or mm"]
     motors: list[str]
     pulse_units: Annotated[list[str], "step, us or count"]
-    start_pulses: list[int]
+    start_pulses: Annotated[list[int], "where it began"]
     pulses: Annotated[list[int] | None, "as the board counts"]
     moves: Annotated[list[int], "planned"]
-    position_mm: list[float] | None
+    position_mm: Annotated[list[float] | None, "of the tool, there"]
     position: Annotated[str, "known, retained or lost"]
-    duration_s: float
-    segments: int
+    duration_s: Annotated[float, "planned"]
+    segments: Annotated[int, "pieces of constant acceleration that the board was sent"]
     top_speed: Annotated[list[float], "greatest speed of every joint [deg/s or mm/s]"]
     top_rate: Annotated[list[float], "greatest rate of every motor [pulses/s]"]
 
@@ -37,7 +37,7 @@ class Send(Head, Tooled):
 class BranchAt(TypedDict):
     """Where on a path a branch's name begins."""
 
-    s_mm: float
+    s_mm: Annotated[float, "along the path, from its start"]
     name: str
 
 
@@ -53,7 +53,7 @@ class PathRun(TypedDict):
 class Reconfiguration(TypedDict):
     """Where a run ends before the path does."""
 
-    s_mm: float
+    s_mm: Annotated[float, "along the path, from its start"]
     why: Annotated[str, "limit, reach, boundary, singularity, hit (a keep-out) or end"]
     joint: Annotated[str | None, "whose limit it is"]
     value: Annotated[float | None, "the limit [deg or mm]"]
@@ -72,7 +72,7 @@ class PathBranch(TypedDict):
 class NearestSingularity(TypedDict):
     """Where the arm comes nearest to a singularity."""
 
-    s_mm: float
+    s_mm: Annotated[float, "along the path, from its start"]
     condition: Annotated[float | None, "of the Jacobian; null: infinite"]
 
 
@@ -80,7 +80,7 @@ class Approach(TypedDict):
     """The joint move from where the arm stands to where a path starts: in no other field."""
 
     from_joints: Annotated[list[float], "[deg or mm]"]
-    duration_s: float
+    duration_s: Annotated[float, "of this joint move"]
 
 
 # Where a path is nearest to what it must not touch.
@@ -107,11 +107,11 @@ class Path(Head, Tooled):
     """`path`: a plan, or with exit 3 what is known of one that is not carried to its end."""
 
     task: str
-    length_mm: float
+    length_mm: Annotated[float, "of the path"]
     duration_s: Annotated[float | None, "null: not planned to its end"]
     samples: Annotated[int, "targets that were solved"]
     complete: Annotated[bool, "every isolated branch of every sample is guaranteed to be known"]
-    tolerance_mm: float
+    tolerance_mm: Annotated[float, "allowed between plan and path"]
     deviation_mm: Annotated[
         float | None, "a bound of the distance between plan and path; of points passed by the tolerance their greatest"
     ]
@@ -139,7 +139,7 @@ class PathMoved(Path):
     port: str
     position: Annotated[str, "known, retained or lost"]
     pulses: Annotated[list[int] | None, "as the board counts"]
-    position_mm: list[float] | None
+    position_mm: Annotated[list[float] | None, "of the tool at the end"]
 
 
 class Stands(Head, Where):
@@ -168,15 +168,15 @@ class StatusOfBoard(Stands):
     board: Annotated[str, "its kind"]
     firmware: str
     configured: Annotated[bool, "for this robot file"]
-    state: str
+    state: Annotated[str, "idle, moving, holding, ..."]
     error: Annotated[str | None, "why the last session ended"]
-    drivers_on: bool
-    servo_pulses_on: bool
-    abort_input: bool
+    drivers_on: Annotated[bool, "whether the steppers' drivers are switched on"]
+    servo_pulses_on: Annotated[bool, "whether RC servos get their signal"]
+    abort_input: Annotated[bool, "whether it is active"]
     motor_power: Annotated[bool | None, "null: no input senses it, so a cut goes unnoticed"]
     switches: Annotated[dict[str, bool], "levels of the limit inputs"]
-    boots: int
-    reset_cause: int
+    boots: Annotated[int, "starts since the board's memory was last lost"]
+    reset_cause: Annotated[int, "of the last start, as firmware/PROTOCOL.md has it"]
 
 
 class StatusOfGrbl(Stands):
@@ -263,7 +263,7 @@ class GripOfServo(Head):
 
     port: str
     gripper: Annotated[float, "where it came to rest, in its drive's degrees; a spindle's S word as it was sent"]
-    target: float
+    target: Annotated[float, "where it was sent"]
     measured: Annotated[bool, "false on GRBL, which measures nothing"]
 
 
@@ -272,4 +272,4 @@ class Grip(Head):
 
     port: str
     gripper: Annotated[float, "in its drive's degrees (mm with a lead)"]
-    counts: int
+    counts: Annotated[int, "the same, as the board counts"]
