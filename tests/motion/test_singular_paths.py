@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -248,3 +249,20 @@ def test_an_ordinary_line_asks_once_how_straight_a_wrist_is(monkeypatch: pytest.
     ends[1, :3, 3] += [60.0, 60.0, 0.0]
     assert armkin.path(arm, ends).motion.duration > 0
     assert asked == [3]
+
+
+def test_a_way_that_is_singular_throughout_has_one_place_where_its_wrist_is_straight(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Rounding made every other sample one, each with windows to plan: 8.5 s of a core for a second's motion."""
+    found: list[int] = []
+    straight = wrist_turn._straight
+
+    def counted(*arguments: Any) -> list[int]:
+        places = straight(*arguments)
+        found.append(len(places))
+        return places
+
+    monkeypatch.setattr(wrist_turn, "_straight", counted)
+    test_free_joints_stay_where_the_whole_way_is_singular("puma560")
+    assert max(found) == 1

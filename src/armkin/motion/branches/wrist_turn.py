@@ -38,6 +38,7 @@ _STEP = 0.01  # [mm] to either side, for slopes
 _LOOKED = 97  # places in a window at which the tool's rotation is looked at
 _MOST = 16  # singularities on the way
 _EXACT = 1e-6  # [mm and rad] a posture misses its target by less
+_ROUNDING = 1e-12  # of the wrist's volume
 _TOLD = 1e-4  # of the wrist's volume: less does not tell joint 4
 _LEAST = 1e-8  # [1/mm] what a millimetre counts beside a radian, where the tool's direction must be kept
 _STEPS = 8  # of Newton's method to a straight wrist
@@ -101,6 +102,7 @@ def _bent(arm: Arm, q: Array) -> Array:
 def _straight(arm: Arm, c: Chain, near: float) -> list[int]:
     """Samples at which a chain's wrist comes nearest to straight, and near enough."""
     off = np.abs(_bent(arm, c.q))
+    off[off < _ROUNDING] = 0.0  # else every other sample of a way that is singular throughout were a least one
     step = np.diff(off)
     least = np.append(True, step <= 0) & np.append(step > 0, True)
     between = np.maximum(np.append(0.0, np.abs(step)), np.append(np.abs(step), 0.0))  # it may be nearer by so much
