@@ -76,7 +76,7 @@ def of_targets(
     if len(rows):
         most[rows] = np.maximum(most[rows], HALVES * last_place(numbers[rows, :3, :3]))
     if task.orientation == "full" and len(rows := np.flatnonzero(of_right_angles(numbers))):
-        most[rows] = np.maximum(most[rows], _of_position(numbers[rows, :3, 3]) / arm.reach)
+        most[rows] = np.maximum(most[rows], last_place_of_position(numbers[rows, :3, 3]) / arm.reach)
     return Rounding(known, SOLUTION + most)
 
 
@@ -90,7 +90,7 @@ def of_right_angles(T: Array) -> Bool:
     return whole
 
 
-def _of_position(p: Array) -> Array:
+def last_place_of_position(p: Array) -> Array:
     """How far positions (N, 3) [mm] may be off (N,), by their digits or as float32; 0 where they are exact.
 
     Typed ones are: of fewer than six digits, and fewer than three decimals.
