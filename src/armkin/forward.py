@@ -11,12 +11,12 @@ merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws). The ratios r are 1 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
@@ -258,17 +258,27 @@ def _recorded_of_turns(arm: Arm, formula: Formula) -> LazyCode:
     return LazyCode(lambda inputs: formula(arm, _motions(arm, inputs)), 2 * arm.n - int(arm.prismatic.sum()))
 
 
-def _turns(arm: Arm, q: Array) -> list[Array]:
-    """Of joint values (N, n) slides, and actual cosines and sines of what turns, joint by joint: (N,) each."""
-    values, turning = np.ascontiguousarray(q.T), ~arm.prismatic
-    angles: Any = values[turning] * arm.ratio[turning, None]
+@lru_cache(maxsize=256)
+def _places(arm: Arm) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Of what `_turns` returns: where slides and where cosines stand; and the ratios of what turns (m, 1)."""
+    first = np.cumsum([0, *np.where(arm.prismatic, 1, 2)])[:-1]
+    return first[arm.prismatic], first[~arm.prismatic], arm.ratio[~arm.prismatic, None]
+
+
+def _turns(arm: Arm, q: Array) -> Array:
+    """Of joint values (N, n) slides, and actual cosines and sines of what turns, joint by joint: (2 n - slides, N)."""
+    slides, turning, ratio = _places(arm)
+    values = np.ascontiguousarray(q.T)
+    out = np.empty((len(slides) + 2 * len(turning), len(q)))
+    if len(slides):
+        out[slides], values = values[arm.prismatic], values[~arm.prismatic]
+    angles: Any = values * ratio
     turns: Any = arrays.cos_sin(angles)
-    pairs = zip(*turns, strict=True)
-    each = zip(values, arm.prismatic.tolist(), strict=True)
-    return [x for value, slides in each for x in ([value] if slides else next(pairs))]
+    out[turning], out[turning + 1] = turns
+    return out
 
 
-def _motions(arm: Arm, turns: Sequence[Entry]) -> list[Motion]:
+def _motions(arm: Arm, turns: Iterable[Entry]) -> list[Motion]:
     """The same joint by joint."""
     rest = iter(turns)
     return [next(rest) if slides else (next(rest), next(rest)) for slides in arm.prismatic.tolist()]
@@ -294,10 +304,12 @@ def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) 
     turns, code = _turns(arm, flat_q), _recorded_of_turns(arm, formula).get(len(flat_q))
     if code is not None and len(flat_q) <= FEW:
         numbers = code.numbers()
-        for k, one in enumerate(zip(*(x.tolist() for x in turns), strict=True)):
+        for k, one in enumerate(turns.T.tolist()):
             flat_out[k] = numbers(*one)
         return out
-    found: Any = formula(arm, _motions(arm, turns)) if code is None else code.run(turns, code.workspace(len(flat_q)))
+    found: Any = (
+        formula(arm, _motions(arm, turns)) if code is None else code.run(list(turns), code.workspace(len(flat_q)))
+    )
     for k, entry in enumerate(found):
         flat_out[:, k] = entry
     return out

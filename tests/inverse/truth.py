@@ -17,7 +17,7 @@ from oracle import Goal, Screws
 
 import armkin
 from armkin import Status
-from armkin.inverse.answers.rounding import last_place, last_place_of_position, of_right_angles
+from armkin.inverse.answers.rounding import last_place, last_place_of_position
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import Arm
 from armkin.model.rotation import rpy
@@ -202,7 +202,9 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     stands = np.zeros(s.valid.shape, bool)
     if near is not None and definition.orientation == "full":
         shown = np.maximum(4.0 * s.rounding, 12.0 * last_place(target[:, :3, :3]))
-        hidden = np.where(of_right_angles(target), last_place_of_position(target[:, :3, 3]) / arm.reach, 0.0)
+        R = target[:, :3, :3]
+        right = (np.abs(R - np.rint(R)) <= 1e-14).all(axis=(1, 2))
+        hidden = np.where(right, last_place_of_position(target[:, :3, 3]) / arm.reach, 0.0)
         allowed = SOLVES + np.maximum(shown, hidden)
         stands = (s.q == np.broadcast_to(near, q.shape)[:, None]).all(axis=2) & (miss <= allowed[:, None])
     verdict.false = np.flatnonzero((~stands & (miss > 1.1 * SOLVES)).any(axis=1)).tolist()

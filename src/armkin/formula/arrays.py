@@ -145,6 +145,13 @@ def cross(u: Sequence[Entry], v: Sequence[Entry]) -> list[Entry]:
     ]
 
 
+def cross_rows(a: Array, b: Array) -> Array:
+    """Vector products (..., 3), for which np.cross takes three times as long where they are few."""
+    ahead, behind = [1, 2, 0], [2, 0, 1]
+    product: Array = a[..., ahead] * b[..., behind] - a[..., behind] * b[..., ahead]
+    return product
+
+
 def cos_sin(angle: Entry) -> tuple[Entry, Entry]:
     """Cosine and sine of an angle [rad].
 

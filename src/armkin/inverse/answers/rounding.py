@@ -75,19 +75,14 @@ def of_targets(
     rows = np.flatnonzero(defect > ROUNDED)
     if len(rows):
         most[rows] = np.maximum(most[rows], HALVES * last_place(numbers[rows, :3, :3]))
-    if task.orientation == "full" and len(rows := np.flatnonzero(of_right_angles(numbers))):
-        most[rows] = np.maximum(most[rows], last_place_of_position(numbers[rows, :3, 3]) / arm.reach)
+    if task.orientation == "full":
+        corner = numbers[:, 0, 0]  # tells nearly all others
+        rows = np.flatnonzero(np.abs(corner - np.rint(corner)) <= ROUNDED)
+        R = numbers[rows, :3, :3]
+        rows = rows[(np.abs(R - np.rint(R)) <= ROUNDED).all(axis=(1, 2))]
+        if len(rows):
+            most[rows] = np.maximum(most[rows], last_place_of_position(numbers[rows, :3, 3]) / arm.reach)
     return Rounding(known, SOLUTION + most)
-
-
-def of_right_angles(T: Array) -> Bool:
-    """Which poses (N, 4, 4) have a rotation of whole numbers, which shows no rounding."""
-    whole = np.abs(T[:, 0, 0] - np.rint(T[:, 0, 0])) <= ROUNDED  # tells nearly all others
-    rows = np.flatnonzero(whole)
-    if len(rows):
-        R = T[rows, :3, :3]
-        whole[rows] = (np.abs(R - np.rint(R)) <= ROUNDED).all(axis=(1, 2))
-    return whole
 
 
 def last_place_of_position(p: Array) -> Array:

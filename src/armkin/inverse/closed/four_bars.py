@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, cross_rows
 from armkin.forward import jacobian
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import NEAR, NO_AREA, PARALLEL, SAME, SOLUTION, TINY
@@ -113,19 +113,19 @@ def _diagonals(bars: Array, spherical: Bool) -> tuple[Array, Array]:
 def _linkages(arm: Arm, q: Array, which: Int) -> _Linkages:
     """Axes which (M, 4) of postures (M, n)."""
     J = np.take_along_axis(jacobian(arm, q), which[:, None], axis=2).swapaxes(1, 2)  # (M, 4, 6)
-    axis, point = J[:, :, 3:], np.cross(J[:, :, 3:], J[:, :, :3]) / arm.reach  # feet of perpendiculars from the tip
+    axis, point = J[:, :, 3:], cross_rows(J[:, :, 3:], J[:, :, :3]) / arm.reach  # feet of perpendiculars from the tip
     after, ahead = np.roll(axis, -1, axis=1), np.roll(point, -1, axis=1) - point
-    normal = np.cross(axis, after)
+    normal = cross_rows(axis, after)
     area = np.linalg.norm(normal, axis=2)
     planar = (area < NO_AREA).all(axis=1)
     behind = np.roll(ahead, 1, axis=1)
-    bars, sine = np.linalg.norm(ahead, axis=2), (np.cross(behind, ahead) * axis[:, :1]).sum(axis=2)
+    bars, sine = np.linalg.norm(ahead, axis=2), (cross_rows(behind, ahead) * axis[:, :1]).sum(axis=2)
     # all meet in the point where the first two do
     far = np.maximum(area[:, :1] ** 2, TINY)
-    turn = np.cross(ahead[:, 0], axis[:, 1])
+    turn = cross_rows(ahead[:, 0], axis[:, 1])
     along = (turn * normal[:, 0]).sum(axis=1, keepdims=True) / far
     centre = point[:, :1] + (along * axis[:, 0])[:, None]
-    off = np.linalg.norm(np.cross(centre - point, axis), axis=2)
+    off = np.linalg.norm(cross_rows(centre - point, axis), axis=2)
     spherical = ~planar & (area > PARALLEL).all(axis=1) & (off < NO_AREA).all(axis=1)
     arcs = np.arctan2(area, (axis * after).sum(axis=2))
     triple = (np.roll(axis, 1, axis=1) * normal).sum(axis=2)

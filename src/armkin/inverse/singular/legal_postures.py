@@ -79,6 +79,7 @@ def _may_be_legal(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Bool:
     some = np.flatnonzero((inside | out.free[rows[k]]).all(axis=1))
     on: Bool = np.asarray(inside.all(axis=1))
     some = some[~on[some]]
-    sigma, *_ = newton.null_space(arm, task, out.q[rows[k[some]], b[some]], target[rows[k[some]]])
-    on[some] = sigma < CLOSED
+    if len(some):
+        sigma, *_ = newton.null_space(arm, task, out.q[rows[k[some]], b[some]], target[rows[k[some]]])
+        on[some] = sigma < CLOSED
     return np.bincount(k[on], minlength=len(rows)) > 0

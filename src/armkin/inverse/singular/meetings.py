@@ -7,6 +7,8 @@ rounding.
 
 from __future__ import annotations
 
+from functools import cache
+from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 BOW = 0.1  # of its length: a curve is no farther off its chord
-TURN = np.linspace(0.0, np.pi, 256, endpoint=False)
-ROUND = np.stack([np.cos(TURN) ** 2, np.cos(TURN) * np.sin(TURN), np.sin(TURN) ** 2], axis=1)  # of quadratic forms
+AROUND = 256  # directions in a plane, of which each stands for its opposite, too
+ACROSS = 64  # along the edges of a cube whose sides hold directions in space
 ALL_ROUND = 5.0 * BENT  # [1/rad] curvature in all directions: a residual has passed `SOLUTION` 1e-3 rad away
 THIRD = 0.03  # singular value of the third direction, which bends the curves by its inverse
 SPREAD = 5.0  # times that in some direction: no surface of solutions, and the zeros are clear
@@ -67,36 +69,60 @@ def ways_out(
     return np.concatenate([q, more], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1), resting
 
 
+@cache
+def _directions(k: int) -> tuple[Array, Array, float]:
+    """Directions (P, k) in a plane or in space, their coordinates' products (P, k (k + 1) / 2), and how far [rad] any
+    direction is from one of these at most."""
+    if k == 2:
+        turn = np.linspace(0.0, np.pi, AROUND, endpoint=False)
+        unit, far = np.stack([np.cos(turn), np.sin(turn)], axis=1), np.pi / AROUND
+    else:
+        side = np.linspace(-1.0, 1.0, ACROSS)
+        face = np.stack([*np.meshgrid(side, side), np.ones((ACROSS, ACROSS))], axis=2).reshape(-1, 3)
+        unit = np.concatenate([np.roll(face, i, axis=1) for i in range(3)])
+        unit, far = unit / np.linalg.norm(unit, axis=1, keepdims=True), 2.0**0.5 / (ACROSS - 1)
+    return unit, np.stack([unit[:, i] * unit[:, j] for i, j in combinations_with_replacement(range(k), 2)], axis=1), far
+
+
 def _tangents(
     arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array
 ) -> tuple[Bool, Int, Array]:
     """Of which postures (M, n) the directions of curves are known, and these: whose (m,), and which (m, n).
 
-    As far as t along a lost direction v the residual is t^2 / 2 times u . f''(v, v), for both lost left vectors u: two
+    As far as t along a lost direction v the residual is t^2 / 2 times u . f''(v, v), for all lost left vectors u:
     quadratic forms of v (docs/solution.md). Curves leave along their common zeros; where there is none, it grows all
-    round, and where they are nothing but zero they do not tell.
+    round, and where they are nothing but zero they do not tell. Of three lost directions it is told whether there is
+    none.
     """
     n, known = arm.n, np.zeros(len(q), bool)
-    if at.r.shape[1] == n > 2:
-        known = (nullity == 2) & (at.S[:, n - 3] > THIRD)
-    rows = np.flatnonzero(known)
-    if not len(rows):
-        return known, rows, np.zeros((0, n))
-    u, V, unit = at.U[rows][:, :, n - 2 :], at.V[rows], radian_or_reach(arm)
-    ways = np.stack([V[:, n - 2], V[:, n - 1], V[:, n - 2] + V[:, n - 1]])  # (3, m, n)
-    ends = q[rows] + np.multiply.outer([FOLD_WAY, -FOLD_WAY], ways * unit)
-    goal = np.concatenate([target[rows]] * 6)
-    r = residual(task, fk(arm, ends.reshape(-1, n)), ends.reshape(-1, n), goal, arm.reach).reshape(2, 3, len(rows), n)
-    bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * u).sum(axis=2) / FOLD_WAY**2  # (3, m, 2)
-    forms = np.stack([bent[0], bent[2] - bent[0] - bent[1], bent[1]])
-    size = np.linalg.norm(np.tensordot(ROUND, forms, axes=1), axis=2)
-    most = size.max(axis=0)
-    known[rows] = most > SPREAD * ALL_ROUND
-    # half a step from the next of these directions a form differs by twice its largest value at most
-    zero = (size <= ALL_ROUND + 2.0 * TURN[1] * most) & known[rows]
-    zero &= (size <= np.roll(size, 1, axis=0)) & (size < np.roll(size, -1, axis=0))
-    k, who = np.nonzero(zero)
-    return known, rows[who], np.cos(TURN[k])[:, None] * V[who, n - 2] + np.sin(TURN[k])[:, None] * V[who, n - 1]
+    whose, ways = [np.zeros(0, np.intp)], [np.zeros((0, n))]
+    for k in (2, 3):
+        rows = np.flatnonzero(nullity == k)
+        rows = rows[at.S[rows, n - k - 1] > THIRD] if at.r.shape[1] == n > k else rows[:0]
+        if not len(rows):
+            continue
+        unit, products, far = _directions(k)
+        pairs, V = list(combinations_with_replacement(range(k), 2)), at.V[rows, n - k :]
+        push = np.stack([V[:, i] if i == j else V[:, i] + V[:, j] for i, j in pairs])
+        ends = (q[rows] + np.multiply.outer([FOLD_WAY, -FOLD_WAY], push * radian_or_reach(arm))).reshape(-1, n)
+        goal = np.concatenate([target[rows]] * (2 * len(pairs)))
+        r = residual(task, fk(arm, ends), ends, goal, arm.reach).reshape(2, len(pairs), len(rows), n)
+        bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / FOLD_WAY**2
+        own = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
+        forms = np.stack([b if i == j else b - own[i] - own[j] for b, (i, j) in zip(bent, pairs, strict=True)])
+        size = np.linalg.norm(np.tensordot(products, forms, axes=1), axis=2)
+        # that far from the next of these directions a form differs by twice its largest value at most
+        least = ALL_ROUND + 2.0 * far * size.max(axis=0)
+        if k == 3:
+            known[rows] = size.min(axis=0) > least
+            continue
+        known[rows] = size.max(axis=0) > SPREAD * ALL_ROUND
+        zero = (size <= least) & known[rows]
+        zero &= (size <= np.roll(size, 1, axis=0)) & (size < np.roll(size, -1, axis=0))
+        place, who = np.nonzero(zero)
+        whose.append(rows[who])
+        ways.append((unit[place][:, :, None] * V[who]).sum(axis=1))
+    return known, np.concatenate(whose), np.concatenate(ways)
 
 
 def _steps_out(
