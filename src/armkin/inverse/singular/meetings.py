@@ -71,7 +71,7 @@ def ways_out(
 
 @cache
 def _directions(k: int) -> tuple[Array, Array, float]:
-    """Directions (P, k) in a plane or in space, their coordinates' products (P, k (k + 1) / 2), and how far [rad] any
+    """Directions (P, k) in a plane or in space, their coordinates' products (k (k + 1) / 2, P), and how far [rad] any
     direction is from one of these at most."""
     if k == 2:
         turn = np.linspace(0.0, np.pi, AROUND, endpoint=False)
@@ -81,7 +81,7 @@ def _directions(k: int) -> tuple[Array, Array, float]:
         face = np.stack([*np.meshgrid(side, side), np.ones((ACROSS, ACROSS))], axis=2).reshape(-1, 3)
         unit = np.concatenate([np.roll(face, i, axis=1) for i in range(3)])
         unit, far = unit / np.linalg.norm(unit, axis=1, keepdims=True), 2.0**0.5 / (ACROSS - 1)
-    return unit, np.stack([unit[:, i] * unit[:, j] for i, j in combinations_with_replacement(range(k), 2)], axis=1), far
+    return unit, np.stack([unit[:, i] * unit[:, j] for i, j in combinations_with_replacement(range(k), 2)]), far
 
 
 def _tangents(
@@ -110,16 +110,17 @@ def _tangents(
         bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / FOLD_WAY**2
         own = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
         forms = np.stack([b if i == j else b - own[i] - own[j] for b, (i, j) in zip(bent, pairs, strict=True)])
-        size = np.linalg.norm(np.tensordot(products, forms, axes=1), axis=2)
+        grown = forms.transpose(1, 2, 0) @ products  # (m, k, P)
+        size = np.sqrt((grown * grown).sum(axis=1))
         # that far from the next of these directions a form differs by twice its largest value at most
-        least = ALL_ROUND + 2.0 * far * size.max(axis=0)
+        least = ALL_ROUND + 2.0 * far * size.max(axis=1)
         if k == 3:
-            known[rows] = size.min(axis=0) > least
+            known[rows] = size.min(axis=1) > least
             continue
-        known[rows] = size.max(axis=0) > SPREAD * ALL_ROUND
-        zero = (size <= least) & known[rows]
-        zero &= (size <= np.roll(size, 1, axis=0)) & (size < np.roll(size, -1, axis=0))
-        place, who = np.nonzero(zero)
+        known[rows] = size.max(axis=1) > SPREAD * ALL_ROUND
+        zero = (size <= least[:, None]) & known[rows, None]
+        zero &= (size <= np.roll(size, 1, axis=1)) & (size < np.roll(size, -1, axis=1))
+        place, who = np.nonzero(zero.T)
         whose.append(rows[who])
         ways.append((unit[place][:, :, None] * V[who]).sum(axis=1))
     return known, np.concatenate(whose), np.concatenate(ways)
