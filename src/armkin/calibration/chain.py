@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
-from armkin.model.rotation import inverse, rotation_about
+from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -78,7 +78,7 @@ class Model:
         and turns it by [rad], in the measuring frame.
         """
         M, n = c.shape
-        T = np.broadcast_to(np.eye(4), (M, 4, 4))
+        T = np.zeros((M, 4, 4)) + np.eye(4)
         axes = np.zeros((len(self.parameters), M, 3))
         points = np.zeros((len(self.parameters), M, 3))
         turns = np.zeros(len(self.parameters), bool)
@@ -93,16 +93,11 @@ class Model:
             if step.joint >= 0:
                 j = step.joint
                 value = p[k] + (self.arm.ratio[j] + p[ratios[j]]) * c[:, j]
-            T = T @ _motion(step, value)
+            T = _moved(T, step, value)
         tip = T[:, :3, 3]
-        J = np.empty((M, 6, len(self.parameters)))
-        for k in range(len(self.parameters)):
-            if turns[k]:
-                J[:, :3, k] = np.cross(axes[k], tip - points[k])
-                J[:, 3:, k] = axes[k]
-            else:
-                J[:, :3, k] = axes[k]
-                J[:, 3:, k] = 0.0
+        about = turns[:, None, None]
+        moved = np.where(about, np.cross(axes, tip - points), axes)
+        J = np.concatenate([moved, axes * about], axis=2).transpose(1, 2, 0)
         for j in range(n):
             J[:, :, ratios[j]] = J[:, :, zeros[j]] * c[:, j, None]
         return T, J
@@ -197,13 +192,20 @@ def _along(link: Array, reach: float) -> Array:
     return A
 
 
-def _motion(step: _Step, value: Array | float) -> Array:
-    """Transforms along or about an axis: (4, 4), or (M, 4, 4) for values (M,)."""
-    T = np.zeros((*np.shape(value), 4, 4)) + np.eye(4)
+def _motion(step: _Step, value: float) -> Array:
+    """The transform (4, 4) along or about an axis."""
+    return _moved(np.eye(4), step, value)
+
+
+def _moved(T: Array, step: _Step, value: Array | float) -> Array:
+    """Transforms (..., 4, 4), and behind each a motion along or about its axis: of two columns, or of the origin."""
+    T, by = T.copy(), np.asarray(value)[..., None]
     if step.turns:
-        T[..., :3, :3] = rotation_about(step.axis, value)
+        i, j = (step.axis + 1) % 3, (step.axis + 2) % 3
+        a, b, c, s = T[..., i].copy(), T[..., j].copy(), np.cos(by), np.sin(by)
+        T[..., i], T[..., j] = c * a + s * b, c * b - s * a
     else:
-        T[..., step.axis, 3] = value
+        T[..., 3] += by * T[..., step.axis]
     return T
 
 
