@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from armkin.board.backend import Planned
     from armkin.board.planner import Planner, Stream
     from armkin.cli.send_goals import Goals
+    from armkin.errors import ArmkinError
     from armkin.model.arm import Arm
 
 
@@ -96,24 +97,15 @@ def send(
     from armkin.board.stopping import planning
 
     fraction = inputs.percent(speed, "--speed")
-    if start is not None and not dry_run:
-        raise UsageError("--from belongs to --dry-run: the arm starts where it stands")
     rehearsal = dry_run or port == SIM
-    if accel is not None and not rehearsal:
-        raise UsageError("--accel is for --dry-run and --port sim: a real arm's max_accel stands in its robot file")
-    if trace is not None and batch == "-" and not dry_run:
-        raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
+    _check_together(start, accel, trace, batch, dry_run=dry_run, rehearsal=rehearsal)
     if resume:
-        if batch == "-":
-            raise UsageError(
-                "--resume needs the rows that were held once more, and --batch - does not keep what it has read\n"
-                "save the rows in a file and send --batch FILE; or leave --resume out: they start where the arm stands"
-            )
+        _check_rows_are_kept(batch)
         board_link.can_resume({"--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM})
     if path is not None:
         from armkin.cli.commands.path import sent
 
-        others = {
+        others: dict[str, object] = {
             "joint values": q,
             "--target": target,
             "--batch": batch,
@@ -121,11 +113,7 @@ def send(
             "--near": near,
             "--accel": accel,
         }
-        given = [name for name, what in others.items() if what]
-        if given:
-            raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
-        if robot is None:
-            raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
+        robot = _of_a_path(robot, others)
         link = board_link.Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
         arm = keep_outs.moving(robot, scene, ignore_keep_out, tool)
         sent(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
@@ -163,7 +151,50 @@ def send(
             _carry_out(planner, plans, held)
         planned = planner.done.summary(began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
-    problem = goals.problem if isinstance(goals, Stream) else None
+    _tell(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
+
+
+def _check_together(
+    start: str | None, accel: str | None, trace: str | None, batch: str | None, *, dry_run: bool, rehearsal: bool
+) -> None:
+    """Raise UsageError for options that make no sense together."""
+    if start is not None and not dry_run:
+        raise UsageError("--from belongs to --dry-run: the arm starts where it stands")
+    if accel is not None and not rehearsal:
+        raise UsageError("--accel is for --dry-run and --port sim: a real arm's max_accel stands in its robot file")
+    if trace is not None and batch == "-" and not dry_run:
+        raise UsageError("--trace needs all waypoints before the arm moves: not with --batch -")
+
+
+def _check_rows_are_kept(batch: str | None) -> None:
+    """Raise UsageError where --resume cannot have the rows again."""
+    if batch == "-":
+        raise UsageError(
+            "--resume needs the rows that were held once more, and --batch - does not keep what it has read\n"
+            "save the rows in a file and send --batch FILE; or leave --resume out: they start where the arm stands"
+        )
+
+
+def _of_a_path(robot: str | None, others: Mapping[str, object]) -> str:
+    """The robot of --path. Raises UsageError without one, and where one of the `others` is given, too."""
+    given = [name for name, what in others.items() if what]
+    if given:
+        raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
+    if robot is None:
+        raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
+    return robot
+
+
+def _tell(
+    arm: Arm,
+    planned: Mapping[str, Any],
+    found: Mapping[str, Any],
+    problem: ArmkinError | None,
+    trace: str | None,
+    *,
+    json: bool,
+) -> None:
+    """Print where the arm stands after a motion; then raise what ended it, if anything did."""
     answer = {**render.head(arm), **found}
     if problem is not None and not planned["waypoints"]:
         raise problem  # nothing has moved: there is nothing to tell
