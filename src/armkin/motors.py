@@ -246,11 +246,9 @@ def joints_per_pulse(arm: Arm) -> Array:
     Raises UsageError if the motors do not determine the joints.
     """
     gain, still = arm.motor_gain, undriven(arm)
-    if len(still) == arm.n:
-        raise UsageError(f"{arm.name} has no drives; add drive: to its joints, or motors:", undriven=still)
     if still:
-        names = ", ".join(still)
-        raise UsageError(f"{arm.name} has no motor for {names}; add drive: to each joint, or motors:", undriven=still)
+        lacks = "drives" if len(still) == arm.n else f"motor for {', '.join(still)}"
+        raise UsageError(f"{arm.name} has no {lacks}; add motors: to its file, or drive: to each joint", undriven=still)
     # In units of each joint's own pulse, so that rad and mm, or coarse and fine drives, compare.
     scale = np.abs(gain).max(axis=0)
     if np.linalg.matrix_rank(gain / scale) < arm.n:
