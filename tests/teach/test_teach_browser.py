@@ -88,6 +88,10 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         page.keyboard.press("r")
         page.wait_for_selector("#name-1")
         page.wait_for_selector("#player:not([hidden])")
+        tab_to("#rate")
+        page.keyboard.press("Home")  # a quarter of its speed: a busy computer sees it play, too
+        assert page.input_value("#rate") == "0.25"
+        page.evaluate("document.activeElement.blur()")
         page.keyboard.press("p")
         until(page, "document.querySelector('#play').textContent === 'Pause'")
         page.keyboard.press("p")
@@ -225,15 +229,48 @@ def test_the_manual_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> N
     assert "(teach.png)" in (ROOT / "docs/teach.md").read_text()[:1000]
 
 
+# Firefox names the graphics card itself, and complains in its console of who asks for more.
+_NAMED = """
+const gl = WebGL2RenderingContext.prototype;
+const [parameter, extension] = [gl.getParameter, gl.getExtension];
+gl.getParameter = function (what) { return what === gl.RENDERER ? "llvmpipe" : parameter.call(this, what); };
+gl.getExtension = function (name) {
+  if (name === "WEBGL_debug_renderer_info") console.warn(`${name} is deprecated`);
+  return extension.call(this, name);
+};
+"""
+
+
 def test_a_telephone_s_window(browser: Browser, server: Server) -> None:
-    with opened(browser, server.address, viewport={"width": 390, "height": 800}, has_touch=True) as page:
+    narrow = {"viewport": {"width": 390, "height": 800}, "has_touch": True}
+    with opened(browser, server.address, script=_NAMED, **narrow) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         page.locator("#motors").scroll_into_view_if_needed()
         box = page.locator("#stop").bounding_box()
         assert box is not None
         assert 0 <= box["y"] < 100  # STOP stays in sight
+        rights = "buttons => buttons.map((one) => one.getBoundingClientRect().right)"
+        assert max(page.locator("#views button:visible").evaluate_all(rights)) <= 390  # none of them is cut
         aim(page, 390, 80, 300)
         assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
+        # A finger that swipes over a slider scrolls, and turns no joint; one that goes along it does.
+        slider = page.locator("#sliders input[type=range]").nth(1)
+        slider.scroll_into_view_if_needed()
+        line = page.context.new_cdp_session(page)
+        for across, down, turns in ((1, -12, False), (8, 1, True)):
+            rect = slider.bounding_box()
+            assert rect is not None
+            x, y = rect["x"] + 0.3 * rect["width"], rect["y"] + rect["height"] / 2
+            before, scrolled = value(page, "#box-1"), page.evaluate("scrollY")
+            for k in range(10):
+                kind, at = ("touchMove" if k else "touchStart"), {"x": x + across * k, "y": y + down * k}
+                line.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [at]})
+            line.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+            if not turns:
+                until(page, "scrollY > argument", scrolled)
+            settled(page)
+            assert (value(page, "#box-1") != before) is turns
+            assert slider.evaluate("one => one.valueAsNumber") == pytest.approx(value(page, "#box-1"), abs=0.02)
 
 
 def test_what_went_wrong_is_seen_wherever_one_has_scrolled_to(browser: Browser) -> None:
@@ -299,6 +336,32 @@ _FIRST_DRUM = """async ([arm, q]) => {
   }
   return at;
 }"""
+
+
+# Of two branches outside limits, drawn as lines: each [red, green, blue, whether it is seen through].
+_PALE = """async (arm) => {
+  const [{ Shapes }, { Ghosts }] = [await import('/js/bodies.js'), await import('/js/ghosts.js')];
+  const ghosts = new Ghosts(new Shapes(arm));
+  ghosts.paper.set(0xf3f5f7);
+  const q = arm.joints.map((joint) => joint.home);
+  ghosts.show(['#d62728', '#1f77b4'].map((colour) => ({ joints: q, colour, faint: true, solid: false })));
+  const [body] = ghosts.bodies[0].filter(({ count }) => count);
+  const paint = [...body.instanceColor.array].slice(0, 6);
+  return [paint.slice(0, 3), paint.slice(3)].map((colour) => [...colour, body.material.transparent]);
+}"""
+
+
+def test_branches_outside_limits_are_paler_and_mix_nowhere(browser: Browser, server: Server) -> None:
+    """Lines that were seen through mixed to grey where seven of a Panda's crossed."""
+    context = browser.new_context(bypass_csp=True)
+    page = context.new_page()
+    page.goto(server.address)
+    red, blue = page.evaluate(_PALE, scene(armkin.load("three_dof")))
+    assert red[0] > 1.3 * red[1]
+    assert blue[2] > 1.3 * blue[0]
+    assert min(red[:3] + blue[:3]) > 0.4  # of light, as the paper has 0.9; their own least is 0.02
+    assert red[3] is blue[3] is False
+    context.close()
 
 
 def test_the_page_draws_the_arm_where_it_is(browser: Browser, server: Server) -> None:

@@ -13,7 +13,11 @@ from served import served
 _PAD = """
 window.pad = {id: 'Pad <b>1</b>', connected: true, mapping: 'standard', axes: [0, 0, 0, 0],
               buttons: Array.from({length: 17}, () => ({pressed: false}))};
-navigator.getGamepads = () => [window.pad, null];
+window.looked = 0;
+navigator.getGamepads = () => {
+  window.looked++;
+  return [window.pad, null];
+};
 """
 # Signs of life that are a second late, counted.
 _LATE = """
@@ -44,6 +48,10 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
             sign = "!" if ends else ""
             until(page, f"{sign}document.querySelector('#standing').textContent.startsWith('jog')")
 
+        def looked(times: int) -> None:
+            """Until the page has looked at the gamepad: a busy one does so late."""
+            until(page, "looked >= argument", page.evaluate("looked") + times)
+
         page.fill("#jog-speed", "10")
         groups = page.locator("#jog-joint optgroup").all()
         assert [group.get_attribute("label") for group in groups] == ["Joints", "Tip, base axes", "Tip, tool axes"]
@@ -71,13 +79,13 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         page.check("#gamepad")
         until(page, "document.querySelector('#pad').textContent.includes('hold a shoulder')")
         assert page.locator("#pad b").count() == 0  # its name is text
-        page.wait_for_timeout(300)
+        looked(6)
         assert joints() == stands
         pull, let_go = (f"() => {{ pad.buttons[5].pressed = {on}; }}" for on in ("true", "false"))
 
         def release() -> None:
             page.evaluate(let_go)
-            page.wait_for_timeout(200)  # it is looked at 20 times a second
+            looked(2)
 
         jogged(page, partial(page.evaluate, pull), release, lambda: page.text_content("#position") != stood)
         release()

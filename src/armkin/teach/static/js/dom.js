@@ -75,3 +75,34 @@ export function typed(box, hear) {
   box.addEventListener("change", done);
   box.addEventListener("blur", done);
 }
+
+const ALONG = 12; // [px] that a finger goes along a slider before it turns it: less than a browser waits to see a swipe
+
+/**
+ * Hear of a slider that is turned. A finger that swipes over it to scroll the page turns nothing: the browser puts the
+ * slider under the finger at once, and says only then that it scrolls.
+ * @param {HTMLInputElement} slider
+ * @param {(value: number) => void} hear
+ */
+export function turned(slider, hear) {
+  let [before, from] = ["", 0]; // its value while a finger may still be scrolling, and where that touched it
+  const sure = () => {
+    if (!before) return;
+    before = "";
+    hear(slider.valueAsNumber);
+  };
+  slider.addEventListener("pointerdown", (event) => {
+    if (event.pointerType === "touch") [before, from] = [slider.value, event.clientX];
+  });
+  slider.addEventListener("pointermove", (event) => {
+    if (Math.abs(event.clientX - from) > ALONG) sure();
+  });
+  slider.addEventListener("pointerup", sure);
+  slider.addEventListener("pointercancel", () => {
+    if (before) slider.value = before;
+    before = "";
+  });
+  slider.addEventListener("input", () => {
+    if (!before) hear(slider.valueAsNumber);
+  });
+}

@@ -7,6 +7,7 @@ import { frames } from "./chain.js";
 /** @typedef {{joints: number[], colour: string, faint: boolean, solid: boolean, name?: string}} Ghost name: of a branch */
 
 const ROOM = 8; // ghosts of a body that are provided for; more are, when they come
+const PALE = 0.45; // share of the paper in the colour of a branch outside limits
 
 export class Ghosts {
   /** @param {import("./bodies.js").Shapes} shapes */
@@ -14,10 +15,13 @@ export class Ghosts {
     this.arm = shapes.arm;
     this.group = new Group();
     const [lines, solids] = [shapes.lines.map(merged), shapes.bodies.slice(1).map(merged)];
-    const faint = new MeshLambertMaterial({ transparent: true, opacity: 0.35, depthWrite: false });
-    const whole = new MeshLambertMaterial({ transparent: true, opacity: 0.8 });
-    /** Of every body: within limits, outside, pointed at. */
-    this.kinds = lines.map((line, i) => /** @type {const} */ ([[line, new MeshLambertMaterial()], [line, faint], [solids[i], whole]]));
+    // A drum of it that coincides with the arm's own lies behind that.
+    const whole = new MeshLambertMaterial({ transparent: true, opacity: 0.8, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 });
+    /** Of every body: a line, pointed at. */
+    this.kinds = lines.map((line, i) => /** @type {const} */ ([[line, new MeshLambertMaterial()], [solids[i], whole]]));
+    this.paper = new Color();
+    /** @type {Ghost[]} */
+    this.wanted = [];
     /** @type {InstancedMesh[][]} */
     this.bodies = [];
     this.room(ROOM);
@@ -34,13 +38,15 @@ export class Ghosts {
 
   /** Show these and no others. @param {Ghost[]} wanted */
   show(wanted) {
+    this.wanted = wanted;
     if (wanted.length > (this.most ?? 0)) this.room(2 * wanted.length);
     for (const body of this.bodies.flat()) body.count = 0;
     const at = new Matrix4();
     for (const { joints, colour, faint, solid } of wanted) {
       const paint = new Color(colour);
+      if (faint && !solid) paint.lerp(this.paper, PALE); // lines that are seen through would mix to grey
       frames(this.arm, joints).after.forEach((T, i) => {
-        const body = this.bodies[i][solid ? 2 : faint ? 1 : 0];
+        const body = this.bodies[i][solid ? 1 : 0];
         body.setMatrixAt(body.count, at.fromArray(T).transpose());
         body.setColorAt(body.count, paint);
         body.count += 1;

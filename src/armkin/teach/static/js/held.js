@@ -1,6 +1,6 @@
 // @ts-check
 /** The one joint that is held of an arm with a joint to spare: a slider of its own, and how far it can turn. */
-import { fixed, get } from "./dom.js";
+import { fixed, get, turned } from "./dom.js";
 import { interval } from "./redundant.js";
 
 const PAUSE = 60; // [ms] without another posture after which the interval is found
@@ -16,10 +16,10 @@ export class Held {
     /** @type {number[] | null} */
     this.legal = null;
     this.waiting = 0;
-    this.slider.addEventListener("input", () => {
+    turned(this.slider, (value) => {
       const [low, high] = this.legal ?? [-Infinity, Infinity];
       const q = [...this.q];
-      q[this.joint] = Math.min(Math.max(this.slider.valueAsNumber, low), high);
+      q[this.joint] = Math.min(Math.max(value, low), high);
       swing(q);
     });
   }

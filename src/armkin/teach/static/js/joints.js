@@ -1,6 +1,6 @@
 // @ts-check
 /** A slider and a number box for each joint, its limits and home, and its lock. */
-import { fixed, get, make, show, typed } from "./dom.js";
+import { fixed, get, make, show, turned, typed } from "./dom.js";
 
 export class Joints {
   /**
@@ -34,7 +34,7 @@ export class Joints {
         q[i] = value;
         moved(q, true, this.held.has(joint.name));
       };
-      slider.addEventListener("input", () => change(slider.valueAsNumber));
+      turned(slider, change);
       typed(box, change);
       rows.append(name, slider, box, make("span", {}, joint.unit), this.lock(joint, locked), marks);
       const ends = [joint.lower, joint.upper].map((end) => make("span", {}, end === null ? "no limit" : String(Number(end.toFixed(1)))));

@@ -89,8 +89,9 @@ export class View {
   /** Whether the processor draws. */
   software() {
     const gl = this.renderer.getContext();
-    const names = gl.getExtension("WEBGL_debug_renderer_info");
-    return SOFTWARE.test(String(gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER)));
+    const name = String(gl.getParameter(gl.RENDERER));
+    const more = /webkit/i.test(name) && gl.getExtension("WEBGL_debug_renderer_info"); // Firefox complains of it in its console
+    return SOFTWARE.test(more ? String(gl.getParameter(more.UNMASKED_RENDERER_WEBGL)) : name);
   }
 
   /** Take the colours of the page's theme. */
@@ -99,6 +100,8 @@ export class View {
     this.tube.color.set(dark ? 0xc6d0da : 0xdfe4e9);
     this.drum.color.set(dark ? 0x4d9de0 : 0x0072b2);
     this.floor.colour(dark ? 0x4a5663 : 0xb4bec8);
+    this.ghosts.paper.set(dark ? 0x1d232a : 0xf3f5f7);
+    this.ghosts.show(this.ghosts.wanted);
     this.draw();
   }
 
