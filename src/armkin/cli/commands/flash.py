@@ -47,7 +47,7 @@ def flash(
     kind = _kind(robot, board)
     program = image(kind)
     port = port or _only_port(kind)
-    with output.progress("bytes written and read back") as tick:
+    with output.progress("bytes out and back") as tick:
         done = upload(program, port, tick)
     found: dict[str, object] = {"board": kind, **done._asdict()}
     with output.destination(None) as write:
