@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, FLOAT32, NO_LENGTH, SOLUTION
+from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, FLOAT32, SOLUTION
 from armkin.inverse.tasks.task import ROUNDED
 
 if TYPE_CHECKING:
@@ -90,8 +90,8 @@ def last_place_of_position(p: Array) -> Array:
 
     Typed ones are: of fewer than six digits, and fewer than three decimals.
     """
-    p = np.where(np.abs(p) < NO_LENGTH, 0.0, p)
-    size = np.floor(np.log10(np.maximum(np.abs(p), NO_LENGTH)))
+    p = np.where(np.abs(p) < SOLUTION, 0.0, p)  # what is that small is rounding
+    size = np.floor(np.log10(np.maximum(np.abs(p), SOLUTION)))
     half = np.zeros(len(p))
     typed = _whole(p * 10.0 ** (FEWEST - 1)) & _whole(p * 10.0 ** (PRINTED - 2 - size))
     left = np.flatnonzero(~typed.all(axis=1))
