@@ -363,6 +363,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "teach/test_teach_program.py": ("test_what_is_played_is_where_the_tip_is_however_long_it_takes",),
     "teach/test_teach_safety.py": (),
     "teach/test_teach_slice.py": (),
+    "teach/test_teach_telephone.py": (),
     "test_docs.py": ("test_the_methods_of_the_shipped_robots_are_on_the_page",),
     "test_examples.py": ("test_an_example_runs_from_any_folder",),
     "test_lowest_versions.py": (),

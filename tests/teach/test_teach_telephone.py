@@ -1,0 +1,66 @@
+"""The page in a telephone's window: what is in sight, and what a finger does."""
+
+from __future__ import annotations
+
+import pytest
+from browsing import COUNTS, aim, opened, settled, until, value
+from playwright.sync_api import Browser
+from served import served
+
+# Firefox names the graphics card itself, and complains in its console of who asks for more.
+_NAMED = """
+const gl = WebGL2RenderingContext.prototype;
+const [parameter, extension] = [gl.getParameter, gl.getExtension];
+gl.getParameter = function (what) { return what === gl.RENDERER ? "llvmpipe" : parameter.call(this, what); };
+gl.getExtension = function (name) {
+  if (name === "WEBGL_debug_renderer_info") console.warn(`${name} is deprecated`);
+  return extension.call(this, name);
+};
+"""
+
+
+def test_a_telephone_s_window(browser: Browser) -> None:
+    narrow = {"viewport": {"width": 390, "height": 800}, "has_touch": True}
+    with served() as server, opened(browser, server.address, script=_NAMED, **narrow) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        page.locator("#motors").scroll_into_view_if_needed()
+        box = page.locator("#stop").bounding_box()
+        assert box is not None
+        assert 0 <= box["y"] < 100  # STOP stays in sight
+        rights = "buttons => buttons.map((one) => one.getBoundingClientRect().right)"
+        assert max(page.locator("#views button:visible").evaluate_all(rights)) <= 390  # none of them is cut
+        aim(page, 390, 80, 300)
+        assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
+        # A finger that swipes over a slider scrolls, and turns no joint; one that goes along it does.
+        slider = page.locator("#sliders input[type=range]").nth(1)
+        slider.scroll_into_view_if_needed()
+        line = page.context.new_cdp_session(page)
+        for across, down, turns in ((1, -12, False), (8, 1, True)):
+            rect = slider.bounding_box()
+            assert rect is not None
+            x, y = rect["x"] + 0.3 * rect["width"], rect["y"] + rect["height"] / 2
+            before, scrolled = value(page, "#box-1"), page.evaluate("scrollY")
+            for k in range(10):
+                kind, at = ("touchMove" if k else "touchStart"), {"x": x + across * k, "y": y + down * k}
+                line.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [at]})
+            line.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+            if not turns:
+                until(page, "scrollY > argument", scrolled)
+            settled(page)
+            assert (value(page, "#box-1") != before) is turns
+            assert slider.evaluate("one => one.valueAsNumber") == pytest.approx(value(page, "#box-1"), abs=0.02)
+
+
+def test_what_went_wrong_is_seen_wherever_one_has_scrolled_to(browser: Browser) -> None:
+    with (
+        served(board="sim") as server,
+        opened(browser, server.address, viewport={"width": 390, "height": 800}, has_touch=True) as page,
+    ):
+        page.locator("#home").scroll_into_view_if_needed()
+        page.click("#home")  # it has no switches
+        until(page, "document.querySelector('#trouble').textContent.includes('homing')")
+        for part in ("#trouble", "#stop"):
+            box = page.locator(part).bounding_box()
+            assert box is not None
+            assert box["y"] >= 0
+            assert box["y"] + box["height"] < 300
