@@ -57,6 +57,13 @@ def test_keys_and_what_was_refused(browser: Browser, tmp_path: Path) -> None:
         page.set_input_files("#load", str(file))
         said = "first a joint move to its start, 1.000 s; then 1.000 s"
         until(page, f"document.querySelector('#planned').textContent.startsWith('{said}')")
+        # While a long program is planned, none that it has been edited from can be played.
+        page.route("**/api/plan", lambda route: None)
+        page.click("#undo")
+        until(page, "document.querySelector('#planned').textContent === 'planning ...'")
+        assert page.is_hidden("#player")
+        page.unroute("**/api/plan")  # which lets those that were held go on
+        page.wait_for_selector("#player:not([hidden])")
 
 
 def test_hostile_words_of_a_path_file_are_shown_and_run_nothing(tab: Page, tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ import { Rows } from "./moves.js";
 import { Player } from "./player.js";
 import { act } from "./server.js";
 
+const OLD = 500; // [ms] that the plan of a program is shown which has been edited
+
 export class Program {
   /**
    * @param {import("./types.js").Arm} arm
@@ -111,20 +113,26 @@ export class Program {
   async plan() {
     if (this.carried) return;
     if (!this.count || !this.page.mine()) {
-      this.player.load(null);
-      this.page.trail([]);
-      get("planned").textContent = "";
+      this.none("");
       return;
     }
+    const late = setTimeout(() => this.none("planning ..."), OLD); // what is shown is the plan of another program
     try {
       const plan = /** @type {import("./types.js").Played} */ (await act("plan"));
       if (this.planning.next === null) this.take(plan); // else it has been edited meanwhile
     } catch (error) {
-      this.player.load(null);
-      this.page.trail([]);
-      get("planned").textContent = /** @type {Error} */ (error).message;
+      this.none(/** @type {Error} */ (error).message);
       get("planned").className = "bad";
     }
+    clearTimeout(late);
+  }
+
+  /** Nothing to play. @param {string} why */
+  none(why) {
+    this.player.load(null);
+    this.page.trail([]);
+    get("planned").textContent = why;
+    get("planned").className = "";
   }
 
   /** Show the pose where a move ends; the next one is recorded behind it. @param {number} k */
