@@ -267,6 +267,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     ),
     "inverse/test_regular_targets.py": ("test_all_at_once_is_as_one_by_one",),
     "inverse/test_rounded_targets.py": (
+        "test_a_rotation_by_right_angles_hides_its_rounding_but_the_position_shows_it",
         "test_a_turn_about_one_axis_shows_its_rounding_by_its_digits",
         "test_its_own_pose_in_few_digits_moves_no_joint",
         "test_machine_code_stays_as_python_does",
