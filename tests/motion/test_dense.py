@@ -362,6 +362,21 @@ def test_noise_in_tight_bends_takes_little_time(three_dof: Arm) -> None:
         at += int(np.flatnonzero(np.linalg.norm(way[at:] - point, axis=1) <= plan.tolerance + 1e-3)[0])
 
 
+def test_noise_that_leaves_the_tolerance_never_brings_the_law_to_rest(three_dof: Arm) -> None:
+    """The greatest speed before a bend led to rest behind it, where the law stood for 1e298 s."""
+    curve, a = (
+        np.random.default_rng(0).normal(size=(4, 5)) * 40 / np.arange(1, 6) ** 1.6,
+        np.linspace(0, 2 * np.pi, 600),
+    )
+    k = np.arange(1, 6)[:, None] * a
+    x, y = curve[0] @ np.cos(k) + curve[1] @ np.sin(k), curve[2] @ np.cos(k) + curve[3] @ np.sin(k)
+    flat = np.stack([x, y, 0 * x], axis=1) * 60 / np.hypot(x, y).max()
+    rng = np.random.default_rng(1)
+    rng.uniform(-0.02, 0.02, flat.shape)
+    noisy = np.array([340.0, 40.0, 300.0]) + flat + rng.normal(0, 0.02, flat.shape)
+    assert armkin.path(three_dof, noisy, corners="tolerance").duration < 7
+
+
 def test_noise_in_a_cusp_is_no_row_of_corners() -> None:
     """Points 0.03 to 0.1 mm apart about a bend of 0.3 mm: 13 of 15 were corners, each rounded by itself."""
     a = np.linspace(-2.0, 2.0, 240)

@@ -110,8 +110,9 @@ class Fastest:
         motion = self.bound.of(some)
         P, R, C = _rows(motion._replace(accel=motion.accel * self.share[:, some]))
         slope, level, h = R / P, C / P, motion.h
-        # x + 2 h u >= 0 must leave room below the upper bounds of u
-        steep = slope - 0.5 / h
+        # x + 2 h u >= x / 2 must leave room below the upper bounds of u: no interval may force more, since where they
+        # are long beside a bend the greatest x would lead to rest, and the law may stand there forever
+        steep = slope - 0.25 / h
         room = np.where(steep > 0, level / steep, np.inf).min(axis=0)
         left = _meeting(np.minimum(self.cap[:-1][some], room), slope, level)
         self.cap[:-1][some] = left
