@@ -23,11 +23,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
 
 import brute
+from closed_curves import harmonics, on_path
 from lines import random_line
 
 import armkin
 from armkin.forward import condition
-from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.tool_path.placing import placing
 from armkin.path_file import gcode
 from armkin.path_file.drawing import Wishes
@@ -44,11 +44,6 @@ def moving(name: str) -> armkin.Arm:
     unit = np.where(arm.prismatic, 5.0, np.pi / 180)
     speed = np.where(np.isnan(arm.max_speed), 90 * unit, arm.max_speed)
     return replace(arm, max_speed=speed, max_accel=np.where(np.isnan(arm.max_accel), 3 * speed, arm.max_accel))
-
-
-def on_path(plan: PathPlan) -> float:
-    """Seconds on the tool's way."""
-    return sum(stretch.duration for stretch, _ in plan.on_path.values())
 
 
 def flat(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -68,11 +63,7 @@ def shape(name: str, count: int) -> np.ndarray:
         return flat(55 * np.cos(3 * a / 2) * np.cos(a), 55 * np.cos(3 * a / 2) * np.sin(a))
     if name == "trochoid":
         return flat(18 * (a - np.pi) - 22 * np.sin(4 * a), 30 - 22 * np.cos(4 * a))
-    rng = np.random.default_rng(int(name))  # a random closed curve of five harmonics
-    c = rng.normal(size=(4, 5)) * 40 / np.arange(1, 6) ** 1.6
-    k = np.arange(1, 6)[:, None] * a
-    x, y = c[0] @ np.cos(k) + c[1] @ np.sin(k), c[2] @ np.cos(k) + c[3] @ np.sin(k)
-    return flat(*(60 * np.stack([x, y]) / np.hypot(x, y).max()))
+    return flat(*harmonics(int(name), count).T)
 
 
 def shapes() -> None:

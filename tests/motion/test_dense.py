@@ -7,19 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_curves import CENTRE, on_path, tips
 
 import armkin
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
 from armkin.motion.branches import branch_path
 from armkin.motion.plan import playback
-from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.timing.curve import Curve
 from armkin.motion.tool_path import fitting
 from armkin.motion.tool_path.b_spline import banded
 from armkin.plot import path as picture
 
-CENTRE = np.array([340.0, 80.0, 300.0])
 CORNER = np.deg2rad(20)
 
 
@@ -51,20 +50,6 @@ def stadium() -> np.ndarray:
     a = np.linspace(-np.pi / 2, np.pi / 2, 40)
     bend = np.stack([30 + 20 * np.cos(a), 20 * np.sin(a), 0 * a], axis=1)
     return np.asarray(CENTRE + np.concatenate([[[-50, -20, 0]], bend, [[-50, 20, 0]]]))
-
-
-def on_path(plan: PathPlan) -> float:
-    """Seconds on the tool's way, without the joint move to it."""
-    return sum(stretch.duration for stretch, _ in plan.on_path.values())
-
-
-def tips(plan: PathPlan) -> np.ndarray:
-    """The executed tip, densely, while it is on the path."""
-    parts = []
-    for number, (stretch, _) in sorted(plan.on_path.items()):
-        begin = plan.motion.begins[number]
-        parts.append(plan.q(np.linspace(begin, begin + stretch.duration, 20_000)))
-    return armkin.fk(plan.arm, np.concatenate(parts))[:, :3, 3]
 
 
 def to_segment(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -253,15 +238,6 @@ def test_long_chords_beside_short_ones_are_kept_to(seed: int) -> None:
     assert excess <= 0.051
 
 
-def test_noise_is_no_corner_and_a_small_square_is() -> None:
-    rng = np.random.default_rng(5)
-    x = np.linspace(0, 10, 200)
-    noisy = np.stack([x, rng.uniform(-0.02, 0.02, 200), 0 * x], axis=1)
-    assert not fitting.corners(noisy, 0.05).any()
-    small = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], dtype=float)
-    assert fitting.corners(small, 0.05).tolist() == [False, True, True, False]
-
-
 def test_blends_that_share_a_side_s_middle_are_planned(three_dof: Arm) -> None:
     """A slicer's infill: lines 0.2 mm apart, so that the two blends of each turn take half of the short side each."""
     corners = [[(30.0 if (k + 1) // 2 % 2 else -30.0), 0.2 * (k // 2) / np.sqrt(3), 0.0] for k in range(60)]
@@ -325,68 +301,6 @@ def test_a_way_shown_with_too_few_samples_is_shown_best_where_it_bends_most(thre
     few, worse = playback.times(three_dof, plan, begins, 0.02, len(whole) // 2)
     assert len(few) == len(whole) // 2
     assert worse <= 6 * off  # halves are off by a quarter as much
-
-
-def test_noise_in_a_tight_bend_is_no_corner() -> None:
-    """Points 0.1 mm apart about a bend of 1 mm: seen from afar the way turns, from point to point the noise does."""
-    a = np.linspace(0, np.pi, 32)
-    bend = np.stack([np.cos(a), np.sin(a)], axis=1)
-    legs = np.linspace(10, 0.1, 100)[:, None]
-    way = np.concatenate([[1, 0] - legs * [0, 1], bend, [-1, 0] - legs[::-1] * [0, 1]])
-    found = 0
-    for seed in range(5):
-        noise = np.random.default_rng(seed).uniform(-0.02, 0.02, way.shape)
-        found += int(fitting.corners(way + noise, 0.05).sum())
-    assert found <= 1  # 42 where it is seen from afar alone
-    sharp = np.concatenate([np.linspace([0, 0], [10, 0], 100), np.linspace([10, 0], [10, 10], 100)[1:]])
-    assert np.flatnonzero(fitting.corners(sharp, 0.05)).tolist() == [99]
-
-
-def loops(count: int, noise: float = 0.0) -> np.ndarray:
-    """A closed curve of five harmonics with bends of 1 mm, where 600 points are 0.05 mm apart."""
-    c = np.random.default_rng(4).normal(size=(4, 5)) * 40 / np.arange(1, 6) ** 1.6
-    a = np.arange(1, 6)[:, None] * np.linspace(0, 2 * np.pi, count)
-    xy = np.stack([c[0] @ np.cos(a) + c[1] @ np.sin(a), c[2] @ np.cos(a) + c[3] @ np.sin(a)])
-    exact = CENTRE - [0, 40, 0] + np.pad(60 * xy / np.hypot(*xy).max(), ((0, 1), (0, 0))).T
-    return np.asarray(exact + np.random.default_rng(19).uniform(-noise, noise, exact.shape))
-
-
-def test_noise_in_tight_bends_takes_little_time(three_dof: Arm) -> None:
-    """1.059 of the smooth curve's time: four points of a bend were corners, with sides of 0.05 mm to be rounded in."""
-    points = loops(600, 0.02)
-    plan = armkin.path(three_dof, points, corners="tolerance")
-    assert plan.deviation <= plan.tolerance
-    assert on_path(plan) <= 1.04 * on_path(armkin.path(three_dof, loops(20_000), corners="tolerance"))
-    way, at = tips(plan), 0
-    for point in points:  # in order: each behind the first place where the one before it is passed
-        at += int(np.flatnonzero(np.linalg.norm(way[at:] - point, axis=1) <= plan.tolerance + 1e-3)[0])
-
-
-def test_noise_that_leaves_the_tolerance_never_brings_the_law_to_rest(three_dof: Arm) -> None:
-    """The greatest speed before a bend led to rest behind it, where the law stood for 1e298 s."""
-    curve, a = (
-        np.random.default_rng(0).normal(size=(4, 5)) * 40 / np.arange(1, 6) ** 1.6,
-        np.linspace(0, 2 * np.pi, 600),
-    )
-    k = np.arange(1, 6)[:, None] * a
-    x, y = curve[0] @ np.cos(k) + curve[1] @ np.sin(k), curve[2] @ np.cos(k) + curve[3] @ np.sin(k)
-    flat = np.stack([x, y, 0 * x], axis=1) * 60 / np.hypot(x, y).max()
-    rng = np.random.default_rng(1)
-    rng.uniform(-0.02, 0.02, flat.shape)
-    noisy = np.array([340.0, 40.0, 300.0]) + flat + rng.normal(0, 0.02, flat.shape)
-    assert armkin.path(three_dof, noisy, corners="tolerance").duration < 7
-
-
-def test_noise_in_a_cusp_is_no_row_of_corners() -> None:
-    """Points 0.03 to 0.1 mm apart about a bend of 0.3 mm: 13 of 15 were corners, each rounded by itself."""
-    a = np.linspace(-2.0, 2.0, 240)
-    y = np.sign(a) * np.abs(a) ** 3
-    cusp = np.stack([4 * a**2, y, 0 * a], axis=1)
-    found = 0
-    for seed in range(5):
-        noise = np.random.default_rng(seed).uniform(-0.02, 0.02, cusp.shape)
-        found += int(fitting.corners(cusp + noise, 0.05).sum())
-    assert found <= 1
 
 
 @pytest.mark.parametrize("seed", [6, 51, 54, 93])
