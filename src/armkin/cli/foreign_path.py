@@ -8,7 +8,7 @@ import typer
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.numbers import comma_separated, number
+from armkin.cli.numbers import number, place
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ Lift = Annotated[str | None, typer.Option("--lift", metavar="MM", help="SVG: hei
 GripBy = Annotated[
     str | None, typer.Option("--grip-by", metavar="M3|M106", help="G-code: which words close and open the gripper.")
 ]
-_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 def moves(
@@ -55,7 +54,7 @@ def moves(
         raise UsageError(f"{file} needs --at X,Y,Z, for example --at 300,0,50: where its zero lies in the arm's frame")
     if grip_by not in (None, "M3", "M106"):
         raise UsageError(f"--grip-by: '{grip_by}' is neither M3 nor M106")
-    zero = comma_separated(at, _POSE[: 6 if at.count(",") > 2 else 3], "--at")
+    zero = place(at, "--at")
     factor = 1.0 if scale is None else number(scale, "--scale")
     if not 1e-6 <= factor <= 1e6:
         raise UsageError(f"--scale: '{scale}' must be from 1e-6 to 1e6")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from armkin import files
 from armkin.cli import output, unit_notes
-from armkin.cli.numbers import NOT_FINITE, comma_separated, is_number, number, numbers
+from armkin.cli.numbers import NOT_FINITE, comma_separated, is_number, number, numbers, place
 from armkin.errors import FileError, UsageError
 from armkin.model import units
 
@@ -40,8 +40,7 @@ def load(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
 
 def _six(tool: str) -> list[float]:
     """`--tool X,Y,Z[,R,P,Y]` as six numbers [mm, deg]."""
-    names = ("x", "y", "z", "roll", "pitch", "yaw")[: 6 if tool.count(",") > 2 else 3]
-    return [*comma_separated(tool, names, "--tool"), 0.0, 0.0, 0.0][:6]
+    return [*place(tool, "--tool"), 0.0, 0.0, 0.0][:6]
 
 
 def percent(text: str, option: str) -> float:

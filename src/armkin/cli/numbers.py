@@ -80,6 +80,12 @@ def comma_separated(text: str, names: Sequence[str], what: str) -> list[float]:
     return numbers(words, names, what)
 
 
+def place(text: str, what: str) -> list[float]:
+    """``X,Y,Z``, or with roll, pitch and yaw, as options take them: three numbers or six [mm, deg]."""
+    names = ("x", "y", "z", "roll", "pitch", "yaw")
+    return comma_separated(text, names[: 6 if text.count(",") > 2 else 3], what)
+
+
 def whole(text: str, name: str, low: int, high: int) -> int:
     """A whole number within bounds."""
     value = number(text, name, float("inf"))
