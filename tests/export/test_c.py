@@ -13,6 +13,7 @@ import pytest
 from exported import Exported, agreement, postures, texts_of
 
 import armkin
+import right_angles
 from armkin.export.c.program import identifier, program
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
@@ -230,9 +231,7 @@ def test_an_arm_asked_for_its_own_pose_in_few_digits_stays(robot: str, tmp_path:
     code, q = Exported(arm, tmp_path), np.clip(postures(arm, 60), arm.lower, arm.upper)
     q[:, 4] = 0.0
     if robot == "puma560":  # by right angles alone, where the position shows the rounding
-        q[0], q[4], q[8] = np.radians(
-            [[90, -75, 75, 60, 0, 30], [0, -40, -50, -45, 0, 135], [-90, 15, -105, 75, 0, 15]]
-        )
+        q[0], q[4], q[8] = np.radians(right_angles.POSTURES[robot])
     q = np.clip(q, arm.lower, arm.upper)
     for k, (near, T) in enumerate(zip(q, armkin.fk(arm, q), strict=True)):
         given = [np.round(T, 6), np.round(T, 8), T.astype(np.float32).astype(float)][k % 3]

@@ -12,6 +12,7 @@ import pytest
 from exported_js import ask, differences, goals_of
 
 import armkin
+import right_angles
 from armkin.errors import UsageError
 from armkin.export.js.program import module
 from armkin.inverse.solvers.recognise import solver
@@ -162,8 +163,7 @@ def test_the_arm_that_stands_at_its_target_stays(name: str, tmp_path: Path) -> N
 
 def test_a_rotation_by_right_angles_hides_its_rounding_but_the_position_shows_it(tmp_path: Path) -> None:
     arm = armkin.load("puma560")
-    q = np.radians([[90, -75, 75, 60, 0, 30], [0, -40, -50, -45, 0, 135], [-90, 15, -105, 75, 0, 15]])
-    q = np.tile(q, (3, 1))
+    q = np.tile(np.radians(right_angles.POSTURES["puma560"]), (3, 1))
     targets = goals_of(arm, q)
     targets[:3], targets[3:6] = targets[:3].round(4), targets[3:6].round(5)
     targets[6:] = targets[6:].astype(np.float32)

@@ -7,6 +7,7 @@ import pytest
 from test_every_branch import shipped
 
 import armkin
+import right_angles
 from armkin import Status
 from armkin.errors import UsageError
 from armkin.inverse.answers.rounding import of_targets, printed
@@ -74,19 +75,11 @@ def test_a_turn_about_one_axis_shows_its_rounding_by_its_digits() -> None:
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
 
 
-# postures [deg] with joint 5 straight whose end effector is turned by right angles alone
-RIGHT_ANGLES = {
-    "thor": [[90, -75, -15, 150, 0, -60], [90, -30, 30, -60, 0, -120], [-150, 60, -60, -165, 0, -135]],
-    "puma560": [[90, -75, 75, 60, 0, 30], [0, -40, -50, -45, 0, 135], [-90, 15, -105, 75, 0, 15]],
-    "ur5e": [[0, -75, 30, 45, 0, 90], [90, -105, 75, 120, 0, -90], [-90, -60, -45, 15, 0, 180]],
-}
-
-
-@pytest.mark.parametrize("name", RIGHT_ANGLES)
+@pytest.mark.parametrize("name", right_angles.POSTURES)
 def test_a_rotation_by_right_angles_hides_its_rounding_but_the_position_shows_it(name: str) -> None:
     """17 of 24 such postures of a Thor and 13 of a Puma turned a joint by up to 180 degrees."""
     arm, _ = shipped(name)
-    q = np.radians(RIGHT_ANGLES[name])
+    q = np.radians(right_angles.POSTURES[name])
     T, fast = armkin.fk(arm, q), armkin.compile(arm)
     np.testing.assert_allclose(T[:, :3, :3], np.rint(T[:, :3, :3]), atol=1e-14)
     for digits in ("6g", "7g", "8f", "9g", "float32"):
