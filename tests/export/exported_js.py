@@ -93,7 +93,7 @@ def _differs(arm: armkin.Arm, told: dict[str, Any], s: armkin.Solutions, k: int)
         return "" if _one_each(arm, s, k, own, theirs) else f"target {k} (boundary): other solutions"
     unit = np.where(arm.prismatic, arm.reach, 1.0)
     apart = np.abs((theirs[:, None] - own[None]) / unit).max(axis=2)
-    if (worst := float(apart.min(axis=0).max(initial=0.0))) > 1.7e-11:  # 1e-9 degrees
+    if (worst := float(apart.min(axis=0).max(initial=0.0))) > np.deg2rad(1e-9):
         return f"target {k}: joint values {worst:.1e} apart"
     if s.within_limits[k][order].tolist() != [row["within_limits"] for row in told["branches"]]:
         return f"target {k}: limits"

@@ -243,15 +243,16 @@ def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
         assert not differences(rest, [answer], s)
 
 
-def test_a_surface_of_postures_is_not_listed_once_for_each_that_was_found(tmp_path: Path) -> None:
-    """A folded iiwa7, its wrist in its shoulder: 48 rows of one surface."""
-    arm = armkin.load("iiwa7")
-    q = np.deg2rad([[0, -45, 135, 180, -180, 135, 0]])
-    [answer] = ask(arm, tmp_path, q, near=arm.home[None], targets=armkin.fk(arm, q))["ik"]
-    assert answer["status"] == "singular"
-    assert 1 <= len(answer["branches"]) <= 4
-    reached = armkin.fk(arm, np.array([row["joints"] for row in answer["branches"]]))
-    assert np.abs(reached - armkin.fk(arm, q)).max() < 2e-9 * arm.reach
+def test_surfaces_of_postures_are_counted_by_the_curves_that_they_are_swept_from(tmp_path: Path) -> None:
+    """An iiwa7 folded, its wrist in its shoulder, and stretched upwards (`tests/inverse/test_surfaces.py`)."""
+    arm = armkin.lock(armkin.load("iiwa7"), {"J7": 0.5})
+    q = np.deg2rad([[0, -45, 135, 180, -180, 135], [90, 180, 90, 180, 90, 90], [180, 0, 90, 0, 45, -180]])
+    told = ask(arm, tmp_path, q, targets=armkin.fk(arm, q))["ik"]
+    assert [len(answer["branches"]) for answer in told] == [2, 4, 1]
+    assert not differences(arm, told, armkin.ik(arm, armkin.fk(arm, q)))
+    on = np.deg2rad([[10.0, 0, 20, 0, 30, 40]])  # an arm that stands on one stays
+    [answer] = ask(arm, tmp_path, on, near=on, targets=armkin.fk(arm, on))["ik"]
+    assert [row["joints"] for row in answer["branches"]] == on.tolist()
 
 
 def test_a_held_joint_outside_its_limits_leaves_no_best_branch(tmp_path: Path) -> None:

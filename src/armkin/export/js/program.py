@@ -40,7 +40,7 @@ _ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: 
  *   reach: number, position: number, sums: number[][], offsets: number[], orientation: string, labels: string[]}} */"""
 _KEEP_OUT_IS = """/** @type {{thick: number[], solid: number, moving: number[][], shapes: {kind: number,
  *   numbers: number[]}[], crossings: number[][], pairs: string[][], clearance: number}} of segments [mm] */"""
-_SOLVER = ("numbers", "linear_algebra", "residual", "component", "singular", "ik", "closest")
+_SOLVER = ("numbers", "linear_algebra", "residual", "component", "singular", "surfaces", "ik", "closest")
 
 
 def module(arm: Arm, task_name: str | None = None) -> str:

@@ -52,7 +52,8 @@ class Examined(NamedTuple):
     """What is known of K targets.
 
     q: (K, W, n) branches, nan past the last.  valid: (K, W).  label: (K, W) the branch that a posture is, of the
-    solver's own numbering.  status: (K,).  free: (K, n).  again: (K,) more postures had to be tried.
+    solver's own numbering.  status: (K,).  free: (K, n).  again, surface: (K,) whether more postures had to be tried,
+    and whether a self-motion is a surface.
     """
 
     q: Array
@@ -61,6 +62,7 @@ class Examined(NamedTuple):
     status: NDArray[np.int8]
     free: Bool
     again: Bool
+    surface: Bool
 
 
 class _Settled(NamedTuple):
@@ -98,7 +100,7 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     else:
         more_of = again | unsettled | (found.status != Status.EXACT)
     if not more_of.any():
-        return Examined(*found[:5], again)
+        return Examined(*found[:5], again, found.surface)
     rows = np.flatnonzero(more_of)
     others, labels, open_ = more(rows, again[rows])
     if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
@@ -109,17 +111,17 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     there = again[rows] | ~np.isnan(others[:, :, 0]).all(axis=1)
     rows, others = rows[there], others[there]
     if not len(rows):
-        return Examined(*found[:5], again)
+        return Examined(*found[:5], again, found.surface)
     again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
     whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
     second = _settle(goals.of(rows), Seeds.of(np.concatenate([found.q[rows], others], axis=1), whose), HOPELESS)
     wider = ((0, 0), (0, max(second.q.shape[1] - found.q.shape[1], 0)))
     q, valid = np.pad(found.q, (*wider, (0, 0)), constant_values=np.nan), np.pad(found.valid, wider)
-    out = Examined(q, valid, np.pad(found.label, wider, constant_values=OWN), found.status, found.free, again)
+    out = Examined(q, valid, np.pad(found.label, wider, constant_values=OWN), *found[3:5], again, found.surface)
     out.q[rows], out.valid[rows], out.label[rows] = np.nan, False, OWN
     own = second.q.shape[1]
     out.q[rows, :own], out.valid[rows, :own], out.label[rows, :own] = second[:3]
-    out.status[rows], out.free[rows] = second.status, second.free
+    out.status[rows], out.free[rows], out.surface[rows] = second.status, second.free, second.surface
     return out
 
 

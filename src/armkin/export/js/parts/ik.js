@@ -113,6 +113,7 @@ const allMisses = new Float64Array(3 * ARM.branches); // squared; of a closed fo
  * @typedef {object} Row
  * @property {number[]} q actual joint values @property {number} branch @property {number[][]} [path] of a self-motion
  * @property {Component} [at] what lies around it @property {boolean} [wide] whether it is one of a surface
+ * @property {Pin} [pin] of a surface: the joint that is held on its path
  */
 
 /** Candidates of a target, in `allJoints` and `allMisses`; whether it is at an edge. @param {Float64Array} goal @param {Numbers} near */
@@ -152,7 +153,7 @@ function solutions(goal, near, edge) {
   // of two roots in one an elimination may see none: beside the target both are real on one side
   let sure = true;
   for (let k = 0; !CLOSED_FORM && k < 8; k++) sure = !seed(beside(goal, k), near, Infinity) && sure;
-  let found = components(seeds, goal);
+  let found = solutionSet(seeds, goal, near);
   if (!CLOSED_FORM && found.status === 'singular') {
     // a self-motion takes all roots of an elimination, and a target beside it has none there: others are searched for
     for (let k = 1; k <= STARTS; k++) {
@@ -165,7 +166,7 @@ function solutions(goal, near, edge) {
       }
       if (one.missed <= SOLUTION && !seeds.some((other) => apart(other.q, one.q) < 1e-7)) seeds.push({ q: one.q, branch: 0 });
     }
-    found = components(seeds, goal);
+    found = solutionSet(seeds, goal, near);
   }
   return { ...found, complete: found.complete && (CLOSED_FORM || (sure && found.status === 'exact')) };
 }
@@ -344,24 +345,24 @@ function solvesIt(near, goal, rounding) {
 function stay(found, near, goal, rounding) {
   const stand = Array.from(near);
   const own = found.findIndex((one) => {
-    if (one.path) return onPath(stand, one.path, goal);
+    if (one.path) return whileHeld(one.pin, () => onPath(stand, one.path ?? [], goal));
     return joined(one.q, near, goal) || (rounding > 0 && apart(one.q, near) < Math.sqrt(rounding));
   });
   const away = found.map((one) => apart(one.q, near));
   const like = found[own < 0 ? away.indexOf(Math.min(...away)) : own];
-  const one = { ...placed({ q: stand, branch: like?.branch ?? 0 }, near, goal), path: like?.path };
+  const one = { ...placed({ q: stand, branch: like?.branch ?? 0 }, near, goal), path: like?.path, pin: like?.pin };
   if (own < 0) found.push(one);
   else found[own] = one;
 }
 
-/** @typedef {{q: number[], branch: number, path?: number[][], rank: number, row: Branch}} Found a row at its nearest legal copy;
+/** @typedef {{q: number[], branch: number, path?: number[][], pin?: Pin, rank: number, row: Branch}} Found a row at its nearest legal copy;
  * rank: its motion in degrees and mm */
 
 /** @param {Row} solution @param {Numbers} near @param {Float64Array} goal @returns {Found} */
 function placed(solution, near, goal) {
   const q = solution.path || solution.wide ? nearest(solution, near, goal) : legal(solution.q, near);
   const [degrees, row] = [copyMotion[0], branchOf(q, solution.branch, goal, false)];
-  return { q, branch: solution.branch, path: solution.path, rank: degrees, row };
+  return { q, branch: solution.branch, path: solution.path, pin: solution.pin, rank: degrees, row };
 }
 
 /** What is told of a posture that `legal` has turned. @param {number[]} q @param {number} b its branch @param {Float64Array} goal

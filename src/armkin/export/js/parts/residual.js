@@ -3,6 +3,8 @@ const REGULAR = 1e-5; // singular value from which on a Jacobian is inverted
 /** @type {number[]} */
 const residualNumbers = []; // as `residual` leaves them, until the next one
 
+let pin = /** @type {Pin | null} */ (null); // a joint that is held counts as one more number of the target
+
 /**
  * What joint values miss of a target: lengths in reaches, angles in rad. The array is the same each time.
  * @param {Numbers} q @param {Numbers} goal @returns {number[]}
@@ -40,6 +42,7 @@ function residual(q, goal) {
     if (sine > 1e-12) out.push(...w.map((x) => (x * Math.atan2(sine, cosine)) / sine));
     else out.push(...(cosine < 0 ? [Math.PI * T[0], Math.PI * T[4], Math.PI * T[8]] : w));
   }
+  if (pin) out.push(less(pin.at, q[pin.joint], false));
   return out;
 }
 
@@ -107,6 +110,7 @@ function slope(q) {
       for (let i = 0; i < 3; i++) rows[turns + i][j] -= pose16[4 * i + 2] * along;
     }
   }
+  if (pin) return [...rows, rows[0].map((_, j) => (j === pin?.joint ? 1 : 0))];
   return rows;
 }
 

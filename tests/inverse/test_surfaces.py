@@ -1,0 +1,64 @@
+"""Self-motions of two dimensions: an iiwa7 with J7 held whose elbow is folded or stretched.
+
+Folded, its wrist is in its shoulder: the axes of joints 3 and 5 are one line, and what is left is a spherical linkage
+of three bars of 90 degrees, z1 z2, z2 z3 and z3 z6, closed by the angle between z1 and z6. For a given z2 the line z3
+is across z2 and z6: it has two senses, which are two circuits. Where z1 and z6 are at right angles z2 may be along z6,
+with z3 anywhere across it, or z3 along z1: four circuits that cross. Stretched upwards, joints 1, 3 and 5 are about one
+line.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armkin
+
+FOLDED = [
+    ([60, 60, -120, 180, -150, 180, 0], 2),
+    ([33, 71, 12, 180, 17, 50, 40], 2),
+    ([0, -90, 180, 180, 90, -90, -130], 2),
+    ([90, 180, 90, 180, 90, 90, 0], 4),
+    ([-150, 0, 105, 180, -15, -75, -45.5], 4),
+]
+
+
+def _rows(q: list[float]) -> tuple[armkin.Arm, armkin.Solutions]:
+    arm, posture = armkin.load("iiwa7"), np.deg2rad(q)
+    rest = armkin.lock(arm, {"J7": posture[6]})
+    return rest, armkin.ik(rest, armkin.fk(arm, posture))
+
+
+@pytest.mark.parametrize(("q", "count"), FOLDED)
+def test_a_folded_elbow_has_a_row_for_each_circuit_of_its_linkage(q: list[float], count: int) -> None:
+    rest, s = _rows(q)
+    rows = s.q[s.valid]
+    assert s.status == armkin.Status.SINGULAR
+    assert len(rows) == count
+    np.testing.assert_allclose(np.cos(rows[:, 3]), -1.0, atol=1e-12)
+    z1, z2, z3, _, _, z6 = np.moveaxis(armkin.jacobian(rest, rows)[:, 3:], 2, 0)
+    if count == 2:
+        assert sorted(np.sign((np.cross(z2, z6) * z3).sum(axis=1))) == [-1.0, 1.0]
+    else:
+        along = np.stack([(z3 * z1).sum(axis=1), -(z3 * z1).sum(axis=1), (z2 * z6).sum(axis=1), -(z2 * z6).sum(axis=1)])
+        assert sorted(along.argmax(axis=0)) == [0, 1, 2, 3]
+        assert s.free.tolist() == [True, True, True, False, True, True]
+
+
+@pytest.mark.parametrize(
+    "q", [[180, 0, 90, 0, 45, -180, -129.5], [-90, 180, -90, 0, 180, 90, 0], [0, 0, 0, 0, 0, 90, 9]]
+)
+def test_three_joints_about_one_line_are_one_surface(q: list[float]) -> None:
+    _, s = _rows(q)
+    assert s.status == armkin.Status.SINGULAR
+    assert s.valid.sum() == 1
+    assert s.free.tolist() == [True, False, True, False, True, False]
+
+
+def test_an_arm_that_stands_on_a_surface_stays() -> None:
+    arm, posture = armkin.load("iiwa7"), np.deg2rad([10.0, 0, 20, 0, 30, 40, 50])
+    rest = armkin.lock(arm, {"J7": posture[6]})
+    s = armkin.ik(rest, armkin.fk(arm, posture), near=posture[:6])
+    assert s.valid.sum() == 1
+    assert s.best == 0
+    assert (s.q[0] == posture[:6]).all()
