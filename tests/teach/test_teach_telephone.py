@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import io
+
+import numpy as np
 import pytest
 from browsing import COUNTS, aim, opened, settled, until, value
+from matplotlib import image
 from playwright.sync_api import Browser
 from served import served
 
@@ -17,6 +21,13 @@ gl.getExtension = function (name) {
   return extension.call(this, name);
 };
 """
+# Its lines take the picture's room.
+_NO_LEGEND = (
+    "() => Object.assign(document.querySelector('#legend').style, { position: 'absolute', visibility: 'hidden' })"
+)
+# How far down the picture its buttons reach [px].
+_BELOW = """() => document.querySelector('#views').getBoundingClientRect().bottom
+  - document.querySelector('#canvas').getBoundingClientRect().top + 2"""
 
 
 def test_a_telephone_s_window(browser: Browser) -> None:
@@ -49,6 +60,32 @@ def test_a_telephone_s_window(browser: Browser) -> None:
             settled(page)
             assert (value(page, "#box-1") != before) is turns
             assert slider.evaluate("one => one.valueAsNumber") == pytest.approx(value(page, "#box-1"), abs=0.02)
+
+
+def test_fit_fits_the_slice_of_reach_in(browser: Browser) -> None:
+    """Its voxels change the picture, and nothing at the picture's sides and lower edge."""
+    narrow = {"viewport": {"width": 390, "height": 800}, "has_touch": True}
+    with served() as server, opened(browser, server.address, **narrow) as page:
+        canvas = page.locator("#canvas")
+
+        def picture() -> np.ndarray:
+            until(page, "document.querySelector('#canvas').dataset.coarse === 'false'")
+            return image.imread(io.BytesIO(canvas.screenshot()))[..., :3]
+
+        page.get_by_role("button", name="Slice").click()
+        until(page, "document.getElementById('legend').innerText.includes('voxels')")
+        page.evaluate(_NO_LEGEND)
+        page.get_by_role("button", name="Fit").click()
+        page.wait_for_timeout(100)
+        shown = picture()
+        page.get_by_role("button", name="Slice").click()
+        page.wait_for_timeout(100)
+        changed = (shown != picture()).any(axis=2)
+        changed[: int(page.evaluate(_BELOW))] = False  # the buttons
+        assert changed.sum() > 0.05 * changed.size
+        assert not changed[:, :4].any()
+        assert not changed[:, -4:].any()
+        assert not changed[-4:].any()
 
 
 def test_what_went_wrong_is_seen_wherever_one_has_scrolled_to(browser: Browser) -> None:

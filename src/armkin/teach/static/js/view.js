@@ -113,7 +113,7 @@ export class View {
     const [x, y, z] = /** @type {Object<string, number[]>} */ (EYES)[name]
       ?? this.camera.position.clone().sub(this.orbit.target).setLength(2.1).toArray();
     const box = this.box();
-    for (const body of this.ghosts.bodies.flat()) if (body.visible) box.expandByObject(body);
+    for (const one of [...this.ghosts.bodies.flat(), this.cloud, this.slice.cubes]) if (one?.visible) box.expandByObject(one);
     const size = Math.max(0.9 * this.arm.reach, 0.8 * box.getSize(this.middle).length());
     box.getCenter(this.middle);
     this.orbit.target.copy(this.middle);
@@ -210,7 +210,7 @@ export class View {
     const height = clientHeight * (1 - this.covered);
     // A narrow window sees as much to its sides as a square one.
     const aspect = clientWidth / height;
-    this.camera.fov = aspect < 1 ? 36 / aspect ** 0.7 : 36;
+    this.camera.fov = (360 / Math.PI) * Math.atan(Math.tan(Math.PI / 10) / Math.min(aspect, 1));
     this.camera.setViewOffset(clientWidth, height, 0, height - clientHeight, clientWidth, clientHeight);
     this.now();
   }
