@@ -112,7 +112,7 @@ const allMisses = new Float64Array(3 * ARM.branches); // squared; of a closed fo
 /**
  * @typedef {object} Row
  * @property {number[]} q actual joint values @property {number} branch @property {number[][]} [path] of a self-motion
- * @property {Component} [at] what lies around it @property {boolean} [wide] whether it is one of a surface
+ * @property {Component} [at] what lies around it @property {Pair[]} [wide] of a surface: joints about one line
  * @property {Pin} [pin] of a surface: the joint that is held on its path
  */
 
@@ -201,7 +201,7 @@ function components(seeds, goal) {
   for (const { seed } of ranked) {
     const known = (/** @type {Row} */ row) => {
       if (row.path) return onPath(seed.q, row.path, goal);
-      if (row.wide) return walked(seed.q, row.q, goal);
+      if (row.wide) return row.wide.length ? row.wide.every((pair) => aboutOneLine(seed.q, pair)) : walked(seed.q, row.q, goal);
       return row.at ? apart(row.q, seed.q) < 1e-7 || onComponent(row.at, row.q, seed.q) : joined(row.q, seed.q, goal);
     };
     const crosses = met.includes(seed);
@@ -223,7 +223,7 @@ function components(seeds, goal) {
       continue;
     }
     if (!crosses && rows.some((row) => straight(row.q, seed.q, goal))) continue;
-    if (kind === 'surface') rows.push({ ...seed, wide: true });
+    if (kind === 'surface') rows.push({ ...seed, wide: pairsAt(seed.q) });
     for (const path of paths) {
       if (rows.some((row) => row.path && oneCurve(path, row.path, goal))) continue;
       rows.push({ ...seed, path });

@@ -2,7 +2,6 @@
 // target wherever the others are. A surface of postures that they sweep is a circle times a curve, and with the second of
 // the two held it is that curve: each curve of the others is a surface of its own.
 const ONE_LINE = 4.5e-4; // difference of columns of the Jacobian; where an elbow is stretched they are known to the root of rounding
-const HELD_STARTS = 64; // postures from which curves are searched for while a joint is held
 
 /** @typedef {{joint: number, at: number}} Pin a joint that is held, and where */
 /** @typedef {{i: number, j: number, way: number}} Pair joints about one line; the first turns by `way` as the second is turned back */
@@ -35,46 +34,35 @@ function pairsAt(q) {
 }
 
 /**
- * What `components` lists, a row for each curve in place of those of surfaces. Where three joints are about one line, the two of
- * them that sweep the most surfaces tell.
+ * What `components` lists, a row for each curve in place of those of surfaces. Where three joints are about one line, two of them
+ * that are so at the most seeds sweep the most surfaces.
  * @param {Row[]} seeds @param {Float64Array} goal @param {Numbers} near
  */
 function solutionSet(seeds, goal, near) {
   const found = components(seeds, goal);
-  const wide = found.rows.filter((row) => row.wide);
-  /** @type {Map<string, Pair>} */
-  const pairs = new Map(wide.flatMap((row) => pairsAt(row.q).map((pair) => [`${pair.i} ${pair.j} ${pair.way}`, pair])));
-  let most = /** @type {{rows: Row[], free: number[], pair: Pair} | null} */ (null);
-  for (const pair of pairs.values()) {
-    const curves = curvesOf(seeds, goal, near, pair);
-    if (curves.rows.length > (most ? most.rows.length : 0)) most = curves;
-  }
-  if (!most) return found;
-  const { pair, rows, free } = most;
-  const others = found.rows.filter((row) => !aboutOneLine(row.q, pair));
+  const pairs = found.rows.flatMap((row) => row.wide ?? []);
+  const on = pairs.map((pair) => seeds.filter((seed) => aboutOneLine(seed.q, pair)));
+  const most = on.reduce((best, some, k) => (some.length > (on[best]?.length ?? 0) ? k : best), 0);
+  if (!pairs.length) return found;
+  const { rows, free } = curvesOf(on[most], goal, near, pairs[most]);
+  if (!rows.length) return found;
+  const others = found.rows.filter((row) => !aboutOneLine(row.q, pairs[most]));
   const moves = new Set([...found.free, ...free]);
   return { ...found, rows: [...others, ...rows], free: [...moves].sort((a, b) => a - b) };
 }
 
 /** The curves of a target with the second joint of a pair held where `near` has it, and the joints that move.
- * @param {Row[]} seeds @param {Float64Array} goal @param {Numbers} near @param {Pair} pair */
+ * @param {Row[]} seeds on surfaces @param {Float64Array} goal @param {Numbers} near @param {Pair} pair */
 function curvesOf(seeds, goal, near, pair) {
   const { i, j, way } = pair;
   const own = { joint: j, at: near[j] };
-  const turned = seeds.filter((seed) => aboutOneLine(seed.q, pair)).map((seed) => {
+  const turned = seeds.map((seed) => {
     const q = seed.q.slice();
     q[i] += way * (q[j] - near[j]);
     q[j] = near[j];
     return { q, branch: seed.branch };
   });
-  const { rows, free } = whileHeld(own, () => {
-    for (let k = 1; k <= HELD_STARTS; k++) {
-      const start = ARM.unit.map((unit, m) => (m === j ? near[j] : unit * Math.PI * (2 * ((k * Math.sqrt(2 + 3 * m + m * m)) % 1) - 1)));
-      const { q, missed: off } = newton(start, goal, 25);
-      if (off <= SOLUTION && !turned.some((one) => apart(one.q, q) < 1e-7)) turned.push({ q, branch: 0 });
-    }
-    return components(turned, goal);
-  });
+  const { rows, free } = whileHeld(own, () => components(turned, goal));
   const on = rows.filter((row) => row.path && aboutOneLine(row.q, pair)).map((row) => ({ ...row, pin: own }));
-  return { rows: on, free: [...free, i, j], pair };
+  return { rows: on, free: [...free, i, j] };
 }
