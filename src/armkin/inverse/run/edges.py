@@ -13,7 +13,7 @@ from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
 from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, NEARBY, SAME
-from armkin.inverse.singular import linkages, near_itself, surfaces
+from armkin.inverse.singular import components, linkages, near_itself, surfaces
 
 AT_ONCE = 1024  # targets examined together
 
@@ -191,7 +191,9 @@ def examined(
 
         arrays: tuple[NDArray[Any], ...] = seeds
         part = Seeds(*(array[start : start + AT_ONCE] for array in arrays))
-        seen = surfaces.examined(some, part, more, None if unsettled is None else unsettled[rows])
+        seen = components.examine(some, part, more, None if unsettled is None else unsettled[rows])
+        if seen.surface.any():
+            seen = surfaces.swept(some, seen)
         width = seen.q.shape[1]
         if width > out.q.shape[1]:
             out = wider(out, width)

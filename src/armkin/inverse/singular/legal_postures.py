@@ -17,7 +17,7 @@ from armkin.inverse.answers.closest import thorough
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, CLOSED, SAME, SOLUTION
-from armkin.inverse.singular import surfaces
+from armkin.inverse.singular import components, surfaces
 from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def with_legal_postures(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Bat
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = out.branch[k, out.valid[k]].astype(np.int64)
-        found = surfaces.examined(beside, Seeds.of(q[None], label), surfaces.no_more(arm))
+        found = surfaces.swept(beside, components.examine(beside, Seeds.of(q[None], label), surfaces.no_more(arm)))
         _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
         if not (inside & found.valid[0]).any():
             continue

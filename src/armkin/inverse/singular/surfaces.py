@@ -27,9 +27,8 @@ if TYPE_CHECKING:
 Pair = tuple[int, int, float]  # joints about one line, and the way of the first for a turn of the second
 
 
-def examined(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None) -> Examined:
-    """`components.examine`, surfaces listed by the curves that they are swept from."""
-    seen = examine(goals, seeds, more, unsettled)
+def swept(goals: Goals, seen: Examined) -> Examined:
+    """The same, surfaces listed by the curves that they are swept from."""
     if goals.task.orientation == "none":  # sums of joint values are those of all joints
         return seen
     for k in np.flatnonzero(seen.surface):
