@@ -30,6 +30,8 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     Raises UsageError if the task does not fit the arm.
     """
     task = task_for(arm, task_name)
+    if task_name is None:  # the same geometry, prepared once, as that of the task by its name
+        return solver(arm, task.name)
     if arm.n > task.constraints:
         surplus = arm.n - task.constraints
         raise redundant(
