@@ -185,6 +185,7 @@ SLOW: dict[str, tuple[str, ...]] = {
     "compiled/test_compiled.py": (),
     "compiled/test_folds.py": (),
     "compiled/test_lanes.py": (),
+    "compiled/test_tasks.py": ("test_a_task_by_name_is_built_alone",),
     "compiled/test_toolchain.py": ("test_a_compiler_that_takes_too_long_to_optimise_does_not",),
     "engines/test_cluster.py": (
         "test_a_batch_is_the_same_bytes_on_a_cluster",

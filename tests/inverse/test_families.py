@@ -359,7 +359,7 @@ def test_a_joint_that_turns_about_the_tool_is_redundant_where_its_axis_alone_is_
     there = armkin.fk(arm, turned)
     off = np.abs(np.concatenate([there[..., :3, 3], there[..., :3, 2]], axis=-1) - target[:, None])
     assert off[s.valid].max() <= 1e-9 * arm.reach
-    fast = armkin.compile(arm).ik(target, "xyz_axis", near=q)
+    fast = armkin.compile(arm, "xyz_axis").ik(target, "xyz_axis", near=q)
     np.testing.assert_allclose(fast.q, s.q, atol=1e-9)
     assert (fast.complete == s.complete).all()
 

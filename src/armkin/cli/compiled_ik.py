@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def prepare(arm: Arm) -> None:
+def prepare(arm: Arm, task: str | None = None) -> None:
     """Build the machine code, before there are processes, which then have it, too."""
     import armkin
 
-    armkin.compile(arm)
+    armkin.compile(arm, task)
 
 
 def ik(
@@ -26,14 +26,14 @@ def ik(
     """`armkin.ik`."""
     import armkin
 
-    return armkin.compile(arm).ik(targets, task, near, rounding=rounding)
+    return armkin.compile(arm, task).ik(targets, task, near, rounding=rounding)
 
 
-def fk(arm: Arm, q: Array) -> Array:
-    """`armkin.fk`."""
+def fk(arm: Arm, q: Array, task: str | None = None) -> Array:
+    """`armkin.fk`; task: whose library serves."""
     import armkin
 
-    return armkin.compile(arm).fk(q)
+    return armkin.compile(arm, task).fk(q)
 
 
 def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:

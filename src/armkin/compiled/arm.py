@@ -30,6 +30,7 @@ from armkin.inverse.run.workers import check, shared
 from armkin.inverse.singular import near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
+from armkin.inverse.tasks.fitting import default_task
 from armkin.inverse.tasks.task import distance, read_targets
 from armkin.keep_out.clearance import Clearance, clearance, least, named
 from armkin.model.arm import actual
@@ -44,10 +45,10 @@ BLOCK = 16384  # poses of an elimination whose results are kept in all columns
 UNREAD = 2  # state of a target that must be read (made a rotation, refused) first: parts/batch.c
 
 
-@lru_cache(maxsize=16)
-def compile(arm: Arm) -> CompiledArm:
+def compile(arm: Arm, task: str | None = None) -> CompiledArm:
     """An arm whose `fk` and `ik` run as machine code, built now by the system's C compiler and kept for later.
 
+    task: for whose `ik` it is built now, the arm's usual one if None; for another task it is built at its first use.
     The results are those of `armkin.fk` and `armkin.ik`, to rounding; targets on an edge that C does not tell (singular
     postures, roots in doubt) and classes without a form in C are solved by `armkin.ik` itself. Raises
     MissingExtraError without a C compiler.
@@ -57,6 +58,13 @@ def compile(arm: Arm) -> CompiledArm:
     >>> fast.ik([390, 80, 300]).valid.sum()
     np.int64(4)
     """
+    found = _compiled(arm)
+    found._of(task)
+    return found
+
+
+@lru_cache(maxsize=16)
+def _compiled(arm: Arm) -> CompiledArm:
     return CompiledArm(arm)
 
 
@@ -67,22 +75,21 @@ class CompiledArm:
         self.arm = arm
         self._tasks: dict[str | None, _CompiledTask] = {}
         self._lock = threading.Lock()
-        self._of(None)
 
     def __repr__(self) -> str:
         return f"<CompiledArm {self.arm.name}>"
 
     def fk(self, q: ArrayLike, *, workers: int = 1) -> Array:
         """Pose of the tool, as `armkin.fk`: q (..., n) [rad | mm] -> (..., 4, 4) [mm]."""
-        return self._of(None).fk(q, workers)
+        return self._any().fk(q, workers)
 
     def position(self, q: ArrayLike, *, workers: int = 1) -> Array:
         """Position of the tool alone: q (..., n) [rad | mm] -> (..., 3) [mm]."""
-        return self._of(None).position(q, workers)
+        return self._any().position(q, workers)
 
     def clearance(self, q: ArrayLike) -> Clearance:
         """How far the arm is from hitting anything, as `armkin.clearance`."""
-        return self._of(None).clearance(q)
+        return self._any().clearance(q)
 
     def ik(
         self,
@@ -98,6 +105,10 @@ class CompiledArm:
             check(workers)
         return (self._tasks.get(task) or self._of(task)).ik(targets, near, workers, rounding)
 
+    def _any(self) -> _CompiledTask:
+        """A library: each has the chain, whatever its task."""
+        return next(iter(self._tasks.values()))
+
     def _of(self, task: str | None) -> _CompiledTask:
         """The library for a task, built at its first use."""
         found = self._tasks.get(task)
@@ -105,9 +116,9 @@ class CompiledArm:
             with self._lock:
                 found = self._tasks.get(task)
                 if found is None:
-                    usual = self._tasks.get(None)
-                    same = usual is not None and bool(usual.branches) and usual.task.name == task
-                    found = self._tasks[task] = usual if usual is not None and same else _CompiledTask(self.arm, task)
+                    name = task or default_task(self.arm)
+                    same = (built for built in self._tasks.values() if built.branches and built.task.name == name)
+                    found = self._tasks[task] = next(same, None) or _CompiledTask(self.arm, task)
         return found
 
 
@@ -331,14 +342,14 @@ class _CompiledTask:
 
     def _commanded(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None) -> Solutions:
         """A calibrated arm, by way of its actual joint values."""
-        inner = compile(self.turned)
+        inner = compile(self.turned, self.name)
         close = solve._actual_near(self.arm, near)
         return solve._commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=said))
 
 
 def _of_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = True, **options: Any) -> Solutions:
     """`armkin.ik` of an arm whose redundant joint is held, from machine code."""
-    return compile(arm).ik(targets, task, **options)
+    return compile(arm, task).ik(targets, task, **options)
 
 
 def _class_of(arm: Arm, name: str | None) -> tuple[Task | None, Geometry | None]:

@@ -56,7 +56,7 @@ class QuickIk:
         from armkin.compiled.arm import compile
 
         with suppress(ArmkinError):  # no compiler, or nowhere to build: Python goes on
-            built = compile(arm)
+            built = compile(arm, task)
             home = targets_of(solver(actual(arm), task)[0], fk(arm, arm.home)[None], arm.home[None])
             built.ik(home, task, arm.home)  # the task's own library
             self._built = built

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -105,8 +106,8 @@ def ik(
     if compiled and sweep:
         raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
     if compiled:
-        request = replace(request, ik=compiled_ik.ik, fk=compiled_ik.fk)
-        compiled_ik.prepare(arm)
+        request = replace(request, ik=compiled_ik.ik, fk=partial(compiled_ik.fk, task=what.name))
+        compiled_ik.prepare(arm, what.name)
     if continuous and batch is None:
         raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
     if batch is not None or (reached is not None and len(reached) > 1):

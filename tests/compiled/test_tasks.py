@@ -1,0 +1,42 @@
+"""`armkin.compile` of an arm for a task: no library is built that nobody asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armkin
+from armkin.compiled import arm as compiled_arm
+from armkin.compiled import toolchain
+
+
+def loaded(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What libraries hold as `arm_content` from now on, one by one; no arm has any yet."""
+    contents: list[str] = []
+    load = toolchain.load
+
+    def counted(source: str, content: str, level: int = 3) -> object:
+        contents.append(content)
+        return load(source, content, level)
+
+    monkeypatch.setattr(toolchain, "load", counted)
+    compiled_arm._compiled.cache_clear()
+    return contents
+
+
+def test_a_task_by_name_is_built_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The arm's usual task, and that of the arm whose last joint is held, were built, too."""
+    arm, contents = armkin.load("ur5e"), loaded(monkeypatch)
+    fast = armkin.compile(arm, "xyz_axis")
+    T = armkin.fk(arm, arm.home)
+    np.testing.assert_allclose(fast.fk(arm.home), T, atol=1e-9)
+    found = fast.ik(np.concatenate([T[:3, 3], T[:3, 2]]), "xyz_axis")
+    assert found.status == armkin.Status.EXACT
+    assert len(contents) == 2  # the chain; five joints, a sixth held
+
+
+def test_the_usual_task_by_its_name_is_the_usual_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm, contents = armkin.load("three_dof"), loaded(monkeypatch)
+    for task in ("xyz", None, "xyz"):
+        assert armkin.compile(arm, task).ik([390, 80, 300], task).valid.sum() == 4
+    assert len(contents) == 1
