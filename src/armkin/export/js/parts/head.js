@@ -1,5 +1,5 @@
 /** @typedef {ArrayLike<number>} Numbers */
-/** @typedef {number[] | number[][]} Target */
+/** @typedef {Numbers | Numbers[]} Target numbers of the task, or a pose's rows */
 /** @typedef {'exact' | 'boundary' | 'singular' | 'unreachable'} Status */
 /** @typedef {{joint: string, value: number, lower: number | null, upper: number | null}} Violation */
 /** @typedef {{body: string, with: string, depth_mm: number}} Hit */
