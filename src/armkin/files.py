@@ -6,7 +6,7 @@ import errno
 import os
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import IO, Any, Literal
 
@@ -16,6 +16,7 @@ _APPEND = {"w": "a", "wb": "ab"}
 
 
 _ROBOT = rb"(?m)^convention[ \t]*:", rb"(?m)^joints[ \t]*:"
+_DATA = (".csv", ".jsonl", ".npz", ".parquet")  # before another ending it is not clear which one is meant
 _HEAD = 2_000_000  # [bytes] of a file that are looked at: robot files are shorter
 _kept: set[tuple[int, int]] = set()  # device and inode of the files that the running command reads
 
@@ -90,6 +91,29 @@ def check(path: str | os.PathLike[str]) -> None:
     folder = os.path.dirname(real)
     if not os.path.isdir(folder):
         raise FileError(f"{name}: cannot write: there is no folder {os.path.dirname(name)}", file=name)
+
+
+def ending(path: str | os.PathLike[str], what: str, allowed: Sequence[str], *, bare: bool = False) -> str:
+    """The ending of a file's name, in lower case: what the file is written as, one of `allowed`.
+
+    what: such a file's content with its verb, for the message. bare: a name without an ending will do, too, and
+    gives ""; so does a pipe or device, whatever its name. Raises UsageError for another ending, and for two.
+
+    >>> ending("poses.NPZ", "rows are", (".csv", ".npz"))
+    '.npz'
+    """
+    name = os.fspath(path)
+    stem, end = os.path.splitext(name.lower())
+    before = os.path.splitext(stem)[1]
+    if bare and (not end or (os.path.exists(name) and not os.path.isfile(name))):
+        return ""
+    if end not in allowed:
+        *others, last = allowed
+        kinds, them = (f"{', '.join(others)} or {last}", "one of them") if others else (last, "that")
+        raise UsageError(f"{name}: {what} written as {kinds}; end the file's name with {them}")
+    if before in (*allowed, *_DATA):
+        raise UsageError(f"{name}: its name has two endings, {before} and {end}; end it with one of them")
+    return end
 
 
 def _is_stream(there: os.stat_result) -> bool:

@@ -74,7 +74,7 @@ def test_a_picture_has_the_measure_that_colours_it(tmp_path: Path) -> None:
         (["--grid", "5,5"], "a grid needs 3 numbers of points, or one for all; got 2"),
         (["--samples", "5", "--grid", "5"], "samples (random) and a grid: give one of the two"),
         (["--measure", "speed"], "there is no measure 'speed'"),
-        (["--out", "cloud.xyz"], "a cloud is written as .csv, .npz, .ply"),
+        (["--out", "cloud.xyz"], "a cloud is written as .csv, .npz or .ply"),
         (["--plot", "cloud.jpg"], "a picture is written as .png or .svg"),
         (["--color", "z"], "--color is for the picture; add --plot FILE"),
         (["--plot", "cloud.png", "--color", "red"], "there is no colour 'red'"),

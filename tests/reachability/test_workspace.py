@@ -339,7 +339,7 @@ def bad_calls() -> Iterator[tuple[dict[str, object], str]]:
     yield {"measures": ["speed"]}, "there is no measure 'speed'; there are manipulability, step_error"
     yield (
         {"out": "cloud.txt"},
-        ("cloud.txt: a cloud is written as .csv, .npz, .ply; end the file's name with one of them"),
+        ("cloud.txt: a cloud is written as .csv, .npz or .ply; end the file's name with one of them"),
     )
 
 

@@ -176,8 +176,8 @@ class Batch:
         """Answer all pieces."""
         to_file = self.out is not None and self.out != "-"
         format = format_of(self.out if to_file else None)
-        if self.as_json and not format.is_text:
-            raise UsageError(f"--json and --out {self.out}: JSON is text; leave one away")
+        if self.as_json and (not format.is_text or str(self.out).lower().endswith(".csv")):
+            raise UsageError(f"--json and --out {self.out}: JSON is text; leave one away, or end the name with .jsonl")
         if self.resume and not to_file:
             raise UsageError("--resume goes on with --out FILE; give the file")
         job = Job(self.questions, self.as_json, "" if format.name == "csv" else f".{format.name}", self.compiled)

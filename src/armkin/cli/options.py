@@ -1,11 +1,12 @@
 """Arguments and options that several commands share: same name, same meaning, same help."""
 
 import sys
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import typer
 
-from armkin.cli import completion
+from armkin.cli import completion, output
 from armkin.cli.numbers import whole
 
 Robot = Annotated[
@@ -54,6 +55,35 @@ Batch = Annotated[
         help="Many at once, a row each: CSV (or standard input), .npz, .parquet, .jsonl. Gives CSV; see --out.",
     ),
 ]
+
+
+def ending(what: str, *allowed: str) -> Callable[[str | None], str | None]:
+    """A check of a file's name before any work: it ends as what is written to it, or has no ending."""
+
+    def check(path: str | None) -> str | None:
+        if path:
+            from armkin import files
+
+            files.ending(path, what, allowed, bare=True)
+        return path
+
+    return check
+
+
+def _out(what: str, *allowed: str) -> Any:
+    return typer.Option(
+        "--out",
+        "-o",
+        metavar="FILE|-",
+        callback=ending(what, *allowed),
+        help=f"Write to a file, whole or not at all: {', '.join(allowed)}.",
+    )
+
+
+TextOut = Annotated[str | None, _out("an answer is", *output.TEXT)]
+SchemaOut = Annotated[str | None, _out("a schema is", ".json")]
+RobotOut = Annotated[str | None, _out("a robot file is", ".yaml", ".yml")]
+RowsOut = Annotated[str | None, _out("rows of joint values are", ".csv")]
 Out = Annotated[
     str | None,
     typer.Option("--out", "-o", metavar="FILE|-", help="Write to a file, which appears whole or not at all."),
@@ -64,7 +94,7 @@ BatchOut = Annotated[
         "--out",
         "-o",
         metavar="FILE|-",
-        help="Write to a file, whole or not at all; a batch by its ending: .csv, .npz, .parquet, .jsonl.",
+        help="Write to a file, whole or not at all: .txt, .json; a batch .csv, .npz, .parquet, .jsonl.",
     ),
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="With --batch and --out: go on where an earlier run was ended.")]

@@ -3,20 +3,24 @@
 import math
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol, TextIO
 
 Write = Callable[[str], object]
 _COLOURS = {"note": "36", "warning": "33", "error": "31"}
 _LONGEST = {"error": 240, "warning": 1000, "note": 1000}  # characters of a line; an error may quote a long word
+TEXT = (".txt", ".json")  # endings of an answer in a file
 _broken: list[str] = []  # words of the command line that have line breaks in them
 _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warnings so far
 
 
 @contextmanager
-def destination(path: str | None) -> Iterator[Write]:
-    """The function that writes a command's data: to stdout ("-"), or to a file that appears whole or not at all."""
+def destination(path: str | None, what: str = "", endings: Sequence[str] = ()) -> Iterator[Write]:
+    """The function that writes a command's data: to stdout ("-"), or to a file that appears whole or not at all.
+
+    what, endings: what is written, and how the file's name may end (`files.ending`), where no option has checked it.
+    """
     from armkin.errors import FileError, UsageError
 
     if path == "":
@@ -24,6 +28,9 @@ def destination(path: str | None) -> Iterator[Write]:
     if path is not None and path != "-":
         from armkin import files
 
+        if endings:
+            files.check(path)
+            files.ending(path, what, endings, bare=True)
         with files.whole(path) as file:
             yield file.write
     elif sys.stdout is None:

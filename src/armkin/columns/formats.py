@@ -5,10 +5,10 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import IO
 
 from armkin.columns import npz, parquet, text
+from armkin.files import ending
 
 Source = Callable[[], Iterable[IO[bytes]]]  # opens the parts, one after the other, as often as it is called
 
@@ -31,16 +31,21 @@ def _joined(file: IO[bytes], parts: Source) -> None:
 CSV = Format("csv", text.csv, _joined, is_text=True)
 JSON_LINES = Format("jsonl", text.json_lines, _joined, is_text=True)
 _BY_ENDING = {
-    ".jsonl": JSON_LINES,
     ".npz": Format("npz", npz.encoded, npz.together),
     ".parquet": Format("parquet", parquet.encoded, parquet.together),
+    ".jsonl": JSON_LINES,
+    ".csv": CSV,
+    "": CSV,
 }
+ENDINGS = tuple(name for name in _BY_ENDING if name)
 
 
 def format_of(path: str | None) -> Format:
-    """By the ending of a file's name; a pipe, no name and every other ending are CSV.
+    """By the ending of a file's name; no name, a name without an ending and a pipe are CSV.
 
-    >>> format_of("poses.npz").name, format_of("-").name, format_of("poses.txt").name
-    ('npz', 'csv', 'csv')
+    Raises UsageError for another ending.
+
+    >>> format_of("poses.npz").name, format_of("-").name
+    ('npz', 'csv')
     """
-    return _BY_ENDING.get(Path(path).suffix.lower(), CSV) if path is not None else CSV
+    return CSV if path is None else _BY_ENDING[ending(path, "rows are", ENDINGS, bare=True)]

@@ -7,13 +7,12 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from armkin.errors import MissingExtraError, UsageError
-from armkin.files import whole
+from armkin.files import ending, whole
 from armkin.formula.arrays import Array
 
 INK, SOFT, FAINT = "#1b1f24", "#6a737d", "#d5dae0"
@@ -45,10 +44,7 @@ _STYLE: dict[Any, Any] = {
 
 def check(path: str) -> str:
     """The kind of picture that a file's name asks for."""
-    end = Path(path).suffix.lower()
-    if end not in _ENDS:
-        raise UsageError(f"{path}: a picture is written as .png or .svg; end the file's name with one of them")
-    return end[1:]
+    return ending(path, "a picture is", _ENDS)[1:]
 
 
 def require() -> None:

@@ -14,13 +14,11 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from armkin.errors import UsageError
-from armkin.files import whole
+from armkin.files import ending, whole
 from armkin.formula.arrays import Array
 from armkin.model import units
 
@@ -34,10 +32,7 @@ _ENDS = (".csv", ".npz", ".ply")
 
 def check(path: str) -> str:
     """The kind of cloud that a file's name asks for."""
-    end = Path(path).suffix.lower()
-    if end not in _ENDS:
-        raise UsageError(f"{path}: a cloud is written as {', '.join(_ENDS)}; end the file's name with one of them")
-    return end
+    return ending(path, "a cloud is", _ENDS)
 
 
 @contextmanager

@@ -7,7 +7,6 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from armkin.columns.parts import Parts
 from armkin.columns.table import Table
 from armkin.engines.run import Engine
 from armkin.errors import UsageError
-from armkin.files import check, whole
+from armkin.files import check, ending, whole
 from armkin.formula.arrays import Array
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import actual
@@ -167,10 +166,9 @@ class _Run:
         self.volume = 0.0
         self.parts: Parts | None = None
         if out is not None:
-            if Path(out).suffix.lower() not in (".npz", ".parquet", ".csv"):
-                raise UsageError(f"{out}: a map is written as .npz, .parquet or .csv; end the name with one of them")
+            end = ending(out, "a map is", (".npz", ".parquet", ".csv"))
             check(out)
-            if format_of(out).name == "parquet":
+            if end == ".parquet":
                 from armkin.columns.parquet import require
 
                 require()

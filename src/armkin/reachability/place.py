@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin import __version__, files
+from armkin.columns.formats import ENDINGS
 from armkin.columns.parts import Parts, digest
 from armkin.columns.table import Table
 from armkin.engines.run import Engine
@@ -235,8 +236,7 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
     """What is answered, kept beside the file until it stands."""
     if out is None:
         return None
-    if not os.fspath(out).lower().endswith((".npz", ".parquet", ".jsonl", ".csv")):
-        raise UsageError(f"{out}: places are written as .npz, .parquet, .jsonl or .csv; end the name with one of them")
+    files.ending(out, "places are", ENDINGS)
     files.check(os.fspath(out))
     robots = [
         [one.arm.sha256, one.around.sha256, digest(one.targets.tobytes()), *one.ways, *one.values] for one in questions

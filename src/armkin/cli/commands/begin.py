@@ -11,7 +11,7 @@ from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import NoScene
 from armkin.cli.keys import Keys, keys
-from armkin.cli.options import Out, Robot, Scene
+from armkin.cli.options import Robot, RobotOut, Scene
 from armkin.errors import ArmkinError, FileError, UsageError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def begin(
     port: PortName = None,
     scene: Scene = None,
     no_scene: NoScene = False,
-    out: Out = None,
+    out: RobotOut = None,
     baud: Baud = None,
     no_reset: NoReset = False,
 ) -> None:

@@ -10,11 +10,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.options import Meshes, Out, Robot, Scene, TaskName
+from armkin.cli.options import Meshes, Out, Robot, Scene, TaskName, ending
 from armkin.errors import RedundantArmError, UsageError
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+
+
+_ROBOT_FILE = (".yaml", ".yml")
+_ENDINGS = {
+    "--urdf": (".urdf", ".xml"),
+    "--dh": _ROBOT_FILE,
+    "--mdh": _ROBOT_FILE,
+    "--screws": _ROBOT_FILE,
+    "--json": (".json",),
+    "--js": (".js", ".mjs"),
+    "--html": (".html", ".htm"),
+}
 
 
 def export(
@@ -72,6 +84,8 @@ def export(
         raise UsageError("--path goes with --html alone")
     if meshes is not None and not html:
         raise UsageError("--meshes goes with --html alone")
+    if not c:
+        ending(f"export {asked[0]} is", *_ENDINGS[asked[0]])(out)
     kinds[asked[0]][1](inputs.load(robot, scene))
 
 

@@ -55,7 +55,7 @@ def fk(
         if len(values) == 1:
             inputs.one_alone(workers, cluster, resume)
             [answer] = _answers(arm, one_row(values[0]), frames, compiled)
-            with output.destination(out) as write:
+            with output.destination(out, "one answer is", output.TEXT) as write:
                 write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
             render.warn_of_limits(arm, answer["violations"], answer)
             return

@@ -143,7 +143,7 @@ def ik(
     words = None if reached is not None else [[decimals(word) for word in target or ()]]
     [found] = choose_branch.solve(request, goal, _rounding(arm, what, values, words))
     answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
-    with output.destination(out) as write:
+    with output.destination(out, "one answer is", output.TEXT) as write:
         write(f"{render.to_json(answer)}\n" if json else ik_text.text(arm, answer))
     if answer["best"] is None and answer["closest"] is None:
         raise choose_branch.blocked(request, found)

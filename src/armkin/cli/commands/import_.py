@@ -9,7 +9,7 @@ import typer
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.options import Out
+from armkin.cli.options import RobotOut
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def import_(
     ] = None,
     dh: Annotated[bool, typer.Option("--dh", help="A DH table instead of screws, if the arm has one.")] = False,
     snap: Annotated[bool, typer.Option("--snap", help="Angles within 1e-4 rad of a right angle become one.")] = False,
-    out: Out = None,
+    out: RobotOut = None,
 ) -> None:
     """A robot file from a URDF.
 

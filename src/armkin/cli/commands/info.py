@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from armkin.cli import inputs, output, render
-from armkin.cli.options import Json, Out, Robot, Scene, TaskName
+from armkin.cli.options import Json, Robot, Scene, TaskName, TextOut
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.model.targets import label_units
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from armkin.robot_file import Joint, Motor, RobotFile
 
 
-def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = False, out: Out = None) -> None:
+def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = False, out: TextOut = None) -> None:
     """What a robot file says, checked.
 
     DH table or screws, limits and home, the step chain with pulses per turn and degrees per pulse, the

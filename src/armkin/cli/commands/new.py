@@ -14,7 +14,7 @@ import typer
 
 from armkin.cli import inputs, output
 from armkin.cli.numbers import number, of_pi, whole
-from armkin.cli.options import Out
+from armkin.cli.options import RobotOut
 from armkin.errors import FileError, RobotFileError, UsageError
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def new(
         float | None,
         typer.Option("--floor", metavar="Z", help="A keep-out: nothing of the arm goes below this z, in mm."),
     ] = None,
-    out: Out = None,
+    out: RobotOut = None,
 ) -> None:
     """A robot file from a DH table, commented.
 

@@ -13,7 +13,7 @@ from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.foreign_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import comma_separated, number, whole
-from armkin.cli.options import BranchName, Json, Lock, Near, Robot, Scene, TaskName, Tool
+from armkin.cli.options import BranchName, Json, Lock, Near, Robot, Scene, TaskName, Tool, ending
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -86,7 +86,13 @@ def path(
     ] = None,
     out: Annotated[
         str | None,
-        typer.Option("--out", "-o", metavar="FILE|-", help="The plan as CSV: joints over time; whole or not at all."),
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE|-",
+            callback=ending("a plan is", ".csv"),
+            help="The plan as CSV: joints over time; whole or not at all.",
+        ),
     ] = None,
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
     assume: Assume = None,

@@ -10,7 +10,7 @@ from armkin.cli import board_link, inputs, output
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
-from armkin.cli.options import Out, Robot
+from armkin.cli.options import Robot, RowsOut
 from armkin.columns.cells import csv_line
 from armkin.errors import UsageError
 from armkin.model import units
@@ -29,7 +29,7 @@ def relax(
     seconds: Annotated[
         str, typer.Option("--seconds", metavar="S", help="How long the joints are read; Ctrl-C ends it earlier.")
     ] = "0",
-    out: Out = None,
+    out: RowsOut = None,
     baud: Baud = None,
     no_reset: NoReset = False,
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from armkin.cli import output, render
-from armkin.cli.options import Json, Out
+from armkin.cli.options import Json, TextOut
 
 if TYPE_CHECKING:
     from armkin.cli.answers import ShippedRobot
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _CAN = ("ik", "pulses", "simulate", "send", "home")
 
 
-def robots(json: Json = False, out: Out = None) -> None:
+def robots(json: Json = False, out: TextOut = None) -> None:
     """The robots that come with armkin, and what each can do.
 
     Each is used by its name from any folder: `armkin fk three_dof -30 5 -5`. simulate: `send --dry-run`, and

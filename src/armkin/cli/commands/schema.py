@@ -5,14 +5,14 @@ from typing import Annotated
 import typer
 
 from armkin.cli import output
-from armkin.cli.options import Out
+from armkin.cli.options import SchemaOut
 from armkin.errors import UsageError
 
 
 def schema(
     path: Annotated[bool, typer.Option("--path", help="That of path files instead.")] = False,
     scene: Annotated[bool, typer.Option("--scene", help="That of scenes instead.")] = False,
-    out: Out = None,
+    out: SchemaOut = None,
 ) -> None:
     """JSON Schema of robot files, for editors."""
     import json

@@ -12,7 +12,7 @@ from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import number
-from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, TaskName, Tool
+from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, TaskName, Tool, ending
 from armkin.cli.send_goals import goals as read_goals
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -73,7 +73,12 @@ def send(
     ] = None,
     trace: Annotated[
         str | None,
-        typer.Option("--trace", metavar="FILE|-", help="CSV of the plan: time, joints, every joint's position."),
+        typer.Option(
+            "--trace",
+            metavar="FILE|-",
+            callback=ending("a plan is", ".csv"),
+            help="CSV of the plan: time, joints, every joint's position.",
+        ),
     ] = None,
     accel: Annotated[
         str | None,

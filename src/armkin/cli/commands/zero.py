@@ -11,7 +11,7 @@ from armkin.cli import board_link, inputs, lerobot_zero, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
-from armkin.cli.options import Json, Out, Robot
+from armkin.cli.options import Json, Robot, RobotOut
 from armkin.errors import UsageError
 
 _ENDS = ("open", "closed")
@@ -37,7 +37,7 @@ def zero(
             "where the middles of all ranges are (default: all joints at 0); --port compares it with the servos.",
         ),
     ] = None,
-    out: Out = None,
+    out: RobotOut = None,
     baud: Baud = None,
     no_reset: NoReset = False,
     json: Json = False,

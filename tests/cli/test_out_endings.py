@@ -1,0 +1,81 @@
+"""The ending of `--out` says what is written, or the name is refused before any work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.command_line import run
+
+POSES = b"1,2,3\n4,5,6\n"
+DATA = ".npz, .parquet, .jsonl or .csv"
+TEXT = ".txt or .json"
+ROBOT = ".yaml or .yml"
+ASKED: dict[str, tuple[list[Any], str]] = {
+    "fk": (["fk", "three_dof", 1, 2, 3], TEXT),
+    "fk of many": (["fk", "three_dof", "--batch", "-"], DATA),
+    "ik": (["ik", "three_dof", 390, 80, 300], TEXT),
+    "ik of many": (["ik", "three_dof", "--batch", "-"], DATA),
+    "pulses": (["pulses", "three_dof", 1, 2, 3], TEXT),
+    "pulses of many": (["pulses", "three_dof", "--batch", "-"], DATA),
+    "info": (["info", "three_dof"], TEXT),
+    "robots": (["robots"], TEXT),
+    "schema": (["schema"], ".json"),
+    "workspace": (["workspace", "three_dof", "--samples", 1000], ".csv, .npz or .ply"),
+    "reach": (["reach", "three_dof", "--grid", 100], ".npz, .parquet or .csv"),
+    "place": (["place", "three_dof", "POSES"], DATA),
+    "plot": (["plot", "three_dof", "home"], ".png or .svg"),
+    "path": (["path", "three_dof", "POSES"], ".csv"),
+    "new": (["new", "arm", "--dh", "90,0,170", "--convention", "standard"], ROBOT),
+    "import": (["import", "-"], ROBOT),
+    "calibrate": (["calibrate", "three_dof", "POSES"], ROBOT),
+    "calibrate, poses to measure": (["calibrate", "three_dof", "--suggest", 5], ".csv"),
+    "relax": (["relax", "so101", "--port", "sim"], ".csv"),
+    "zero": (["zero", "so101", "--port", "sim"], ROBOT),
+    "begin": (["begin", "three_dof", "--port", "sim"], ROBOT),
+    "export as URDF": (["export", "three_dof", "--urdf"], ".urdf or .xml"),
+    "export as DH": (["export", "three_dof", "--dh"], ROBOT),
+    "export as JSON": (["export", "three_dof", "--json"], ".json"),
+    "export as JavaScript": (["export", "three_dof", "--js"], ".js or .mjs"),
+    "export as HTML": (["export", "three_dof", "--html"], ".html or .htm"),
+}
+
+
+@pytest.mark.parametrize("name", ["x.parquet.gz", "x.xlsx"])
+@pytest.mark.parametrize("command", ASKED)
+def test_an_unknown_ending_is_refused_with_those_allowed(tmp_path: Path, command: str, name: str) -> None:
+    words, allowed = ASKED[command]
+    (tmp_path / "poses.csv").write_bytes(POSES)
+    words = [tmp_path / "poses.csv" if word == "POSES" else word for word in words]
+    done = run(*words, "--out", tmp_path / name, stdin=POSES)
+    assert (done.code, done.out) == (2, "")
+    assert f"written as {allowed}; end the file's name with" in done.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["poses.csv"]
+
+
+@pytest.mark.parametrize("name", ["x.csv.npz", "x.parquet.CSV", "x.csv.csv"])
+@pytest.mark.parametrize("command", ["fk of many", "ik of many", "pulses of many", "workspace", "reach", "place"])
+def test_two_endings_are_refused(tmp_path: Path, command: str, name: str) -> None:
+    words, _ = ASKED[command]
+    (tmp_path / "poses.csv").write_bytes(POSES)
+    words = [tmp_path / "poses.csv" if word == "POSES" else word for word in words]
+    done = run(*words, "--out", tmp_path / name, stdin=POSES)
+    assert done.code == 2
+    assert "its name has two endings" in done.err or "written as" in done.err
+    assert not (tmp_path / name).exists()
+
+
+def test_json_is_not_written_as_csv(tmp_path: Path) -> None:
+    done = run("fk", "three_dof", "--batch", "-", "--json", "--out", tmp_path / "x.csv", stdin=POSES)
+    assert done.code == 2
+    assert "--json" in done.err
+    for name in ("x.jsonl", "x"):
+        assert run("fk", "three_dof", "--batch", "-", "--json", "--out", tmp_path / name, stdin=POSES) == (0, "", "")
+
+
+def test_names_with_dots_and_without_an_ending_are_taken(tmp_path: Path) -> None:
+    for name in ("x", "run.3.csv", "arm.v2.jsonl", "X.CSV"):
+        assert run("fk", "three_dof", "--batch", "-", "--out", tmp_path / name, stdin=POSES) == (0, "", ""), name
+    assert run("fk", "three_dof", 1, 2, 3, "--out", tmp_path / "x.txt").code == 0
+    assert run("export", "three_dof", "--dh", "-o", tmp_path / "arm.urdf.yaml").code == 0
