@@ -37,6 +37,9 @@ DOF = THREE_DOF
         ("info", "a robot file or the name of a shipped robot (armkin robots)"),
         ("import robots/ur5e.yaml", "armkin info robots/ur5e.yaml"),
         ("import ur5e", "armkin info ur5e"),
+        ("reach pan_tilt", "--task pose asks for whole poses, some of which it reaches; so does task: pose in the"),
+        ("ik pan_tilt 1 2 3", "--task pose asks for whole poses"),
+        ("ik so101 250 50 150 180 0 --position-first", "add --task pose"),
         ("export so101 --task xyz --c -o arm.c", "ik --lock and Python's armkin.lock hold joints"),
     ],
 )

@@ -59,8 +59,8 @@ def _redundant(error: ArmkinError) -> str:
 
 def _incomplete(error: ArmkinError) -> str:
     """Where the lines to add are shown; what a shipped robot lacks is added to a copy of its file."""
-    if error.fields.get("needs") == "blend":
-        return "--blend 5 alone gives one, or blend: 5 at the head of the path file"
+    if (step := _NEEDED.get(error.fields.get("needs", ""))) is not None:
+        return step
     if error.fields.get("undriven"):
         return "armkin info ROBOT shows lines to add"
     name = error.fields.get("robot_file")
@@ -76,6 +76,13 @@ def _lost(error: ArmkinError) -> str:
     return f"{home}, or {assume}" if error.fields["homing"] else f"put the arm in its home pose and {assume}"
 
 
+_NEEDED = {
+    "blend": "--blend 5 alone gives one, or blend: 5 at the head of the path file",
+    "task": "--task pose asks for whole poses, some of which it reaches; so does task: pose in the robot file",
+    "task pose": "add --task pose",
+    "pose": "--pose NAME|Q,... says which pose the middles of all ranges are",
+    "other joint": "write two paths, or hold another joint with --lock JOINT=VALUE",
+}
 _ONE_LINE = (RedundantArmError, PortInUseError, NoHomingError, UnfinishedError)
 _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     RedundantArmError: _redundant,

@@ -28,10 +28,9 @@ def destination(path: str | None, what: str = "", endings: Sequence[str] = ()) -
     if path is not None and path != "-":
         from armkin import files
 
-        if endings:
-            files.check(path)
-            files.ending(path, what, endings, bare=True)
         with files.whole(path) as file:
+            if endings:
+                files.ending(path, what, endings, bare=True)
             yield file.write
     elif sys.stdout is None:
         raise FileError("standard output is closed; give --out FILE or open it")

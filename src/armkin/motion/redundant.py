@@ -115,7 +115,8 @@ def _said(arm: Arm, file: PathFile, joint: int, here: Array) -> float | None:
         elif abs(value - first) > SAME:
             a, b = np.rad2deg([first, value])
             message = f"{name} is redundant and held along a path: it cannot be at {a:g} and then at {b:g} deg"
-            raise UsageError(f"{message}; write two paths, or hold another joint").within(place)
+            advice = "write two paths, or hold another joint"
+            raise UsageError(message, advice=advice, needs="other joint").within(place)
     return first
 
 

@@ -153,7 +153,9 @@ def _check_middle(arm: Arm, joint: int) -> None:
     if not abs(middle) <= _MIDDLE:
         raise UsageError(
             f"{arm.name}: the zero of {arm.joint_names[joint]} lies {abs(middle):.4g} deg from the middle of its "
-            f"limits, more than {_MIDDLE:g}: say which pose the middles of all ranges are",
+            f"limits, more than {_MIDDLE:g}",
+            advice="say which pose the middles of all ranges are",
+            needs="pose",
             joint=arm.joint_names[joint],
             middle=middle,
         )

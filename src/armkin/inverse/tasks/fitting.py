@@ -45,7 +45,7 @@ def _taskless(arm: Arm) -> UsageError:
         return UsageError(f"{problem}: fk, pulses and workspace work, ik does not")
     if free < arm.n:
         return redundant(arm, arm.n - free, f"{problem}: together they move the tool in {free} of its six directions")
-    return UsageError(f"{problem}: ask for task pose, whole poses of which it reaches some")
+    return UsageError(problem, advice="ask for task pose, whole poses of which it reaches some", needs="task")
 
 
 def redundant(arm: Arm, surplus: int, problem: str) -> RedundantArmError:
