@@ -34,6 +34,7 @@ ASKED: dict[str, tuple[list[Any], str]] = {
     "relax": (["relax", "so101", "--port", "sim"], ".csv"),
     "zero": (["zero", "so101", "--port", "sim"], ROBOT),
     "begin": (["begin", "three_dof", "--port", "sim"], ROBOT),
+    "send": (["send", "three_dof", "home", "--dry-run", "--trace", "FILE"], ".csv"),
     "export as URDF": (["export", "three_dof", "--urdf"], ".urdf or .xml"),
     "export as DH": (["export", "three_dof", "--dh"], ROBOT),
     "export as JSON": (["export", "three_dof", "--json"], ".json"),
@@ -47,8 +48,9 @@ ASKED: dict[str, tuple[list[Any], str]] = {
 def test_an_unknown_ending_is_refused_with_those_allowed(tmp_path: Path, command: str, name: str) -> None:
     words, allowed = ASKED[command]
     (tmp_path / "poses.csv").write_bytes(POSES)
-    words = [tmp_path / "poses.csv" if word == "POSES" else word for word in words]
-    done = run(*words, "--out", tmp_path / name, stdin=POSES)
+    known = {"POSES": tmp_path / "poses.csv", "FILE": tmp_path / name}
+    words = [known.get(word, word) for word in words]
+    done = run(*words, *(() if "--trace" in words else ("--out", tmp_path / name)), stdin=POSES)
     assert (done.code, done.out) == (2, "")
     assert f"written as {allowed}; end the file's name with" in done.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["poses.csv"]

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from random import Random
+from threading import Thread
 
 import kills
 import numpy as np
@@ -158,3 +162,53 @@ def test_no_scheduler_and_another_version_are_told(address: str, monkeypatch: py
     monkeypatch.setattr(cluster, "SECONDS", 0.5)
     with pytest.raises(ClusterError, match="no scheduler answers"):
         list(in_order(Engine(cluster="tcp://127.0.0.1:9"), square, "", range(3)))
+
+
+@pytest.mark.parametrize(
+    ("place", "says"),
+    [
+        ("tcp://127.0.0.1:9", "no scheduler answers (Connection refused); start one with: dask scheduler"),
+        ("127.0.0.1:9", "no scheduler answers (Connection refused)"),
+        ("tcp://nowhere.invalid:8786", "no scheduler answers ("),
+        ("tcp://127.0.0.1", "is no address of a scheduler, which is tcp://HOST:PORT"),
+        ("scheduler", "is no address of a scheduler"),
+        ("tcp://host:99999", "is no address of a scheduler"),
+    ],
+)
+def test_an_unreachable_address_is_said_within_three_seconds(place: str, says: str) -> None:
+    began = time.monotonic()
+    with pytest.raises(ClusterError) as told:
+        list(in_order(Engine(cluster=place), square, "", range(3)))
+    assert says in str(told.value)
+    assert time.monotonic() - began < 3
+
+
+def test_an_address_that_drops_packets_is_said_within_three_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A listener whose queue is full takes no connection and refuses none, as a firewall does."""
+    with socket.socket() as deaf, ExitStack() as stack:
+        deaf.bind(("127.0.0.1", 0))
+        deaf.listen(0)
+        for _ in range(8):
+            one = stack.enter_context(socket.socket())
+            one.setblocking(False)
+            one.connect_ex(deaf.getsockname())
+        began = time.monotonic()
+        with pytest.raises(ClusterError, match=r"no connection in 1.5 s"):
+            list(in_order(Engine(cluster=f"tcp://127.0.0.1:{deaf.getsockname()[1]}"), square, "", range(3)))
+        assert time.monotonic() - began < 3
+
+
+def test_another_program_at_the_address_is_no_scheduler() -> None:
+    """A web server's answer, taken for a length, is more than any memory."""
+    with socket.create_server(("127.0.0.1", 0)) as web:
+        Thread(target=_web, args=(web,), daemon=True).start()
+        with pytest.raises(ClusterError, match="no scheduler answers \\(what answers there is no Dask scheduler"):
+            list(in_order(Engine(cluster=f"tcp://127.0.0.1:{web.getsockname()[1]}"), square, "", range(3)))
+
+
+def _web(server: socket.socket) -> None:
+    with suppress(OSError):  # until it is closed
+        while True:
+            with server.accept()[0] as connection, suppress(OSError):
+                connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+                connection.recv(4096)

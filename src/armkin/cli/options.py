@@ -1,7 +1,6 @@
 """Arguments and options that several commands share: same name, same meaning, same help."""
 
 import sys
-from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -57,8 +56,8 @@ Batch = Annotated[
 ]
 
 
-def ending(what: str, *allowed: str) -> Callable[[str | None], str | None]:
-    """A check of a file's name before any work: it ends as what is written to it, or has no ending."""
+def _out(what: str, *allowed: str) -> Any:
+    """`--out`, whose file's name ends as what is written to it, or has no ending."""
 
     def check(path: str | None) -> str | None:
         if path:
@@ -67,15 +66,11 @@ def ending(what: str, *allowed: str) -> Callable[[str | None], str | None]:
             files.ending(path, what, allowed, bare=True)
         return path
 
-    return check
-
-
-def _out(what: str, *allowed: str) -> Any:
     return typer.Option(
         "--out",
         "-o",
         metavar="FILE|-",
-        callback=ending(what, *allowed),
+        callback=check,
         help=f"Write to a file, whole or not at all: {', '.join(allowed)}.",
     )
 
@@ -100,7 +95,9 @@ BatchOut = Annotated[
 Resume = Annotated[bool, typer.Option("--resume", help="With --batch and --out: go on where an earlier run was ended.")]
 Cluster = Annotated[
     str | None,
-    typer.Option("--cluster", metavar="ADDRESS", help="Share the work on a Dask cluster: tcp://HOST:8786."),
+    typer.Option(
+        "--cluster", metavar="ADDRESS", help="Share the work on a Dask cluster, by its scheduler: tcp://HOST:8786."
+    ),
 ]
 
 

@@ -38,6 +38,15 @@ def destination(path: str | None, what: str = "", endings: Sequence[str] = ()) -
         yield sys.stdout.write
 
 
+def check(path: str | None, what: str, *endings: str) -> None:
+    """Raise before long work what `destination` would of a file's name, or that it does not end as what is written."""
+    if path not in (None, "", "-"):
+        from armkin import files
+
+        files.check(path)
+        files.ending(path, what, endings, bare=True)
+
+
 @contextmanager
 def beside(path: str | None) -> Iterator[Write]:
     """Where a command's answer goes while other data goes to `path`: stderr if that is stdout ("-")."""

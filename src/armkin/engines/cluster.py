@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 import platform
+import socket
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -21,7 +22,8 @@ from armkin.errors import ArmkinError, ClusterError, MissingExtraError
 Chunk = TypeVar("Chunk")
 Result = TypeVar("Result")
 
-SECONDS = 10  # until a scheduler that does not answer is given up
+REACHED = 1.5  # [s] until an address is given up to which no connection comes about
+SECONDS = 10  # until a scheduler is given up that has taken the connection and does not answer, or has no worker
 AHEAD = 3  # chunks a thread of the workers
 
 
@@ -76,13 +78,29 @@ def _client(address: str) -> Any:
     import logging
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is said here
+    _check_reached(address)
     try:
         return distributed.Client(address, timeout=SECONDS, set_as_default=False)
-    except (OSError, ValueError, TypeError, ImportError) as error:
-        why = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ClusterError(
-            f"{address}: no scheduler answers ({why}); start one with: dask scheduler", address=address
-        ) from None
+    except Exception as error:  # whatever comes of what another program answers: MemoryError of a length in its bytes
+        why = "what answers there is no Dask scheduler" if isinstance(error, MemoryError) else str(error)
+        raise _no_scheduler(address, why.partition("\n")[0] or type(error).__name__) from None
+
+
+def _check_reached(address: str) -> None:
+    """Raise ClusterError for an address to which no connection comes about: Dask would try again and again."""
+    kind, _, place = address.rpartition("://")
+    host, _, port = place.rpartition(":")
+    if kind not in ("", "tcp", "tls") or not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise ClusterError(f"'{address}' is no address of a scheduler, which is tcp://HOST:PORT", address=address)
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), REACHED).close()
+    except OSError as error:
+        why = f"no connection in {REACHED:g} s" if isinstance(error, TimeoutError) else error.strerror or str(error)
+        raise _no_scheduler(address, why) from None
+
+
+def _no_scheduler(address: str, why: str) -> ClusterError:
+    return ClusterError(f"{address}: no scheduler answers ({why}); start one with: dask scheduler", address=address)
 
 
 def _check_workers(client: Any, address: str) -> None:

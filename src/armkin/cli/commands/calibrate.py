@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.csv_rows import batch_rows
-from armkin.cli.options import Json, Out, Robot, ending
+from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.model.targets import targets_in
@@ -58,9 +58,9 @@ def calibrate(
     import armkin
 
     if suggest is None:
-        ending("a robot file is", ".yaml", ".yml")(out)
+        output.check(out, "a robot file is", ".yaml", ".yml")
     else:
-        ending("poses to measure are", ".json" if json else ".csv")(out)
+        output.check(out, "poses to measure are", ".json" if json else ".csv")
     arm = inputs.load(robot)
     kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
     names = [*arm.joint_names, "x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]

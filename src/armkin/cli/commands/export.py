@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armkin.cli import inputs, output, render
-from armkin.cli.options import Meshes, Out, Robot, Scene, TaskName, ending
+from armkin.cli.options import Meshes, Out, Robot, Scene, TaskName
 from armkin.errors import RedundantArmError, UsageError
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def export(
     if meshes is not None and not html:
         raise UsageError("--meshes goes with --html alone")
     if not c:
-        ending(f"export {asked[0]} is", *_ENDINGS[asked[0]])(out)
+        output.check(out, f"export {asked[0]} is", *_ENDINGS[asked[0]])
     kinds[asked[0]][1](inputs.load(robot, scene))
 
 

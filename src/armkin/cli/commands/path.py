@@ -13,7 +13,7 @@ from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.foreign_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import comma_separated, number, whole
-from armkin.cli.options import BranchName, Json, Lock, Near, Robot, Scene, TaskName, Tool, ending
+from armkin.cli.options import BranchName, Json, Lock, Near, Robot, Scene, TaskName, Tool
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -86,13 +86,7 @@ def path(
     ] = None,
     out: Annotated[
         str | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE|-",
-            callback=ending("a plan is", ".csv"),
-            help="The plan as CSV: joints over time; whole or not at all.",
-        ),
+        typer.Option("--out", "-o", metavar="FILE|-", help="The plan as CSV: joints over time; whole or not at all."),
     ] = None,
     plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
     assume: Assume = None,
@@ -130,6 +124,7 @@ def path(
     free = armkin.lock(arm, locked) if locked else arm
     drawn = foreign_path.moves(free, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
     moves = _moves(free, file, via, task) if drawn is None else drawn
+    output.check(out, "a plan is", ".csv")
     options: dict[str, Any] = {
         "branch": branch,
         "task": task,
@@ -174,6 +169,7 @@ def sent(
 ) -> None:
     """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
     moves = _moves(arm, file, None, None)
+    output.check(trace, "a plan is", ".csv")
     options: dict[str, Any] = {"speed": inputs.percent(speed, "--speed")}
     if not dry_run:
         _carried_out(arm, moves, {}, options, link, trace, None, json=json)

@@ -12,7 +12,7 @@ from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import number
-from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, TaskName, Tool, ending
+from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, TaskName, Tool
 from armkin.cli.send_goals import goals as read_goals
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -73,12 +73,7 @@ def send(
     ] = None,
     trace: Annotated[
         str | None,
-        typer.Option(
-            "--trace",
-            metavar="FILE|-",
-            callback=ending("a plan is", ".csv"),
-            help="CSV of the plan: time, joints, every joint's position.",
-        ),
+        typer.Option("--trace", metavar="FILE|-", help="CSV of the plan: time, joints, every joint's position."),
     ] = None,
     accel: Annotated[
         str | None,
@@ -125,6 +120,7 @@ def send(
         return
     radius = _blend(blend, batch)
     arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near, scene, tool)
+    output.check(trace, "a plan is", ".csv")
     arm = keep_outs.marked(arm, ignore_keep_out)
     if accel is not None:
         arm = _accelerated(arm, number(accel, "--accel"))
