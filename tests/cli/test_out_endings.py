@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.command_line import run
+
+from command_line import run
 
 POSES = b"1,2,3\n4,5,6\n"
 DATA = ".npz, .parquet, .jsonl or .csv"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import sys
 from pathlib import Path
 from typing import cast
@@ -11,7 +12,7 @@ import pytest
 
 from armkin.board.ports import Port
 from armkin.errors import LinkError, MissingExtraError
-from armkin.flash import avrdude, boot_drive, images, intel_hex
+from armkin.flash import avrdude, boot_drive, images, intel_hex, uploading
 from armkin.flash.images import Image
 from armkin.flash.stk500v1 import Stk500v1
 from armkin.flash.uploading import upload
@@ -89,6 +90,28 @@ def test_the_command_says_what_it_copied(drive: Path, tmp_path: Path, monkeypatc
     done = run("flash", "--board", "pico6", "--port", drive, "--json")
     assert done.json == {"board": "pico6", "port": None, "bytes": len(UF2), "uploader": "UF2", "firmware": None}
     assert "120000 bytes copied" in run("flash", "--board", "pico6", "--port", drive).out
+
+
+def test_bytes_are_counted_from_when_the_boot_loader_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Loader:
+        page = 4
+        written = b""
+
+        def write(self, at: int, page: bytes) -> None:
+            self.written += page
+
+        def read(self, at: int, size: int) -> bytes:
+            return self.written[at : at + size]
+
+        def leave(self) -> None: ...
+
+    counted: list[tuple[int, int]] = []
+    monkeypatch.setattr(uploading, "_loader", lambda chip, kind, port: (Loader(), io.BytesIO(), 115_200))
+    monkeypatch.setattr(uploading, "_asked", lambda kind, port: "3.0")
+    monkeypatch.setattr(avrdude, "program", lambda: None)
+    data = b":04001000DEADBEEFB4\n:00000001FF\n"
+    upload(Image("uno_servos", Path("uno_servos.hex"), data), "port", lambda done, total: counted.append((done, total)))
+    assert counted == [(done, 40) for done in range(0, 41, 4)]
 
 
 def test_another_folder_is_no_boot_drive(tmp_path: Path) -> None:

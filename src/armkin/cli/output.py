@@ -183,7 +183,8 @@ class Tick(Protocol):
 def progress(what: str, total: int | Callable[[], int | None] | None = None) -> Iterator[Tick]:
     """A bar with rate and time left on stderr, or a counter without a total, if that is a terminal.
 
-    Call it with the count so far. total: or a function that finds it out, called on a terminal alone.
+    Call it with the count so far; 0 starts the clock anew, where what came before is not the counted work.
+    total: or a function that finds it out, called on a terminal alone.
     """
     if sys.stderr is None or not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
         yield lambda done, total=None: None
@@ -195,9 +196,11 @@ def progress(what: str, total: int | Callable[[], int | None] | None = None) -> 
     shown: Any = None
 
     def tick(done: int, total: int | None = None) -> None:
-        nonlocal last, shown, known
+        nonlocal began, last, shown, known
         known = total or known
         now = time.monotonic()
+        if done == 0:
+            began = last = now
         if now - last < 0.2 and done != known:
             return
         last = now

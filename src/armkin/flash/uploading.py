@@ -43,8 +43,9 @@ class Flashed(NamedTuple):
 def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> Flashed:
     """Write a board's image through a port (a Pico: or the folder of its boot drive), and ask the board what it is.
 
-    tick: is told the bytes written and read back so far, and how many these will be. Raises LinkError, saying what was
-    written: a boot loader stays where it is, so that the same command may be repeated.
+    tick: is told the bytes written and read back so far, 0 when the boot loader has been found, and how many these
+    will be. Raises LinkError, saying what was written: a boot loader stays where it is, so that the same command may be
+    repeated.
     """
     chip = BOARDS[image.kind].chip
     if chip not in _LOADERS:
@@ -52,6 +53,7 @@ def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> Fl
     flash = intel_hex.read(image.data.decode("ascii"))
     total = 2 * len(flash)
     loader, link, baud = _loader(chip, image.kind, port)
+    tick(0, total)
     program = avrdude.program()
     try:
         if program is None:
