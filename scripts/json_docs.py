@@ -40,6 +40,7 @@ def section(kind: type) -> str:
     for key, hint in get_type_hints(kind, include_extras=True).items():
         value, meaning, optional = _taken_apart(hint)
         absent = " (not always)" if optional else ""
+        meaning = meaning.replace("|", "\\|")
         rows.append(f"| `{key}`{absent} | {words(value)} | {meaning} |")
     return "\n".join([f"## {kind.__name__}", "", " ".join((kind.__doc__ or "").split()), "", *rows, ""])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import math
+import re
 import types
 from pathlib import Path
 from typing import Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
@@ -161,11 +162,26 @@ def test_every_command_with_json_has_a_type_and_a_case() -> None:
     assert {kind for kinds in answers.ANSWERS.values() for kind in kinds} == tried
 
 
+def test_every_key_on_the_page_has_a_meaning_and_every_length_and_angle_its_unit() -> None:
+    rows = [line[2:-2].split(" | ") for line in _json_docs().page().splitlines() if line.startswith("| `")]
+    keys = [row for row in rows if len(row) == 3]  # the others are commands
+    assert len(keys) > 300
+    for key, value, meaning in keys:
+        assert len(meaning.split()) > 1, key
+        if "number" in value and key.partition("` ")[0].strip("`").endswith(("_mm", "_deg", "_mm2", "_mm3", "_s")):
+            assert re.search(r"\[(mm|mm2|mm3|deg|s)\]", meaning), (key, meaning)
+
+
 def test_the_page_is_written_from_the_types() -> None:
+    module = _json_docs()
+    assert Path(module.PAGE).read_text() == module.page(), "run scripts/json_docs.py"
+
+
+def _json_docs() -> Any:
     path = ROOT / "scripts" / "json_docs.py"
     spec = importlib.util.spec_from_file_location("json_docs", path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    assert Path(module.PAGE).read_text() == module.page(), "run scripts/json_docs.py"
+    return module

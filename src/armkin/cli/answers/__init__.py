@@ -1,20 +1,16 @@
 """The JSON of every command: keys, types and what they mean.
 
-arm.py     answers about an arm, and errors; branches.py: those of ik
-moving.py  answers about an arm that moves, and about its board
+arm.py          answers about an arm, and errors; branches.py: those of ik; calibration.py: of calibrate
+moving.py       answers about an arm that moves, and about its board
 
 `docs/json.md` is written from these types (scripts/json_docs.py); a test holds the two equal, and the
 commands' real answers to the types. Millimetres and degrees throughout; no NaN and no infinity.
 """
 
 from armkin.cli.answers.arm import BestPlace as BestPlace
-from armkin.cli.answers.arm import Calibrate as Calibrate
-from armkin.cli.answers.arm import Correction as Correction
 from armkin.cli.answers.arm import Error as Error
-from armkin.cli.answers.arm import Errors as Errors
 from armkin.cli.answers.arm import Export as Export
 from armkin.cli.answers.arm import Fk as Fk
-from armkin.cli.answers.arm import Flagged as Flagged
 from armkin.cli.answers.arm import Flash as Flash
 from armkin.cli.answers.arm import Found as Found
 from armkin.cli.answers.arm import Frame as Frame
@@ -34,13 +30,17 @@ from armkin.cli.answers.arm import Rounded as Rounded
 from armkin.cli.answers.arm import ShippedRobot as ShippedRobot
 from armkin.cli.answers.arm import Solver as Solver
 from armkin.cli.answers.arm import Solving as Solving
-from armkin.cli.answers.arm import Suggested as Suggested
 from armkin.cli.answers.arm import Violation as Violation
 from armkin.cli.answers.arm import Workspace as Workspace
 from armkin.cli.answers.branches import Branch as Branch
 from armkin.cli.answers.branches import Closest as Closest
 from armkin.cli.answers.branches import Family as Family
 from armkin.cli.answers.branches import Ik as Ik
+from armkin.cli.answers.calibration import Calibrate as Calibrate
+from armkin.cli.answers.calibration import Correction as Correction
+from armkin.cli.answers.calibration import Errors as Errors
+from armkin.cli.answers.calibration import Flagged as Flagged
+from armkin.cli.answers.calibration import Suggested as Suggested
 from armkin.cli.answers.moving import BranchAt as BranchAt
 from armkin.cli.answers.moving import Difference as Difference
 from armkin.cli.answers.moving import DryRun as DryRun
