@@ -32,14 +32,14 @@ texts_of = cache(program)
 _libraries: dict[tuple[str, ...], ctypes.CDLL] = {}
 
 
-def library(arm: armkin.Arm, folder: Path, *options: str, single: bool = False) -> ctypes.CDLL:
-    """The generated source as a shared library."""
+def library(arm: armkin.Arm, folder: Path, level: str = "-O0", *, single: bool = False) -> ctypes.CDLL:
+    """The generated source as a shared library; some dozen targets take less time than optimising does."""
     texts = texts_of(arm, "arm.c", None, single)
-    key = texts.source, texts.header, *options
+    key = texts.source, texts.header, level
     if key not in _libraries:
         (folder / "arm.c").write_text(texts.source)
         (folder / "arm.h").write_text(texts.header)
-        words = ["gcc", "-std=c99", "-O1", *options, "-shared", "-fPIC", "arm.c", "-o", "arm.so", "-lm"]
+        words = ["gcc", "-std=c99", level, "-shared", "-fPIC", "arm.c", "-o", "arm.so", "-lm"]
         subprocess.run(words, cwd=folder, check=True)
         _libraries[key] = ctypes.CDLL(str(folder / "arm.so"))
     return _libraries[key]
@@ -88,7 +88,7 @@ def postures(arm: armkin.Arm, count: int) -> np.ndarray:
 
 def agreement(arm: armkin.Arm, folder: Path, count: int) -> Agreement:
     """Compare on random poses."""
-    code, n, prefix = library(arm, folder), arm.n, identifier(arm.name)
+    code, n, prefix = library(arm, folder, "-O1"), arm.n, identifier(arm.name)
     task, _ = solver(arm, None)
     q = postures(arm, count)
     T = armkin.fk(arm, q)

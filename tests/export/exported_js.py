@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,9 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import actual
+
+# of one arm there is one text in all tests of a process
+_text_of = cache(module)
 
 _ASK = """
 import * as arm from './arm.mjs';
@@ -48,7 +52,7 @@ def ask(
     goals = goals_of(arm, q) if targets is None else targets
     close = np.broadcast_to(arm.home, q.shape) if near is None else near
     asked = {"q": q.tolist(), "targets": goals.tolist(), "near": close.tolist()}
-    (folder / "arm.mjs").write_text(module(arm, task), encoding="utf-8")
+    (folder / "arm.mjs").write_text(_text_of(arm, task), encoding="utf-8")
     (folder / "asked.json").write_text(json.dumps(asked))
     (folder / "ask.mjs").write_text(_ASK)
     subprocess.run([node, "ask.mjs"], cwd=folder, check=True, timeout=300)

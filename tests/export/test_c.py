@@ -115,7 +115,8 @@ def test_it_compiles_without_a_warning(robot: str, compiler: list[str], tmp_path
         return
     # on an AVR double has 32 bits, and its libm functions of float are those of double
     warnings = [flag for flag in WARNINGS if compiler[0] != "avr-gcc" or flag != "-Wdouble-promotion"]
-    run(*compiler, *warnings, "-Os", "-c", source, "-o", "arm.o", folder=tmp_path)
+    optimised = "-O0" if compiler[0] == "clang" else "-Os"  # gcc warns of what it finds while it optimises
+    run(*compiler, *warnings, optimised, "-c", source, "-o", "arm.o", folder=tmp_path)
 
 
 def test_the_files_say_what_they_were_made_from() -> None:
@@ -275,7 +276,7 @@ def built(folder: Path, arm: armkin.Arm, single: bool = False) -> str:
     texts = program(arm, "arm.c", single=single)
     for name, text in (("arm.c", texts.source), ("arm.h", texts.header), ("arm_test.c", texts.test)):
         (folder / name).write_text(text)
-    run("gcc", *WARNINGS, "-O1", "arm.c", "arm_test.c", "-lm", "-o", "test", folder=folder)
+    run("gcc", *WARNINGS, "arm.c", "arm_test.c", "-lm", "-o", "test", folder=folder)
     return run("./test", folder=folder)
 
 
