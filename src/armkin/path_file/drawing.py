@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from armkin.errors import PathFileError
 from armkin.path_file.model import LEAST_TOOL_SPEED, Arc, Circle, Move, PathFile, Source
+from armkin.robot_file.model import cross
 
 Point = tuple[float, float, float]
 LARGEST = 1e6  # [mm] of a coordinate
@@ -95,7 +96,7 @@ class Pen:
             return
         base = [x - o for x, o in zip(a, out, strict=True)]
         if abs(rise) < _NO_ARC and abs(angle) < _THREE_POINTS:
-            across = _cross(normal, (out[0], out[1], out[2]))
+            across = cross(normal, (out[0], out[1], out[2]))
             end = math.dist(base, b)  # it may differ a little from the radius at the start
             half, mean = angle / 2, (radius + end) / 2 / radius
             via = [
@@ -142,7 +143,3 @@ class Pen:
         lines: dict[tuple[str | int, ...], int] = {("moves", k): line for k, line in enumerate(self.lines)}
         made = PathFile.model_construct(moves=self.moves, corners="tolerance")
         return made.read_from(Source(name, lines, notes=tuple(notes)))
-
-
-def _cross(a: Point, b: Point) -> Point:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
