@@ -104,7 +104,7 @@ def test_roots_that_solutions_share_are_taken_apart(tmp_path: Path) -> None:
     assert json.loads(told.stdout) == [False] * len(q)
 
 
-SINGULAR = {
+SINGULAR: dict[str, list[list[float]]] = {
     "thor": [
         [135, 0, 0, 0, -135, 180],  # the elbow stretched over the base: a self-motion of double roots
         [90, 180, 180, 90, 0, 0],  # and with the wrist straight: a surface of them

@@ -55,6 +55,8 @@ class _Buffers:
 
     def name(self, x: Any, half: tuple[int | None, ...] = ()) -> str:
         """A value, or its part; half: the place on each of the last branch axes, None for all places."""
+        if isinstance(x, Node) and not half:
+            return self.names[id(x)]
         axes = axes_of(x)
         place: Place = tuple(
             slice(None) if k is None else min(k, size - 1) for k, size in zip(half[-len(axes) :], axes, strict=False)
@@ -93,7 +95,8 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
     that numpy may round another way in its vectorised loops are called number by number.
     Returns the function, which takes the inputs (N,) and the buffers, and what the buffers must be.
     """
-    both_signs, buffers = _both_signs(recording), _Buffers(recording)
+    terms = {id(node): _term(node) for node in recording.nodes}
+    both_signs, buffers = _both_signs(recording, terms), _Buffers(recording)
     reads = {
         id(node): [y for x in node.args for y in (x.args if id(x) in both_signs else [x]) if isinstance(y, Node)]
         for node in recording.nodes
@@ -104,7 +107,7 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
     for k, node in enumerate(recording.nodes):
         if id(node) in both_signs:
             continue
-        term = _term(node)
+        term = terms[id(node)]
         signed = term if id(term) in both_signs else None
         arguments = [buffers.name(x) for x in node.args] if signed is None else []
         over = [x for x in {id(x): x for x in reads[id(node)]}.values() if x.op != "input" and last[id(x)] == k]
@@ -150,11 +153,13 @@ def _term(node: Node) -> Node | None:
     return next((x for x in terms[::-1] if branch_signs(x, zeros=True)), None)
 
 
-def _both_signs(recording: Recording) -> set[int]:
-    """Values times signs of branches that are only asked for as such terms."""
-    terms = {id(x) for node in recording.nodes if (x := _term(node)) is not None and node.args[0] is not node.args[1]}
-    asked = {id(x) for node in recording.nodes for x in node.args if x is not _term(node)}
-    return terms - asked - {id(x) for x in recording.outputs}
+def _both_signs(recording: Recording, terms: dict[int, Node | None]) -> set[int]:
+    """Values times signs of branches that are only asked for as such terms, by node."""
+    signed = {
+        id(x) for node in recording.nodes if (x := terms[id(node)]) is not None and node.args[0] is not node.args[1]
+    }
+    asked = {id(x) for node in recording.nodes for x in node.args if x is not terms[id(node)]}
+    return signed - asked - {id(x) for x in recording.outputs}
 
 
 def _flip(axis: int, a: Any, out: NDArray[Any]) -> None:

@@ -51,9 +51,9 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
     def value(x: Any, index: tuple[int, ...]) -> Value | str:
         """What an argument is on a branch: a value, or a constant's digits."""
         axes = axes_of(x)
-        at = tuple(0 if size == 1 else i for size, i in zip(axes, index[len(index) - len(axes) :], strict=True))
+        at = tuple(0 if size == 1 else i for size, i in zip(axes, index[-len(axes) :], strict=True)) if axes else ()
         if isinstance(x, Node):
-            return same.get((id(x), at), (id(x), at))
+            return same.get(one := (id(x), at), one)
         return repr(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
 
     todo: list[tuple[Value, str, list[Value | str]]] = []

@@ -95,7 +95,7 @@ class Trace:
         if op == "multiply":
             sign = _product(s, t)
             for x, y in ((a, b), (b, a)):
-                if not isinstance(x, Node) and np.ndim(x) == 0 and abs(x) in (0.0, 1.0):
+                if not isinstance(x, Node) and _ndim(x) == 0 and abs(x) in (0.0, 1.0):
                     return self._signed(y, _product(sign, x)) if x else 0.0
             return self._signed(self._product(a, b), sign)
         return self._sum(s, a, -t if op == "subtract" else t, b)
@@ -106,16 +106,16 @@ class Trace:
             return self._signed(a, s)
         if _is_zero(a):
             return self._signed(b, t)
-        if np.ndim(s) and not np.ndim(t):
+        if _ndim(s) and not _ndim(t):
             s, a, t, b = t, b, s, a
         relative = _product(s, t)
-        if np.ndim(relative):
+        if _ndim(relative):
             return self._signed(self.record("add", (a, self._signed(b, relative))), s)
         if relative > 0:
             return self._signed(self.record("add", (a, b)), s)
         if a is b:
             return 0.0
-        if np.ndim(s) == 0 and s < 0:
+        if _ndim(s) == 0 and s < 0:
             return self.record("subtract", (b, a))
         return self._signed(self.record("subtract", (a, b)), s)
 
@@ -125,7 +125,7 @@ class Trace:
         sign = _product(sign, own)
         if not isinstance(x, Node):
             return sign * x
-        if np.ndim(sign):
+        if _ndim(sign):
             return self.record("multiply", (sign, x))
         return x if sign > 0 else self.record("negative", (x,))
 
@@ -139,23 +139,30 @@ class Trace:
         return self.record("multiply", (a, b))
 
     def record(self, op: str, inputs: Sequence[Any]) -> Node:
-        if op in COMMUTING:  # equal ones have equal keys: constants first, then what was recorded first
-            inputs = sorted(inputs, key=_place)
-        key = (op, *(id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs))
-        if key not in self.known:
-            axes = np.broadcast_shapes(*(axes_of(x) for x in inputs))
-            self.known[key] = Node(self, op, tuple(inputs), axes, len(self.nodes))
-            self.nodes.append(self.known[key])
-        return self.known[key]
+        if op in COMMUTING and _place(inputs[0]) > _place(inputs[1]):
+            inputs = inputs[::-1]  # equal ones have equal keys: constants first, then what was recorded first
+        key = (op, *[id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs])
+        found = self.known.get(key)
+        if found is None:
+            shapes = {axes_of(x) for x in inputs} - {()}
+            axes = np.broadcast_shapes(*shapes) if len(shapes) > 1 else next(iter(shapes), ())
+            found = self.known[key] = Node(self, op, tuple(inputs), axes, len(self.nodes))
+            self.nodes.append(found)
+        return found
 
 
 def _place(x: Any) -> float:
     return x.number if isinstance(x, Node) else -math.inf
 
 
+def _ndim(x: Any) -> int:
+    """`numpy.ndim` of an array or a number."""
+    return x.ndim if isinstance(x, np.ndarray) else 0
+
+
 def branch_signs(x: Any, zeros: bool = False) -> bool:
     """Whether a node is a value times an array of signs on branch axes; zeros: of which some may be zero."""
-    if not isinstance(x, Node) or x.op != "multiply" or not isinstance(x.args[0], np.ndarray) or not x.args[0].ndim:
+    if not isinstance(x, Node) or x.op != "multiply" or not _ndim(x.args[0]):
         return False
     size = np.abs(x.args[0])
     return bool(((size == 1.0) | (zeros & (size == 0.0))).all())
@@ -165,7 +172,7 @@ def _split(x: Any) -> tuple[Sign, Any]:
     """A value as a sign and what is left: minus moves out of nodes, signs of branches out of nodes and constants."""
     if isinstance(x, Node):
         return (-1.0, x.args[0]) if x.op == "negative" else x.args if branch_signs(x) else (1.0, x)
-    if np.ndim(x) and np.all(abs(x) == abs(x).flat[0]) and x.flat[0]:
+    if _ndim(x) and np.all(abs(x) == abs(x).flat[0]) and x.flat[0]:
         return _product(np.sign(x), 1.0), abs(float(x.flat[0]))
     return 1.0, x
 
@@ -173,25 +180,26 @@ def _split(x: Any) -> tuple[Sign, Any]:
 def _product(s: Sign, t: Sign) -> Sign:
     """The product of two signs, without branch axes on which it is the same."""
     sign = s * t
-    for axis in range(np.ndim(sign)):
+    for axis in range(_ndim(sign)):
         first = sign.take([0], axis)
         sign = first if (sign == first).all() else sign
-    return float(sign.flat[0]) if np.ndim(sign) and sign.size == 1 else sign
+    return float(sign.flat[0]) if _ndim(sign) and sign.size == 1 else sign
 
 
 def _is_zero(x: Any) -> bool:
-    return not isinstance(x, Node) and np.ndim(x) == 0 and x == 0.0
+    return not isinstance(x, Node) and _ndim(x) == 0 and x == 0.0
 
 
-def _constant_key(x: Any) -> tuple[Any, ...]:
-    return ("constant", np.shape(x), np.asarray(x).tobytes())
+def _constant_key(x: Any) -> Any:
+    """Its digits: -0.0 is not 0.0."""
+    return x.hex() if isinstance(x, float) else (np.shape(x), np.asarray(x).tobytes())
 
 
 def axes_of(x: Any) -> tuple[int, ...]:
     """Lengths of the branch axes of a node, an array or a number."""
     if isinstance(x, Node):
         return x.axes
-    return np.shape(x)[:-1] if np.ndim(x) else ()
+    return x.shape[:-1] if isinstance(x, np.ndarray) else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,5 +228,5 @@ def _needed(nodes: list[Node], outputs: Sequence[Any]) -> list[Node]:
     needed = {id(x) for x in outputs if isinstance(x, Node)}
     for node in reversed(nodes):
         if id(node) in needed:
-            needed |= {id(x) for x in node.args if isinstance(x, Node)}
+            needed.update(id(x) for x in node.args if isinstance(x, Node))
     return [node for node in nodes if id(node) in needed]
