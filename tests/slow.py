@@ -368,7 +368,6 @@ SLOW: dict[str, tuple[str, ...]] = {
     "teach/test_teach_telephone.py": (),
     "test_docs.py": ("test_the_methods_of_the_shipped_robots_are_on_the_page",),
     "test_examples.py": ("test_an_example_runs_from_any_folder",),
-    "test_lowest_versions.py": (),
     "test_package.py": (),
     "test_public_api.py": ("test_every_public_function_is_called_after_all_modules_are_imported",),
     "test_readme.py": ("test_commands_print_what_the_page_shows",),

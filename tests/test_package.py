@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tarfile
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
@@ -13,6 +14,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "armkin"
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PYTHON = "python.exe" if sys.platform == "win32" else "python"
 # Modules of the standard library that Windows does not have.
 POSIX_ONLY = {"fcntl", "grp", "posix", "pty", "pwd", "readline", "resource", "syslog", "termios", "tty"}
 # And what of its other modules Windows does not have.
@@ -61,30 +64,57 @@ def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
     assert contents(build("wheel", tree, tmp_path / "again")) == contents(wheel)
 
 
-def test_a_clean_environment_runs_it_from_any_folder(wheel: Path, tmp_path: Path) -> None:
-    place = tmp_path / "venv"
+@pytest.fixture(scope="module")
+def programs(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The programs' folder of a new environment: the wheel, and what it asks for, in the lowest versions that it takes.
+
+    The lowest numpy is built for Python 3.11: for another one, in the newest.
+    """
+    place = tmp_path_factory.mktemp("venv")
     venv.create(place, with_pip=False)
-    bin_folder = place / ("Scripts" if sys.platform == "win32" else "bin")
-    python = bin_folder / ("python.exe" if sys.platform == "win32" else "python")
-    install = [sys.executable, "-m", "pip", "--python", str(python), "install", "-q", "--no-compile"]
-    subprocess.run([*install, str(wheel)], check=True)
+    folder = place / ("Scripts" if sys.platform == "win32" else "bin")
+    install = [sys.executable, "-m", "pip", "--python", str(folder / PYTHON), "--disable-pip-version-check"]
+    install += ["install", "-q", "--no-compile", str(wheel)]
+    if sys.version_info < (3, 12):
+        install += [dependency.replace(">=", "==") for dependency in PROJECT["dependencies"]]
+    subprocess.run(install, check=True, capture_output=True)
+    return folder
 
-    def armkin(*words: str) -> str:
-        done = subprocess.run(
-            [bin_folder / "armkin", *words], cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout
 
-    assert "398.3923" in armkin("fk", "three_dof", "-30", "5", "-5")
-    assert "ur5e" in armkin("robots")
-    assert "as planned" in armkin("send", "three_dof", "-30", "5", "-5", "--port", "sim")
-    assert '"title"' in armkin("schema")
-    assert "three_dof" in armkin("info", "three_dof")
+@pytest.mark.parametrize(
+    ("words", "code", "shown"),
+    [
+        ("--version", 0, f"armkin {PROJECT['version']}"),
+        ("--help", 0, "Usage: armkin"),
+        ("fk --help", 0, "Usage: armkin fk"),
+        ("fk three_dof -30 5 -5", 0, "398.3923"),
+        ("ik three_dof 390 80 300 --json", 0, '"complete": true'),
+        ("pulses three_dof -30 5 -5", 0, "-10144"),
+        ("workspace three_dof --samples 10", 0, "three_dof"),
+        ("send three_dof -30 5 -5 --port sim", 0, "as planned"),
+        ("path three_dof --via 390,80,300 --via 390,20,300 --dry-run", 0, "mm of path"),
+        ("robots", 0, "ur5e"),
+        ("schema", 0, '"title"'),
+        ("info three_dof", 0, "three_dof"),
+        ("no_such", 2, "there is no command"),
+        ("fk three_dof 1 2", 2, "got 2"),
+    ],
+)
+def test_commands_work_in_a_clean_environment_from_any_folder(
+    words: str, code: int, shown: str, programs: Path, tmp_path: Path
+) -> None:
+    command = [str(programs / "armkin"), *words.split()]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False)
+    assert done.returncode == code, done.stderr
+    assert shown in (done.stdout if code == 0 else done.stderr)
+
+
+def test_the_package_is_imported_from_where_it_was_installed(programs: Path, tmp_path: Path) -> None:
     module = "import armkin; print(armkin.load('ur5e').n, armkin.__file__)"
-    out = subprocess.run([python, "-c", module], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+    command = [str(programs / PYTHON), "-c", module]
+    out = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     assert out.startswith("6 ")
-    assert str(place.resolve()) in str(Path(out.split(maxsplit=1)[1].strip()).resolve())
+    assert str(programs.parent.resolve()) in str(Path(out.split(maxsplit=1)[1].strip()).resolve())
 
 
 def test_nothing_that_windows_lacks_is_imported_at_module_level() -> None:
