@@ -13,36 +13,39 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 _ROOT = Path(__file__).parents[1]
-# helpers that start a browser, or compile the firmware or an exported arm; syntax trees of the whole package
-_SHARED = re.compile(r"^(?:from|import) (?:browsing|emulator|measure|bare_host|exported|ast)\b", re.MULTILINE)
+_BROWSER = re.compile(r"^(?:from|import) browsing\b", re.MULTILINE)
+# helpers that compile the firmware, or an exported arm; syntax trees of the whole package
+_SHARED = re.compile(r"^(?:from|import) (?:emulator|measure|bare_host|exported|ast)\b", re.MULTILINE)
 
 
 @cache
-def together(path: Path) -> bool:
-    """Whether one worker has all tests of a file."""
-    return "firmware" in path.parts or bool(_SHARED.search(path.read_text("utf-8")))
+def together(path: Path) -> str | None:
+    """The name of those tests, this file's among them, that one worker has all of: all in a browser, or a file's."""
+    text = path.read_text("utf-8")
+    if _BROWSER.search(text):
+        return "browser"
+    return str(path) if "firmware" in path.parts or _SHARED.search(text) else None
 
 
 class Distribution(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
-    """To a worker that is free goes the next test, or the next file whose tests stay together."""
+    """To a worker that is free goes the next test, or the next tests that stay together."""
 
     def _split_scope(self, nodeid: str) -> str:
-        path = nodeid.split("::", 1)[0]
-        return path if together(_ROOT / path) else nodeid
+        return together(_ROOT / nodeid.split("::", 1)[0]) or nodeid
 
 
 def mixed(slow: list[pytest.Item], quick: list[pytest.Item]) -> list[pytest.Item]:
     """The order in which tests are given away: long ones first, so that all workers end together.
 
-    Between tests that compute stand, evenly, the files whose tests stay together: most of these wait for a board that
-    keeps real time, and while one worker waits the others compute.
+    Those in a browser begin: they take longest. Between tests that compute stand, evenly, the files whose tests stay
+    together: most of these wait for a board that keeps real time, and while one worker waits the others compute.
     """
-    files: dict[Path, list[pytest.Item]] = {}
+    groups: dict[str, list[pytest.Item]] = {"browser": []}
     for item in slow + quick:
-        if together(item.path):
-            files.setdefault(item.path, []).append(item)
-    alone = [item for item in slow if item.path not in files]
+        if name := together(item.path):
+            groups.setdefault(name, []).append(item)
+    alone = [item for item in slow if not together(item.path)]
     order: list[pytest.Item] = []
-    for number, file in enumerate(files.values()):
-        order += file + alone[number :: len(files)]
-    return (order if files else alone) + [item for item in quick if item.path not in files]
+    for number, group in enumerate(groups.values()):
+        order += group + alone[number :: len(groups)]
+    return order + [item for item in quick if not together(item.path)]

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserType, Page, sync_playwright
 
 COUNTS = [361, -5411, 2898]  # of x 390, y 80, z 300, left, elbow up
 # Chromium fills a menu of its own for every window, which takes as long as a page of ours. The last list of features
@@ -44,16 +44,20 @@ _OPTIONS = (
 
 
 @contextmanager
-def chromium(*options: str) -> Iterator[Browser]:
-    """The browser; every start has a profile of its own."""
+def chromium() -> Iterator[Browser]:
+    """The browser; there is no other in this process meanwhile, unless it is `launched`."""
+    with sync_playwright() as playwright, launched(playwright.chromium) as browser:
+        yield browser
+
+
+@contextmanager
+def launched(kind: BrowserType, *options: str) -> Iterator[Browser]:
+    """A browser of its own, with a new profile; kind: `browser_type` of one that runs."""
     path = shutil.which("chromium") or shutil.which("chromium-browser")
     assert path, "no chromium: scripts/test installs it; or leave these tests out: -m 'not browser'"
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=path, headless=True, args=[*_OPTIONS, *options], timeout=120_000
-        )
-        yield browser
-        browser.close()
+    browser = kind.launch(executable_path=path, headless=True, args=[*_OPTIONS, *options], timeout=120_000)
+    yield browser
+    browser.close()
 
 
 @contextmanager

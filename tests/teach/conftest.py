@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +16,9 @@ from playwright.sync_api import Page as Tab
 from served import Page, served
 
 sys.path.append(str(Path(__file__).parents[1] / "firmware"))
+
+_running = ExitStack()
+_browsers: list[Browser] = []  # at most one
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -30,10 +34,22 @@ def _needs_browser(module: ModuleType) -> bool:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for all tests of a file, each page with a profile of its own; longer, others' event loops would meet it."""
-    with chromium() as one:
-        yield one
+def browser() -> Browser:
+    """One for all tests in a row that need one, each page with a profile of its own."""
+    if not _browsers:
+        _browsers.append(_running.enter_context(chromium()))
+    return _browsers[0]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
+    """The browser ends before a test that needs none: its event loop would meet others'."""
+    try:
+        yield
+    finally:
+        if nextitem is None or nextitem.get_closest_marker("browser") is None:
+            _browsers.clear()
+            _running.close()
 
 
 @pytest.fixture(scope="module")

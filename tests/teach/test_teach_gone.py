@@ -10,20 +10,21 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from browsing import COUNTS, aim, chromium, idle, until
+from browsing import COUNTS, aim, idle, launched, until
 from emulator import EmulatedBoard
 from pins import net, rests_within
+from playwright.sync_api import Browser
 from served import Elsewhere, teaching
 
 
 @pytest.mark.parametrize("how", ["its tab is closed", "its browser is killed"])
-def test_a_page_that_is_gone_holds_the_arm(how: str) -> None:
+def test_a_page_that_is_gone_holds_the_arm(browser: Browser, how: str) -> None:
     """The board is asked by another page afterwards: the arm's position is known, and is that of the pins."""
     mark = f"--armkin-test={uuid.uuid4()}"
     # at 0.4 of real time: a busy computer notices the page's end late, and that is no time of the arm's
     with EmulatedBoard(speed=0.4) as board, teaching("three_dof", "--port", board.port) as url:
-        with chromium(mark) as browser:
-            page = browser.new_page()
+        with launched(browser.browser_type, mark) as another:
+            page = another.new_page()
             page.set_default_timeout(120_000)
             page.goto(url)
             page.wait_for_selector("html[data-ready]")
