@@ -7,18 +7,15 @@ import sys
 from pathlib import Path
 
 import armkin
-from armkin.motion.tool_path.placing import placing
-from armkin.path_file import read_drawing
-from armkin.path_file.drawing import Wishes
 from armkin.plot.path import plot_path
 
-arm, file = armkin.load("three_dof"), str(Path(__file__).with_name("first_layer.gcode"))
-layer = read_drawing(file, placing(arm, [320, -20, 200]), Wishes())
+arm = armkin.load("three_dof")
+# The file's zero lies 320 mm in front of the arm, 20 mm to its right, 200 mm up.
+layer = armkin.drawing(arm, Path(__file__).with_name("first_layer.gcode"), at=[320, -20, 200])
 plan = armkin.path(arm, layer)
 points = sum(len(move.polyline or []) for move in layer.moves)
-print(
-    f"{points} points, {plan.length / 1000:.2f} m in {plan.duration:.0f} s, {len(plan.on_path)} stretches between rests"
-)
+rests = len(plan.on_path)
+print(f"{points} points, {plan.length / 1000:.2f} m in {plan.duration:.0f} s, {rests} stretches between rests")
 print(f"each point within {plan.deviation:.3f} mm of the motion, {plan.tolerance} allowed")
 print(f"{len(layer.notes)} words are of the printer: {layer.notes[0]}")
 if sys.argv[1:]:

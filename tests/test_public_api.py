@@ -47,7 +47,9 @@ def test_no_module_has_the_name_of_a_public_function() -> None:
 
 def test_every_public_function_is_called_after_all_modules_are_imported(tmp_path: Path) -> None:
     """A submodule that is imported becomes a name of its package: it may replace none that people call."""
-    code = """
+    code = (
+        f"SVG = {str(ROOT / 'examples' / 'drawing.svg')!r}"
+        + """
 import importlib, inspect, pkgutil
 import numpy as np
 import armkin
@@ -68,6 +70,7 @@ calls = {
     "method": lambda f: f(arm),
     "compile": lambda f: f,  # a compiler is asked for elsewhere
     "path": lambda f: f(arm, [[350, 0, 300], [350, 50, 300]], start=armkin.ik(arm, [350, 0, 300]).q[0]),
+    "drawing": lambda f: f(arm, SVG, [320, -50, 200]),
     "time_law": lambda f: f(arm, np.linspace(0, 0.1, 20)[:, None] * [1, 1, 1]),
     "joints": lambda f: f(arm, [100, 200, 300]),
     "reach": lambda f: f(arm, grid=200.0, azimuths=6),
@@ -83,6 +86,7 @@ for name in armkin.__all__:
         called += 1
 print(called)
 """
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 20

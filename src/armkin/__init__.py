@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm as Arm
     from armkin.model.lock import lock as lock
     from armkin.model.lock import unlock as unlock
+    from armkin.motion.drawings import drawing as drawing
     from armkin.motion.path import path as path
     from armkin.motion.plan.path_plan import PathPlan as PathPlan
     from armkin.motion.time_law import time_law as time_law
@@ -88,6 +89,7 @@ _HOME = {
     "Arm": "model.arm",
     "lock": "model.lock",
     "unlock": "model.lock",
+    "drawing": "motion.drawings",
     "path": "motion.path",
     "time_law": "motion.time_law",
     "PathPlan": "motion.plan.path_plan",

@@ -30,7 +30,7 @@ import armkin
 from armkin.forward import condition
 from armkin.motion.tool_path.placing import placing
 from armkin.path_file import gcode
-from armkin.path_file.drawing import Wishes
+from armkin.path_file.drawing import DrawingOptions
 from armkin.robot_file import catalogue
 
 _SEEDS = 20  # of each noise
@@ -92,7 +92,7 @@ def planned(name: str, text: str, at: list[float]) -> None:
     """Read and plan a program; print what it takes."""
     arm = armkin.load("three_dof")
     began = time.process_time()
-    file = gcode.parse(text.encode(), "points.gcode", placing(arm, at), Wishes())
+    file = gcode.parse(text.encode(), "points.gcode", placing(arm, at), DrawingOptions())
     read = time.process_time() - began
     plan = armkin.path(arm, file)
     spent = time.process_time() - began

@@ -15,16 +15,16 @@ from armkin.inverse.tasks.fitting import task_for
 from armkin.model.targets import targets_in
 from armkin.motion.tool_path.placing import placing
 from armkin.path_file import gcode, gcode_arcs
-from armkin.path_file.drawing import Placing, Wishes
+from armkin.path_file.drawing import DrawingOptions, Placing
 from command_line import run
 
 AS_IT_IS = Placing((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
-def moves(text: str, **wishes: Any) -> list[tuple[str, Any]]:
+def moves(text: str, **options: Any) -> list[tuple[str, Any]]:
     """Kinds and values of the moves, polylines and targets rounded."""
     out: list[tuple[str, Any]] = []
-    for move in gcode.parse(text.encode(), "t.gcode", AS_IT_IS, Wishes(**wishes)).moves:
+    for move in gcode.parse(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions(**options)).moves:
         value = getattr(move, move.kind)
         if move.kind in ("polyline", "point"):
             value = np.round(value, 6).tolist()
@@ -131,7 +131,7 @@ def test_a_checksum_counts_the_comments_before_it(comment: str) -> None:
 
 def test_events_and_speeds() -> None:
     text = "G0 X1\nM3 S1000\nG1 X2 F120\nX3 F240\nM4\nG4 P0.5\nG4 S2\nM5\nM0\nG0 X4\nG28"
-    file = gcode.parse(text.encode(), "t.nc", AS_IT_IS, Wishes(grip_by="M3"))
+    file = gcode.parse(text.encode(), "t.nc", AS_IT_IS, DrawingOptions(grip_by="M3"))
     found = [(move.kind, move.tool_speed) for move in file.moves]
     assert found == [
         ("point", None), ("grip", None), ("polyline", 2.0), ("polyline", 4.0), ("wait", None), ("wait", None),
@@ -139,14 +139,16 @@ def test_events_and_speeds() -> None:
     ]  # fmt: skip
     assert [move.grip for move in file.moves if move.grip] == ["closed", "open"]
     assert [move.wait for move in file.moves if move.wait] == [0.5, 2.0, "enter"]
-    fan = gcode.parse(b"G0 X1\nM106 S255\nG1 X2\nM106 S0\nG1 X3\nM107", "t", AS_IT_IS, Wishes(3.0, grip_by="M106"))
+    fan = gcode.parse(
+        b"G0 X1\nM106 S255\nG1 X2\nM106 S0\nG1 X3\nM107", "t", AS_IT_IS, DrawingOptions(3.0, grip_by="M106")
+    )
     assert [move.grip for move in fan.moves if move.grip] == ["closed", "open"]
     assert {move.tool_speed for move in fan.moves if move.polyline} == {3.0}
 
 
 def test_what_is_ignored_is_noted_once_a_word() -> None:
     text = "M104 S200\nM104 S210\nT0\nG0 X1 E2\nG1 X2\nG10\nG11\nG40 G49 G61 G80 G94\nG64 P0.1\nG91.1\nG29 P1 X2"
-    notes = gcode.parse(text.encode(), "t", AS_IT_IS, Wishes()).notes
+    notes = gcode.parse(text.encode(), "t", AS_IT_IS, DrawingOptions()).notes
     words = [note.split()[0] for note in notes]
     assert words == ["M104", "S", "T", "E", "G10", "G11", "G40", "G49", "G61", "G80", "G94", "G64", "G91.1", "G29"]
     assert notes[0] == "M104 is ignored (line 1, and 1 more)"
@@ -154,7 +156,7 @@ def test_what_is_ignored_is_noted_once_a_word() -> None:
 
 def test_s_is_noted_where_nothing_takes_it() -> None:
     def words(text: str, grip_by: str | None = None) -> list[str]:
-        notes = gcode.parse(f"{text}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, Wishes(grip_by=grip_by)).notes
+        notes = gcode.parse(f"{text}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, DrawingOptions(grip_by=grip_by)).notes
         return [note.split()[0] for note in notes]
 
     assert words("S100") == ["S"]
@@ -164,10 +166,10 @@ def test_s_is_noted_where_nothing_takes_it() -> None:
 
 
 def test_the_number_of_a_cam_program_is_noted_and_a_macro_of_that_letter_refused() -> None:
-    file = gcode.parse(b"%\nO1001 (pocket)\nG0 X1\nG1 X2 F60\nM30\n%", "t", AS_IT_IS, Wishes())
+    file = gcode.parse(b"%\nO1001 (pocket)\nG0 X1\nG1 X2 F60\nM30\n%", "t", AS_IT_IS, DrawingOptions())
     assert file.notes == ("O is ignored (line 2)",)
     with pytest.raises(PathFileError, match="t:1: 'SUB' is no word"):
-        gcode.parse(b"O100 SUB\nG0 X1\nG1 X2 F60", "t", AS_IT_IS, Wishes())
+        gcode.parse(b"O100 SUB\nG0 X1\nG1 X2 F60", "t", AS_IT_IS, DrawingOptions())
 
 
 def test_a_program_has_as_many_points_as_any_path() -> None:
@@ -178,18 +180,18 @@ def test_a_program_has_as_many_points_as_any_path() -> None:
 
 def test_a_cycle_that_ends_leaves_the_motion_as_it_was() -> None:
     one, other = (
-        gcode.parse(f"G0 X1\nG1 X2 F60{word}\nX3".encode(), "t", AS_IT_IS, Wishes()) for word in ("\nG80", "")
+        gcode.parse(f"G0 X1\nG1 X2 F60{word}\nX3".encode(), "t", AS_IT_IS, DrawingOptions()) for word in ("\nG80", "")
     )
     assert one.moves == other.moves
-    assert gcode.parse(b"G80 G0 X1\nG1 X2 F60", "t", AS_IT_IS, Wishes()).notes == ("G80 is ignored (line 1)",)
+    assert gcode.parse(b"G80 G0 X1\nG1 X2 F60", "t", AS_IT_IS, DrawingOptions()).notes == ("G80 is ignored (line 1)",)
 
 
 def test_home_takes_the_flags_that_slicers_give_it() -> None:
     for line in ("G28 W ; home all without mesh bed level", "G28 X Y", "G28 X0 Y0", "N1 G28 O"):
-        file = gcode.parse(f"{line}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, Wishes())
+        file = gcode.parse(f"{line}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, DrawingOptions())
         assert [move.kind for move in file.moves] == ["joint", "point", "polyline"]
     with pytest.raises(PathFileError, match="t:1: 'X' is no word"):
-        gcode.parse(b"G1 X", "t", AS_IT_IS, Wishes())
+        gcode.parse(b"G1 X", "t", AS_IT_IS, DrawingOptions())
 
 
 @pytest.mark.parametrize(
@@ -274,7 +276,7 @@ def test_lines_that_are_read_in_one_step_are_read_as_word_by_word(monkeypatch: p
 
     def read(text: str) -> object:
         try:
-            file = gcode.parse(text.encode(), "t.gcode", AS_IT_IS, Wishes())
+            file = gcode.parse(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions())
         except PathFileError as error:
             return str(error)
         return [move.model_dump() for move in file.moves], file.notes
@@ -290,7 +292,9 @@ def test_an_arc_without_radius_draws_nothing() -> None:
     arm = armkin.load("three_dof")
 
     def planned(text: str) -> float:
-        return armkin.path(arm, gcode.parse(text.encode(), "t.gcode", placing(arm, [330, -10, 250]), Wishes())).length
+        return armkin.path(
+            arm, gcode.parse(text.encode(), "t.gcode", placing(arm, [330, -10, 250]), DrawingOptions())
+        ).length
 
     with pytest.raises(UsageError, match=r"t\.gcode:1: .*its points are all the same"):
         planned("G0 X0 Y0\nG2 X0 Y0 I0 J0")

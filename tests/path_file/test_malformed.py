@@ -10,7 +10,7 @@ import pytest
 import random_drawings
 from armkin.errors import PathFileError
 from armkin.path_file import gcode, svg, table
-from armkin.path_file.drawing import Wishes
+from armkin.path_file.drawing import DrawingOptions
 from read_twice import AS_IT_IS
 
 _JUNK = [b"1e999", b"-", b"nan", b"(", b"%", b"<g>", b"\0", b"\xff\xfe", b"N1*5", b"G10 L20 P9", b"R-1", b"F0", b"P1e9",
@@ -47,7 +47,7 @@ def test_what_is_damaged_is_read_or_refused_with_its_line(kind: str) -> None:
     for seed in range(40):
         raw = damaged(make(seed), rng, kind != "attributes")
         try:
-            parse(raw, "t", AS_IT_IS, Wishes())
+            parse(raw, "t", AS_IT_IS, DrawingOptions())
         except PathFileError as error:
             refused.append((str(error), raw.count(b"\n") + 1))
     assert len(refused) >= 10

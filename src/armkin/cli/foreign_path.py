@@ -42,8 +42,7 @@ def moves(
 ) -> PathFile | None:
     """The moves of a drawing; None: the file is none. Raises UsageError for options that make no sense."""
     from armkin import path_file
-    from armkin.motion.tool_path.placing import placing
-    from armkin.path_file.drawing import Wishes
+    from armkin.motion.drawings import drawing
 
     given = {"--at": at, "--scale": scale, "--feed": feed, "--lift": lift, "--grip-by": grip_by}
     if file is None or path_file.foreign(file) is None:
@@ -65,7 +64,7 @@ def moves(
     if height < 0:
         raise UsageError(f"--lift: '{lift}' must be at least 0")
     files.keep(file)
-    made = path_file.read_drawing(file, placing(arm, zero, task=task, scale=factor), Wishes(speed, height, grip_by))
+    made = drawing(arm, file, zero, task=task, scale=factor, feed=speed, lift=height, grip_by=grip_by)
     for text in made.notes:
         output.note(text)
     return made

@@ -9,6 +9,7 @@ branches/          the joints' ways: every branch along the tool's way, and the 
 walk.py            goes through the moves of a path; moves.py says what each kind does
 path_planner.py    the best plan of all; branch_report.py: what is said of each branch
 path.py            `armkin.path`; redundant.py: of arms with a redundant joint; held.py: joints held
+drawings.py        `armkin.drawing`: G-code and SVG as such a path
 outline.py         where a path leads the tool, before a branch or a place of the arm is chosen
 jog_line.py        the line of one axis that a held button moves the tip along
 

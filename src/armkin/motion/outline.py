@@ -13,7 +13,7 @@ from armkin.motion.moves import MOVES
 from armkin.motion.path_planner import TOLERANCE, corners_wished
 from armkin.motion.tool_path.geometry import line
 from armkin.motion.tool_path.route import joined
-from armkin.motion.walk import Walk, Wishes
+from armkin.motion.walk import PathOptions, Walk
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -29,7 +29,7 @@ def routes(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Array]]:
     """
     corner = corners_wished(file, None, None)
     pace = Pace(tolerance=file.tolerance or TOLERANCE)
-    outline = _Outline(arm, file, pace, arm.home, Wishes(file.task, corner, None, None, False, None))
+    outline = _Outline(arm, file, pace, arm.home, PathOptions(file.task, corner, None, None, False, None))
     outline.step, outline.found = step, []
     outline.walked(MOVES)
     if not outline.found:

@@ -14,7 +14,7 @@ from armkin.motion.joint_moves import check_jerk, check_share
 from armkin.motion.moves import MOVES
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.proved_free import checked
-from armkin.motion.walk import Walk, Wishes
+from armkin.motion.walk import PathOptions, Walk
 from armkin.motors import settled, undriven
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def planned(
         here = settled(arm, here)
     near = None if near is None else np.asarray(near, dtype=float)
     wish = corners_wished(file, corners, blend)
-    return checked(Walk(arm, file, pace, here, Wishes(task, wish, near, branch, split, samples)).walked(MOVES))
+    return checked(Walk(arm, file, pace, here, PathOptions(task, wish, near, branch, split, samples)).walked(MOVES))
 
 
 def corners_wished(file: PathFile, corners: str | None, blend: float | None) -> float | Literal["default"] | None:

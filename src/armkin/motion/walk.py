@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Wishes:
+class PathOptions:
     """What `path` was asked for beside the moves and their pace."""
 
     task: str | None
@@ -68,10 +68,10 @@ class Walk:
     before: tuple[dict[str, Any], dict[str, Any]] = ({}, {})  # the walk and its plan, before it was reached
     at = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
 
-    def __init__(self, arm: Arm, file: PathFile, pace: Pace, here: Array, wishes: Wishes) -> None:
-        self.arm, self.file, self.pace, self.wishes = arm, file, pace, wishes
+    def __init__(self, arm: Arm, file: PathFile, pace: Pace, here: Array, options: PathOptions) -> None:
+        self.arm, self.file, self.pace, self.options = arm, file, pace, options
         with _of_key(file, "task"):
-            self.plan = PathPlan(arm, _task(arm, file, wishes.task or file.task), pace.tolerance, pace.speed)
+            self.plan = PathPlan(arm, _task(arm, file, options.task or file.task), pace.tolerance, pace.speed)
         self.q = here  # where the joints are when all so far is done
         self.made: list[Stretch] = []
         self.markers: list[Marker] = []  # what happens between stretches
@@ -181,9 +181,9 @@ class Walk:
         """How the corner at a move's end is passed: the radius of its blend, None: by the tolerance."""
         if move.blend is not None:
             return move.blend
-        if self.wishes.corner == "default":
+        if self.options.corner == "default":
             return None if inner else 0.0
-        return self.wishes.corner
+        return self.options.corner
 
     def typed(self, sums: Array) -> None:
         """Where the tool is, sums of angles keep the whole turns that were typed."""
@@ -239,7 +239,7 @@ class Walk:
         if route.length < geometry.SMALL:
             raise UsageError("the tool's way has no length: its points are all the same")
         free = self.goal is not None
-        near = self.q if self.wishes.near is None else self.wishes.near
+        near = self.q if self.options.near is None else self.options.near
         s, runs = self._runs(route, near, free=free)
         for k, run in enumerate(runs):
             fixed = self.q if not free and k == 0 and run.first == 0 and stands(run.chain, self.q) else None
@@ -256,13 +256,13 @@ class Walk:
 
     def _runs(self, route: Route, near: Array, *, free: bool) -> tuple[Array, list[Run]]:
         """A route's samples and the runs that carry it; the other branches, of many samples, are forgotten."""
-        branch = (self.goal_branch or self.wishes.branch) if free else None
+        branch = (self.goal_branch or self.options.branch) if free else None
         carried = carry(
             self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
-            fixed=None if free else self.q, branch=branch, count=self.wishes.samples,
+            fixed=None if free else self.q, branch=branch, count=self.options.samples,
         )  # fmt: skip
         branch_report.note(self.plan, carried, near)
-        if not carried.whole and not (self.wishes.split and carried.covered):
+        if not carried.whole and not (self.options.split and carried.covered):
             raise branch_report.refused(self.plan, carried, branch)
         return carried.columns.s, carried.moving
 
@@ -330,7 +330,7 @@ def _reached(walk: Walk, goal: Spot, branch: str | None) -> Array:
 def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
     """Joint values of a target on all branches within limits, or on the named one, the nearest first."""
     found = ik(walk.arm, geometry.line(walk.task, goal, goal).targets(np.zeros(1))[0], walk.task.name, near=walk.q)
-    meant = find(found.names, wanted) if (wanted := branch or walk.wishes.branch) else None
+    meant = find(found.names, wanted) if (wanted := branch or walk.options.branch) else None
     free = found.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
     good = found.valid & found.within_limits & (True if free is None else free)
     postures = tuple(found.q[b] for b in found.order if good[b] and (meant is None or found.branch[b] in meant))

@@ -22,7 +22,7 @@ from armkin.path_file.model import Move, PathFile, Source
 from armkin.robot_file import strict_yaml
 
 if TYPE_CHECKING:
-    from armkin.path_file.drawing import Placing, Wishes
+    from armkin.path_file.drawing import DrawingOptions, Placing
 
 LARGEST = 32_000_000  # [bytes]
 _KIND = strict_yaml.Kind(
@@ -47,7 +47,7 @@ def read(name: str) -> PathFile:
     """Read a path file, by its ending YAML or CSV. Raises FileError, or PathFileError with the line."""
     if foreign(name):
         raise PathFileError(
-            f"{name}: a drawing does not say where its zero lies in the arm's frame; read_drawing and a place do",
+            f"{name}: a drawing does not say where its zero lies for the arm; armkin.drawing(arm, file, at) does",
             file=name,
         )
     return parse(_bytes(name), name)
@@ -58,16 +58,16 @@ def foreign(name: str) -> str | None:
     return _FOREIGN.get(os.path.splitext(name)[1].lower())
 
 
-def read_drawing(name: str, placing: Placing, wishes: Wishes) -> PathFile:
+def read_drawing(name: str, placing: Placing, options: DrawingOptions) -> PathFile:
     """Read G-code or SVG as a path. Raises FileError, or PathFileError with line and word."""
     raw = _bytes(name)
     if foreign(name) == "svg":
         from armkin.path_file import svg
 
-        return svg.parse(raw, name, placing, wishes)
+        return svg.parse(raw, name, placing, options)
     from armkin.path_file import gcode
 
-    return gcode.parse(raw, name, placing, wishes)
+    return gcode.parse(raw, name, placing, options)
 
 
 def _bytes(name: str) -> bytes:

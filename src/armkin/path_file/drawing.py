@@ -45,7 +45,7 @@ class Placing:
 
 
 @dataclass(frozen=True)
-class Wishes:
+class DrawingOptions:
     """What the command line says of a foreign file beside its place."""
 
     feed: float | None = None  # [mm/s] where the file says none

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from armkin.errors import PathFileError
 from armkin.path_file import gcode_arcs
-from armkin.path_file.drawing import LARGEST, Pen, Placing, Point, Wishes
+from armkin.path_file.drawing import LARGEST, DrawingOptions, Pen, Placing, Point
 from armkin.path_file.gcode_words import PLAIN, Words, lines, words_of, wrong
 from armkin.path_file.model import MOST_POINTS, PathFile
 
@@ -36,12 +36,12 @@ _NO_AXES = [None] * 3
 _KNOWN_G = {*_GROUP, *_IGNORED_G, 53.0}
 
 
-def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
+def parse(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> PathFile:
     """The path of a program. Raises PathFileError with line and word for what is refused."""
     if b"\0" in raw:
         line = raw.partition(b"\0")[0].count(b"\n") + 1
         raise PathFileError(f"{name}:{line}: is no text; binary G-code must be written as text", file=name, line=line)
-    program = _Program(name, Pen(placing), wishes)
+    program = _Program(name, Pen(placing), options)
     program.run(lines(raw.decode("utf-8-sig", "replace"), name))
     notes = [
         f"{word} is ignored (line {program.first[word]}{f', and {n - 1} more' if n > 1 else ''})"
@@ -53,8 +53,8 @@ def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
 class _Program:
     """The modal state of a machine that reads a program."""
 
-    def __init__(self, name: str, pen: Pen, wishes: Wishes) -> None:
-        self.name, self.pen, self.wishes = name, pen, wishes
+    def __init__(self, name: str, pen: Pen, options: DrawingOptions) -> None:
+        self.name, self.pen, self.options = name, pen, options
         self.at = _ZERO  # [mm] in the machine's coordinates
         self.drawn = False  # whether the pen is at the file's point
         self.motion: float | None = None
@@ -116,7 +116,7 @@ class _Program:
                 self._switch(code, gripped)
         values.pop("S", None)
         waits = 4.0 in codes and "P" not in values
-        if gripped is not None and not waits and not (self.wishes.grip_by == "M106" and 106.0 in m_codes):
+        if gripped is not None and not waits and not (self.options.grip_by == "M106" and 106.0 in m_codes):
             self._ignore("S")
         if 4.0 in codes:
             self._dwell(values, gripped)
@@ -169,7 +169,7 @@ class _Program:
 
     def _switch(self, code: float, speed: float | None) -> None:
         """An M word: the gripper's, or ignored."""
-        by, close = self.wishes.grip_by, None
+        by, close = self.options.grip_by, None
         if by == "M3" and code in (3.0, 4.0, 5.0):
             close = code != 5.0
         elif by == "M106" and code in (106.0, 107.0):
@@ -293,7 +293,7 @@ class _Program:
     def _speed(self, word: str) -> float | None:
         """The tool's speed [mm/s]; None: as fast as the joints go."""
         if self.feed is None:
-            return self.wishes.feed
+            return self.options.feed
         if self.feed == 0:
             raise self._wrong(f"{word} with F0 never arrives")
         return self.feed / 60

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from armkin.errors import PathFileError
-from armkin.path_file.drawing import LARGEST, Pen, Placing, Wishes
+from armkin.path_file.drawing import LARGEST, DrawingOptions, Pen, Placing
 from armkin.path_file.model import MOST_POINTS, PathFile
 from armkin.path_file.svg_shapes import (
     Matrix,
@@ -45,7 +45,7 @@ class _Element:
         return self.attributes.get(key)
 
 
-def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
+def parse(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> PathFile:
     """The path of a drawing: x right, y up, zero at the viewBox's lower left corner.
 
     Raises PathFileError with the line of what is refused.
@@ -54,7 +54,7 @@ def parse(raw: bytes, name: str, placing: Placing, wishes: Wishes) -> PathFile:
     if root.tag != "svg":
         raise PathFileError(f"{name}:{root.line}: is <{root.tag}>, and no <svg>", file=name, line=root.line)
     named = {one.attributes["id"]: one for one in _all(root) if "id" in one.attributes}
-    pen = _Drawer(name, Pen(placing), wishes, wishes.lift / placing.scale)
+    pen = _Drawer(name, Pen(placing), options, options.lift / placing.scale)
     try:
         frame = _frame(root)
     except ShapeError as error:
@@ -133,7 +133,7 @@ class _Drawer:
 
     name: str
     pen: Pen
-    wishes: Wishes
+    options: DrawingOptions
     height: float  # [mm of the drawing] of the lifted pen
     at: Point | None = None
     points: int = 0
@@ -199,12 +199,12 @@ class _Drawer:
         if self.at is None or abs(self.at[0] - x) + abs(self.at[1] - y) > _SAME:
             self._to((x, y, 0.0), line)
         for x, y in stroke[1:]:
-            self.pen.line((x, y, 0.0), self.wishes.feed, line)
+            self.pen.line((x, y, 0.0), self.options.feed, line)
         self.at, self.line = stroke[-1], line
 
     def _to(self, p: tuple[float, float, float], line: int) -> None:
         if self.height > 0:
-            self.pen.line(p, self.wishes.feed, line)
+            self.pen.line(p, self.options.feed, line)
 
     def lift(self) -> None:
         """Lift the pen where it is."""
