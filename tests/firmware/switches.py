@@ -10,7 +10,7 @@ from emulator import EmulatedBoard
 
 from command_line import ROOT, THREE_DOF
 
-HOMING = """    homing: {{switch: {switch}, direction: {way}, at: {at}, speed: 20, backoff: 2, normally: open{order}}}
+HOMING = """    homing: {{switch: {switch}, direction: {way}, at: {at}, speed: 40, backoff: 2, normally: open{order}}}
 """
 AT = {"X": -4302, "Y": 3700, "Z": -2333}  # -121, 121 and -125 deg in steps from home
 EDGES = {"X": -900, "Y": 1500, "Z": -1200}  # in steps from where the arm was left
