@@ -12,7 +12,9 @@ import { Usb } from './usb.mjs';
 
 const SLICE = CLOCK_HZ / 4000;
 
-const { values: options } = parseArgs({
+/** @param {string[]} args */
+const read = (args) => parseArgs({
+  args,
   options: {
     board: { type: 'string' }, elf: { type: 'string' }, port: { type: 'string', default: '' }, stdin: { type: 'boolean' },
     speed: { type: 'string', default: '1' }, ahead: { type: 'string', default: '50' }, patience: { type: 'string', default: '0' },
@@ -21,7 +23,8 @@ const { values: options } = parseArgs({
     trace: { type: 'string' }, seed: { type: 'string', default: '1' }, fd: { type: 'string' },
     by: { type: 'string', default: 'uart' },
   },
-});
+}).values;
+let options = read(process.argv.slice(2));
 
 const stepped = options.speed === 'step';
 const pace = {
@@ -29,58 +32,71 @@ const pace = {
   patience: Number(options.patience) / 1e3,
 };
 const MOST_PATIENCE = 10_000_000_000n; // [ns] whoever is silent for so long has closed the port, which is not seen here
-const heard = []; // bytes from the board that nobody has taken yet
+let pins, line, usb, host, chip, commands;
 
-const pins = new Pins(options.driver, options.trace);
-const line = new Line(
-  Number(options.baud),
-  (byte, cycle) => {
+/** A board that has just been switched on. */
+function make() {
+  const heard = []; // bytes from the board that nobody has taken yet
+  pins = new Pins(options.driver, options.trace);
+  line = new Line(
+    Number(options.baud),
+    (byte, cycle) => {
+      heard.push(byte);
+      pins.record(251, byte, cycle);
+    },
+    (byte, cycle) => pins.record(250, byte, cycle),
+  );
+  usb = new Usb((byte, cycle) => {
     heard.push(byte);
     pins.record(251, byte, cycle);
-  },
-  (byte, cycle) => pins.record(250, byte, cycle),
-);
-const usb = new Usb((byte, cycle) => {
-  heard.push(byte);
-  pins.record(251, byte, cycle);
-});
-const host = options.by === 'usb' ? usb : line; // what the port is connected to
-const chip = new Chip(
-  readUf2(fs.readFileSync(options.elf)),
-  (rp2040, self) => {
-    pins.attach(rp2040, self);
-    line.attach(rp2040, self);
-    usb.attach(rp2040, self);
-  },
-  Number(options.seed),
-);
-const commands = new Commands({ chip, pins, line, usb, host, heard, stepped });
-chip.outside = {
-  get next() {
-    return Math.min(line.next, usb.next, commands.next);
-  },
-  due(cycle) {
-    line.due(cycle);
-    usb.due(cycle);
-    commands.due(cycle);
-  },
-};
+  });
+  host = options.by === 'usb' ? usb : line; // what the port is connected to
+  chip = new Chip(
+    readUf2(fs.readFileSync(options.elf)),
+    (rp2040, self) => {
+      pins.attach(rp2040, self);
+      line.attach(rp2040, self);
+      usb.attach(rp2040, self);
+    },
+    Number(options.seed),
+  );
+  commands = new Commands({ chip, pins, line, usb, host, heard, stepped });
+  chip.outside = {
+    get next() {
+      return Math.min(line.next, usb.next, commands.next);
+    },
+    due(cycle) {
+      line.due(cycle);
+      usb.due(cycle);
+      commands.due(cycle);
+    },
+  };
+  for (const command of options.do) {
+    const answer = commands.carryOut(command);
+    if (answer.error) {
+      process.stderr.write(`simboard: ${command}: ${answer.error}\n`);
+      process.exit(2);
+    }
+  }
+  say({ ok: true, port: options.port, board: 'pico6' });
+}
 
 function say(answer) {
   process.stdout.write(JSON.stringify(answer) + '\n');
 }
 
-for (const command of options.do) {
-  const answer = commands.carryOut(command);
-  if (answer.error) {
-    process.stderr.write(`simboard: ${command}: ${answer.error}\n`);
-    process.exit(2);
-  }
-}
-say({ ok: true, port: options.port, board: 'pico6' });
+make();
 if (options.stdin || process.stdin.isTTY) {
   const lines = readline.createInterface({ input: process.stdin });
-  lines.on('line', (text) => say(commands.carryOut(text)));
+  lines.on('line', (text) => {
+    if (stepped && text.startsWith('renew ')) { // another board, with its options in JSON: this process is warm
+      pins.end();
+      options = read(JSON.parse(text.slice(6)));
+      make();
+    } else {
+      say(commands.carryOut(text));
+    }
+  });
   if (options.stdin) {
     lines.on('close', end);
   }
@@ -118,8 +134,8 @@ function turn() {
   const until = process.hrtime.bigint() + 2_000_000n; // then the host gets a look
   while (process.hrtime.bigint() < until && (free() || chip.cycle < allowed())) {
     chip.runUntil(chip.cycle + SLICE);
-    if (heard.length) {
-      port.write(Buffer.from(heard.splice(0)));
+    if (commands.heard.length) {
+      port.write(Buffer.from(commands.heard.splice(0)));
     }
   }
   if (free() || clock() - chip.cycle > 0.05 * CLOCK_HZ) {

@@ -91,6 +91,14 @@ export class Pins {
     }
   }
 
+  /** Nothing more will be recorded. */
+  end() {
+    this.flush();
+    if (this.trace !== undefined) {
+      fs.closeSync(this.trace);
+    }
+  }
+
   #changed(gpio, signal, high) {
     const before = this.level.get(gpio) ?? gpio === ENABLE;
     this.level.set(gpio, high);
