@@ -86,7 +86,7 @@ def ik(
         rounding is None
         and not single
         and examine
-        and values.ndim <= 2
+        and (values.ndim == 1 or values.shape == (4, 4))  # a batch prepares nothing for one
         and (one := one_target.prepared(arm, task)) is not None
         and (alone := one.solve(values, near)) is not None
     ):
