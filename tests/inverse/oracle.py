@@ -7,6 +7,7 @@ eq. 4.14). The oracle for branches is a damped Newton iteration from many random
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -90,16 +91,23 @@ def screws(file: Any) -> Screws:
 
 def exponential(screw: Screws, joint: int, q: Array) -> Array:
     """exp([S] q) of one joint: (..., 4, 4) (Rodrigues' formula)."""
-    w, p = screw.w[joint], screw.p[joint]
-    E = np.zeros((*q.shape, 4, 4)) + np.eye(4)
-    if screw.prismatic[joint]:
-        E[..., :3, 3] = q[..., None] * w
-        return E
-    K = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-    s, c1 = np.sin(q)[..., None, None], 2 * np.sin(q / 2)[..., None, None] ** 2
-    E[..., :3, :3] += s * K + c1 * (K @ K)
-    E[..., :3, 3] = p - E[..., :3, :3] @ p
-    return E
+    once, twice = _generators(screw.w[joint].tobytes(), screw.p[joint].tobytes(), bool(screw.prismatic[joint]))
+    angle = q[..., None, None]
+    if twice is None:
+        return np.eye(4) + angle * once
+    return np.eye(4) + np.sin(angle) * once + 2 * np.sin(angle / 2) ** 2 * twice
+
+
+@lru_cache(maxsize=1024)
+def _generators(direction: bytes, point: bytes, slides: bool) -> tuple[Array, Array | None]:
+    """[S] of a joint, 4 x 4, and of one that turns its square."""
+    w, p, S = np.frombuffer(direction), np.frombuffer(point), np.zeros((4, 4))
+    if slides:
+        S[:3, 3] = w
+        return S, None
+    S[:3, :3] = [[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]
+    S[:3, 3] = -S[:3, :3] @ p
+    return S, S @ S
 
 
 def forward(screw: Screws, q: Array) -> Array:
@@ -113,20 +121,15 @@ def forward(screw: Screws, q: Array) -> Array:
 def forward_and_jacobian(screw: Screws, q: Array) -> tuple[Array, Array]:
     """Poses (M, 4, 4) and Jacobians (M, 6, n) of the tool, linear rows first."""
     P = np.broadcast_to(np.eye(4), (len(q), 4, 4))
-    axes, points = [], []
+    lines = np.empty((len(q), len(screw.prismatic), 3, 2))  # of each axis its direction and a point
     for i in range(len(screw.prismatic)):
-        axes.append(P[:, :3, :3] @ screw.w[i])
-        points.append(P[:, :3, :3] @ screw.p[i] + P[:, :3, 3])
+        lines[:, i] = P[:, :3] @ np.array([[*screw.w[i], 0.0], [*screw.p[i], 1.0]]).T
         P = P @ exponential(screw, i, q[:, i])
     T = P @ screw.M
-    J = np.zeros((len(q), 6, len(axes)))
-    for i, (w, p) in enumerate(zip(axes, points, strict=True)):
-        if screw.prismatic[i]:
-            J[:, :3, i] = w
-        else:
-            J[:, :3, i] = np.cross(w, T[:, :3, 3] - p)
-            J[:, 3:, i] = w
-    return T, J
+    w, lever = lines[..., 0], T[:, None, :3, 3] - lines[..., 1]
+    slides = screw.prismatic[:, None]
+    moved = np.where(slides, w, np.cross(w, lever))
+    return T, np.concatenate([moved, np.where(slides, 0.0, w)], axis=2).swapaxes(1, 2)
 
 
 class Goal(NamedTuple):
@@ -182,21 +185,27 @@ def _residual(screw: Screws, goals: Goal, q: Array) -> tuple[Array, Array]:
     """Residual (M, r) and its Jacobian (M, r, n), lengths in units of the arm's size."""
     T, J = forward_and_jacobian(screw, q)
     r = [(goals.T - T)[:, : goals.position, 3] / screw.size]
-    rows = [J[:, : goals.position] / screw.size]
     if len(goals.sums):
         off = goals.sum_values - goals.offsets - q @ goals.sums.T
         r.append(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
-        rows.append(np.broadcast_to(goals.sums, (len(q), *goals.sums.shape)))
     if goals.orientation == "full":
-        cross = np.cross(T[:, :3, :3], goals.T[:, :3, :3], axis=1).sum(axis=2)
-        r.append(0.5 * cross)
+        r.append(0.5 * np.cross(T[:, :3, :3], goals.T[:, :3, :3], axis=1).sum(axis=2))
+    if goals.orientation == "axis":
+        r.append(np.cross(T[:, :3, 2], goals.T[:, :3, 2]))
+    return np.concatenate(r, axis=1), _constrained(screw, goals, T, J)
+
+
+def _constrained(screw: Screws, goals: Goal, T: Array, J: Array) -> Array:
+    """Of the Jacobian (M, 6, n) of poses (M, 4, 4) what constraints see: (M, r, n)."""
+    rows = [J[:, : goals.position] / screw.size]
+    if len(goals.sums):
+        rows.append(np.broadcast_to(goals.sums, (len(J), *goals.sums.shape)))
+    if goals.orientation == "full":
         rows.append(J[:, 3:])
     if goals.orientation == "axis":
-        z, wanted = T[:, :3, 2], goals.T[:, :3, 2]
-        r.append(np.cross(z, wanted))
-        across = np.eye(3) - z[:, :, None] * z[:, None, :]
-        rows.append(across @ J[:, 3:])
-    return np.concatenate(r, axis=1), np.concatenate(rows, axis=1)
+        z = T[:, :3, 2]
+        rows.append((np.eye(3) - z[:, :, None] * z[:, None, :]) @ J[:, 3:])
+    return np.concatenate(rows, axis=1)
 
 
 def newton(screw: Screws, goals: Goal, q: Array, steps: int = 40) -> tuple[Array, Array]:
@@ -256,7 +265,7 @@ def distance(screw: Screws, a: Array, b: Array) -> Array:
 
 def weakness(screw: Screws, goals: Goal, q: Array) -> Array:
     """Smallest singular value of the constraints' Jacobian (M,), lengths and slides in the arm's size."""
-    _, J = _residual(screw, goals, q)
+    J = _constrained(screw, goals, *forward_and_jacobian(screw, q))
     S = np.linalg.svd(J * np.where(screw.prismatic, screw.size, 1.0), compute_uv=False)
     rank = goals.position + len(goals.sums) + {"none": 0, "axis": 2, "full": 3}[goals.orientation]
     return np.asarray(S[:, min(rank, q.shape[1]) - 1], dtype=float)

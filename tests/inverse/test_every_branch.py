@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +18,18 @@ from armkin.model.arm import Arm
 ROBOTS = Path(__file__).parents[2] / "robots"
 TASKLESS = {"pan_tilt"}
 NAMES = sorted(path.stem for path in ROBOTS.glob("*.yaml") if path.stem not in TASKLESS)
+# arms that differ from another one in their lengths alone, or in nothing but their drives
+ALIKE = {
+    "ar4_pico6": "ar4",
+    "kuka_kr6_r700": "irb2400",
+    "parol6_pico6": "parol6",
+    "ra02_screws": "ra02",
+    "roarm_m2": "yaw_two_link",
+    "thor_pico6": "thor",
+    "ur10e": "ur5e",
+    "ur3e": "ur5e",
+}
+UNLIKE = [name for name in NAMES if name not in ALIKE]
 SLOW = dict.fromkeys(
     ("jaco_j2n6s300", "moveo", "panda", "iiwa7", "kinova_gen3", "xarm6", "niryo_ned2", "fanuc_crx10ia"), 1000
 )  # poses for arms that need the elimination
@@ -61,6 +74,24 @@ def locked(screw: Screws, joint: int, value: float) -> Screws:
     p[joint + 1 :] = p[joint + 1 :] @ E[:3, :3].T + E[:3, 3]
     kept = [i for i in range(len(w)) if i != joint]
     return Screws(w[kept], p[kept], screw.prismatic[kept], E @ screw.M)
+
+
+def between_axes(screw: Screws) -> tuple[list[bool], list[float], list[bool]]:
+    """Which joints slide; of every two axes the cosine of their angle, and whether they meet or are one line."""
+    cosines, meet = [], []
+    for i, j in itertools.combinations(range(len(screw.prismatic)), 2):
+        w, v, apart = screw.w[i], screw.w[j], screw.p[j] - screw.p[i]
+        cosines.append(abs(float(w @ v)))
+        across = np.cross(w, v) if abs(w @ v) < 1 - 1e-9 else np.cross(w, np.cross(w, apart))
+        meet.append(abs(float(apart @ across)) < 1e-6 * screw.size * float(np.linalg.norm(across)) + 1e-9)
+    return screw.prismatic.tolist(), cosines, meet
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_arms_called_alike_are(name: str) -> None:
+    one, other = (between_axes(shipped(each)[1]) for each in (name, ALIKE[name]))
+    assert (one[0], one[2]) == (other[0], other[2])
+    np.testing.assert_allclose(one[1], other[1], atol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)

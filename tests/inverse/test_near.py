@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import truth
 from oracle import goal
-from test_every_branch import NAMES, shipped
+from test_every_branch import UNLIKE, shipped
 
 import armkin
 from armkin import Status
 from armkin.inverse.solvers.recognise import solver
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", UNLIKE)
 def test_near_as_a_batch_is_near_one_by_one(name: str, sample: Callable[[int, int], int]) -> None:
     """Row by row: at round postures, too, where joints are half a turn from `near` and motions are equal."""
     arm, screw = shipped(name)
@@ -51,7 +51,7 @@ def test_half_a_turn_from_near_is_above_it(near: float) -> None:
         assert (away[half] > 0.0).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", UNLIKE)
 def test_a_posture_on_its_limits_stays_where_its_target_is_rounded(name: str) -> None:
     """The exact answer for a rounded target may lie beyond the limit that `near`, which solves it, too, is on."""
     arm, screw = shipped(name)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from oracle import goal
-from test_every_branch import NAMES, shipped
+from test_every_branch import UNLIKE, shipped
 
 import armkin
 from armkin.inverse.branches.whole_turns import nearest_copy, nearest_number
@@ -20,7 +20,7 @@ from armkin.model.arm import Arm
 
 # without a closed form, of which none is answered in plain numbers
 GENERAL = {"fanuc_crx10ia", "jaco_j2n6s300", "kinova_gen3", "moveo", "niryo_ned2", "panda", "xarm6"}
-CLOSED = [name for name in NAMES if name not in GENERAL]
+CLOSED = [name for name in UNLIKE if name not in GENERAL]
 FIELDS = [f.name for f in fields(armkin.Solutions)]
 
 

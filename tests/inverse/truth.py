@@ -53,8 +53,10 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
     rng = np.random.default_rng(seed)
     definition, _ = solver(arm, task)
 
+    anything = oracle.goal(definition, screw, np.zeros((1, arm.n)))  # what a Jacobian sees is the task's alone
+
     def weak(q: Array) -> Array:
-        return oracle.weakness(screw, oracle.goal(definition, screw, q), q)
+        return oracle.weakness(screw, anything, q)
 
     def anywhere(k: int) -> Array:
         q = rng.uniform(-np.pi, np.pi, (k, arm.n))
@@ -188,10 +190,10 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     s = armkin.ik(arm, target, task) if near is None else armkin.ik(arm, target, task, near=near)
     goals = goal_of(definition, target)
     # what the posture asked for becomes at the rounded target: itself if it solves it, else where Newton leads it
-    asked, left = oracle.newton(screw, goals, q, 60)
-    itself = miss_of(arm, screw, goals, q) < 0.5 * SOLVES
-    asked[itself] = q[itself]
-    reached = itself | (left < 1e-12)
+    reached, asked = miss_of(arm, screw, goals, q) < 0.5 * SOLVES, q.copy()
+    led = np.flatnonzero(~reached)
+    asked[led], left = oracle.newton(screw, goals.take(led), q[led], 60)
+    reached[led] = left < 1e-12
     verdict = Verdict(len(q), s)
     none = ~s.valid.any(axis=1)
     verdict.unreachable = np.flatnonzero(reached & (none | (s.status == Status.UNREACHABLE))).tolist()
