@@ -57,8 +57,11 @@ if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
 gc.disable()
 
 import built_once  # noqa: E402
+import quickly_built  # noqa: E402
+from quickly_built import optimised  # noqa: E402, F401  # a fixture
 
 built_once.install()
+quickly_built.install()
 
 _HERE = Path(__file__).parent
 # Helpers that compile the firmware, or run it in the emulator.

@@ -45,6 +45,7 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("optimised")
 @pytest.mark.parametrize("robot", ["three_dof", "ur5e"])
 def test_compiled_clearances_are_pythons(robot: str, scene: Path) -> None:
     arm = armkin.load(robot, scene=scene)

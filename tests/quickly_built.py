@@ -1,0 +1,47 @@
+"""Machine code for tests that ask what it says: optimising takes the compiler five times as long as all else.
+
+What is optimised says the same to the last bit, as no flag lets sums change their order; `tests/compiled` and others
+that ask for the fixture `optimised` hold that, of code that is built as users have it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import pytest
+
+from armkin.compiled import toolchain
+
+if TYPE_CHECKING:
+    from armkin.compiled.arm import CompiledArm
+    from armkin.model.arm import Arm
+
+_load = toolchain.load
+
+
+def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
+    """`toolchain.load`, optimised a little."""
+    return _load(source, content, min(level, 1))
+
+
+def install() -> None:
+    """For all tests of this process."""
+    toolchain.load = load
+
+
+@lru_cache(maxsize=16)
+def _optimised(arm: Arm) -> CompiledArm:
+    from armkin.compiled.arm import CompiledArm
+
+    return CompiledArm(arm)
+
+
+@pytest.fixture
+def optimised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`armkin.compile` as users have it."""
+    import armkin.compiled.arm
+
+    monkeypatch.setattr(toolchain, "load", _load)
+    monkeypatch.setattr(armkin.compiled.arm, "_compiled", _optimised)
