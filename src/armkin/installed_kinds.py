@@ -21,7 +21,7 @@ _FIRMWARE = "firmware"  # the module of all of BOARDS
 
 
 @cache
-def own() -> tuple[str, ...]:
+def own_kinds() -> tuple[str, ...]:
     """Names of armkin's own kinds, as in a robot file: firmware's boards, then others."""
     folder = import_module(_KINDS).__path__
     return (*BOARDS, *sorted(name for _, name, _ in iter_modules(folder) if name != _FIRMWARE))
@@ -29,22 +29,22 @@ def own() -> tuple[str, ...]:
 
 @cache
 def _offered() -> dict[str, EntryPoint]:
-    return {point.name: point for point in entry_points(group=GROUP) if point.name not in own()}
+    return {point.name: point for point in entry_points(group=GROUP) if point.name not in own_kinds()}
 
 
 def names() -> tuple[str, ...]:
     """Names of all kinds that are installed."""
-    return (*own(), *sorted(_offered()))
+    return (*own_kinds(), *sorted(_offered()))
 
 
 def exists(kind: str) -> bool:
     """Whether a kind is installed; other packages are asked only for what armkin has not."""
-    return kind in own() or kind in _offered()
+    return kind in own_kinds() or kind in _offered()
 
 
 def module(kind: str) -> Any:
     """The module of a kind with other firmware; `firmware`: of armkin's own."""
-    ours = kind == _FIRMWARE or kind in own()
+    ours = kind == _FIRMWARE or kind in own_kinds()
     return import_module(f"{_KINDS}.{kind}") if ours else _offered()[kind].load()
 
 

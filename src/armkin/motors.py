@@ -125,7 +125,7 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     return np.asarray(arm.home + q)
 
 
-def settled(arm: Arm, q: ArrayLike) -> Array:
+def legal_with_same_pulses(arm: Arm, q: ArrayLike) -> Array:
     """Joint values within the limits that have the same pulses, if there are: whole steps may be half a step outside.
 
     q: (..., n) [rad | mm]. Returns (..., n); q itself where its nearest legal values have other pulses.

@@ -23,7 +23,7 @@ class _Told:
         self.lines: list[str] = []
 
     def tell(self, done: int, total: int | None, seconds: float) -> None:
-        self.lines.append(progress_bar.said("bytes", done, total, seconds))
+        self.lines.append(progress_bar.progress_text("bytes", done, total, seconds))
 
     def end(self) -> None:
         pass

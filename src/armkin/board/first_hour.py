@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from armkin.board.planner import where
+from armkin.board.planner import where_arm_stands
 from armkin.errors import NoSolutionError, PositionLostError, UsageError
 from armkin.forward import fk, jacobian
 from armkin.model import units
@@ -228,7 +228,7 @@ def _known(board: Board) -> bool:
 
 def _standing(board: Board) -> str:
     """Where the arm stands, in words."""
-    q = where(board.machine)["joints"]
+    q = where_arm_stands(board.machine)["joints"]
     if q is None:
         return "moved; its position is not known yet"
     return ", ".join(f"{name} = {value:.2f}" for name, value in zip(board.arm.joint_names, q, strict=True))

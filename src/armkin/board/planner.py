@@ -164,7 +164,7 @@ class Stream:
         return plans
 
 
-def where(machine: Backend) -> Where:
+def where_arm_stands(machine: Backend) -> Where:
     """Where the arm stands, as JSON [deg | mm]."""
     arm = machine.arm
     known = machine.position() != "lost"

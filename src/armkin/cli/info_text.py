@@ -222,9 +222,9 @@ def _keep_outs(answer: Mapping[str, Any]) -> str:
         words = ", ".join(" and ".join(pair) for pair in answer["pairs_left_out"])
         lines.append(wrapped(f"{words}: they overlap in every posture", "  left out ", " " * 11))
     if answer["hits_at_home"]:
-        from armkin.keep_out.clearance import said
+        from armkin.keep_out.clearance import hits_text
 
-        lines.append(wrapped(said(answer["hits_at_home"]), "  at home  ", " " * 11))
+        lines.append(wrapped(hits_text(answer["hits_at_home"]), "  at home  ", " " * 11))
     return "\n".join([table(rows, left=(0, 2)), "", *lines])
 
 

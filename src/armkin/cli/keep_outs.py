@@ -69,19 +69,19 @@ def check_start(machine: Backend, arm: Arm, no_scene: bool) -> None:
     check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
     if not arm.keep_out or machine.position() == "lost":
         return
-    from armkin.keep_out.clearance import hits, said
+    from armkin.keep_out.clearance import hits, hits_text
 
     [(_, found)] = hits(arm, machine.joints()[None])
     if found:
         more = "" if arm.ignores_keep_out else ": it may move out, and no farther in"
-        output.note(f"the arm stands in a hit: it {said(found)}{more}")
+        output.note(f"the arm stands in a hit: it {hits_text(found)}{more}")
 
 
 def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
     """What motions pass through under `--ignore-keep-out`."""
     import numpy as np
 
-    from armkin.keep_out.clearance import said
+    from armkin.keep_out.clearance import hits_text
     from armkin.keep_out.guard import guard
 
     deepest: dict[tuple[str, str], float] = {}
@@ -94,5 +94,5 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
             deepest[held.of(k)] = max(deepest.get(held.of(k), 0.0), float(-apart[k]))
     if deepest:
         ordered = sorted(deepest.items(), key=lambda item: -item[1])
-        words = said([{"body": body, "with": other, "depth_mm": mm} for (body, other), mm in ordered])
+        words = hits_text([{"body": body, "with": other, "depth_mm": mm} for (body, other), mm in ordered])
         output.warn(f"--ignore-keep-out: this motion {words}")

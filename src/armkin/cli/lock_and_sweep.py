@@ -27,7 +27,9 @@ def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
         k = joint_index(arm, name)
         value = units.joints_in(arm, [found[name] if i == k else 0.0 for i in range(arm.n)])
         if limits.outside(arm, value)[k]:
-            raise NoSolutionError(f"--lock {text}: {limits.said(arm, k, value[k])}", **limits.fields(arm, k, value[k]))
+            raise NoSolutionError(
+                f"--lock {text}: {limits.outside_text(arm, k, value[k])}", **limits.fields(arm, k, value[k])
+            )
     return found
 
 

@@ -17,12 +17,14 @@ class Bar:
         self.what = what
         columns = (BarColumn(_WIDTH), TextColumn("{task.fields[said]}"))
         self._drawn = Progress(*columns, console=console, auto_refresh=False, transient=True)
-        self._task: TaskID = self._drawn.add_task("", total=None, said="")
+        self._task: TaskID = self._drawn.add_task("", total=None, progress_text="")
         self._drawn.start()
 
     def tell(self, done: int, total: int | None, seconds: float) -> None:
         """So many are done, of so many, after so long."""
-        self._drawn.update(self._task, completed=done, total=total, said=said(self.what, done, total, seconds))
+        self._drawn.update(
+            self._task, completed=done, total=total, progress_text=progress_text(self.what, done, total, seconds)
+        )
         self._drawn.refresh()
 
     def end(self) -> None:
@@ -35,12 +37,12 @@ def begun(what: str) -> Bar:
     return Bar(what, Console(file=sys.stderr, highlight=False))
 
 
-def said(what: str, done: int, total: int | None, seconds: float) -> str:
+def progress_text(what: str, done: int, total: int | None, seconds: float) -> str:
     """Count, rate and time left in words.
 
-    >>> said("rows", 250_000, 1_000_000, 5.0)
+    >>> progress_text("rows", 250_000, 1_000_000, 5.0)
     '25 %  250,000 of 1,000,000 rows, 50,000/s, 0:00:15 left'
-    >>> said("rows", 250_000, None, 5.0)
+    >>> progress_text("rows", 250_000, None, 5.0)
     '250,000 rows, 50,000/s, 0:00:05'
     """
     rate = done / max(seconds, 1e-3)

@@ -54,9 +54,9 @@ def hits_said(found: Mapping[str, Any]) -> str:
     """Hits in words: ``hits table by 12.3 mm (q3)``; nothing where there are none."""
     if not found.get("hits"):
         return ""
-    from armkin.keep_out.clearance import said
+    from armkin.keep_out.clearance import hits_text
 
-    return said(found["hits"])
+    return hits_text(found["hits"])
 
 
 def violation(arm: Arm, joint: int, value: float) -> Violation:
@@ -65,12 +65,12 @@ def violation(arm: Arm, joint: int, value: float) -> Violation:
     return {"joint": arm.joint_names[joint], "value": value, "lower": lower, "upper": upper}
 
 
-def said(arm: Arm, violation: Violation) -> str:
+def violation_text(arm: Arm, violation: Violation) -> str:
     """One violation in words: ``q2 = 130 deg is outside -20 to 120 deg``."""
     from armkin.model import limits
 
     joint = arm.joint_names.index(violation["joint"])
-    return limits.said(arm, joint, violation["value"] * (1.0 if arm.prismatic[joint] else units.DEGREE))
+    return limits.outside_text(arm, joint, violation["value"] * (1.0 if arm.prismatic[joint] else units.DEGREE))
 
 
 def to_json(value: Any) -> str:
@@ -154,6 +154,6 @@ def joint_headings(arm: Arm) -> list[str]:
 def warn_of_limits(arm: Arm, found: list[Violation], near: Mapping[str, Any] | None = None) -> None:
     """Say which joints of a pose are outside their limits, and what it hits."""
     if found:
-        output.warn("; ".join(said(arm, violation) for violation in found))
+        output.warn("; ".join(violation_text(arm, violation) for violation in found))
     if near is not None and (words := hits_said(near)):
         output.warn(f"this pose {words}")

@@ -30,7 +30,7 @@ from armkin.inverse.redundant.held import arm_without, others, redundant_alone
 from armkin.inverse.redundant.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits
-from armkin.keep_out.clearance import said as hits_said
+from armkin.keep_out.clearance import hits_text as hits_said
 from armkin.model import limits, units
 from armkin.model.lock import unlock
 

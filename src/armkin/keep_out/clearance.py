@@ -92,10 +92,10 @@ def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
     return found
 
 
-def said(hits: list[Hit]) -> str:
+def hits_text(hits: list[Hit]) -> str:
     """Hits in words.
 
-    >>> said([{"body": "q3", "with": "table", "depth_mm": 12.345}])
+    >>> hits_text([{"body": "q3", "with": "table", "depth_mm": 12.345}])
     'hits table by 12.3 mm (q3)'
     """
     words = [f"{hit['with']} by {_size(hit['depth_mm'])} ({hit['body']})" for hit in hits]

@@ -37,13 +37,13 @@ def fields(arm: Arm, joint: int, value: float) -> dict[str, Any]:
     return {"joint": arm.joint_names[joint], "value": float(value) / unit, "lower": lower, "upper": upper}
 
 
-def said(arm: Arm, joint: int, value: float) -> str:
+def outside_text(arm: Arm, joint: int, value: float) -> str:
     """A joint outside its limits in words.
 
     value: [rad | mm].
 
     >>> import armkin, math
-    >>> said(armkin.load("robots/three_dof.yaml"), 1, math.radians(130))
+    >>> outside_text(armkin.load("robots/three_dof.yaml"), 1, math.radians(130))
     'q2 = 130 deg is outside -20 to 120 deg'
     """
     size, unit = (1.0, "mm") if arm.prismatic[joint] else (DEGREE, "deg")
@@ -64,4 +64,6 @@ def check_limits(arm: Arm, targets: NDArray[np.float64]) -> None:
     for row, joint in np.argwhere(outside(arm, targets)):
         which = f"waypoint {row + 1}: " if len(targets) > 1 else ""
         value = targets[row, joint]
-        raise NoSolutionError(f"{which}{said(arm, joint, value)}: nothing was moved", **fields(arm, joint, value))
+        raise NoSolutionError(
+            f"{which}{outside_text(arm, joint, value)}: nothing was moved", **fields(arm, joint, value)
+        )

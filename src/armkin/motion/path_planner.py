@@ -15,7 +15,7 @@ from armkin.motion.moves import MOVES
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.proved_free import checked
 from armkin.motion.walk import PathOptions, Walk
-from armkin.motors import settled, undriven
+from armkin.motors import legal_with_same_pulses, undriven
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -69,7 +69,7 @@ def planned(
         wrist_turn.check(arm)
     here = arm.home if start is None else np.asarray(start, dtype=float)
     if arm.motors and not undriven(arm):
-        here = settled(arm, here)
+        here = legal_with_same_pulses(arm, here)
     near = None if near is None else np.asarray(near, dtype=float)
     wish = corners_wished(file, corners, blend)
     return checked(Walk(arm, file, pace, here, PathOptions(task, wish, near, branch, split, samples)).walked(MOVES))

@@ -19,7 +19,7 @@ from armkin.inverse.branches.names import find
 from armkin.inverse.solve import isolated as ik
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.limits import check_limits, outside, said
+from armkin.model.limits import check_limits, outside, outside_text
 from armkin.motion import branch_report
 from armkin.motion.branches.branch_path import Pace, carry, stands, stretches
 from armkin.motion.branches.grid import Missed, deviation, missed
@@ -282,7 +282,7 @@ class Walk:
         """A joint move to joint values."""
         bad = np.flatnonzero(outside(self.arm, goal))
         if len(bad):
-            raise NoSolutionError(f"{said(self.arm, int(bad[0]), float(goal[bad[0]]))}: nothing was moved")
+            raise NoSolutionError(f"{outside_text(self.arm, int(bad[0]), float(goal[bad[0]]))}: nothing was moved")
         speed = self.pace.speed * (1.0 if move is None or move.speed is None else move.speed / 100)
         if self.opening:  # the path begins here, and what leads here is none of its moves
             self.begun, self.opening = goal, False

@@ -14,7 +14,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints, fk
 from armkin.forward import frames as joint_frames
-from armkin.keep_out.clearance import hits, said
+from armkin.keep_out.clearance import hits, hits_text
 from armkin.model.limits import outside
 from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat, picture, renderer, space, true_proportions
 from armkin.reachability.volume import motion
@@ -114,7 +114,7 @@ def _legend(names: Sequence[str], legal: Sequence[bool], hit: Sequence[str]) -> 
 
 def _briefly(found: list[Hit]) -> str:
     """The deepest hit in words, and how many more there are."""
-    return said(found[:1]) + (f" and {len(found) - 1} more" if len(found) > 1 else "")
+    return hits_text(found[:1]) + (f" and {len(found) - 1} more" if len(found) > 1 else "")
 
 
 class _Drawing:

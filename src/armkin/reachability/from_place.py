@@ -87,7 +87,7 @@ def positions_of(task: Task, targets: Array) -> Array:
     return targets[:, :3, 3] if task.orientation == "full" else targets[:, : task.position]
 
 
-def counted(question: Question, at: Array) -> NDArray[np.int64]:
+def reached_counts(question: Question, at: Array) -> NDArray[np.int64]:
     """How many targets are reached from positions (P, 2) at each yaw: (P, K); of values to hold, at the best one."""
     if question.values:
         return _most(question, at)
@@ -105,11 +105,11 @@ def _most(question: Question, at: Array) -> NDArray[np.int64]:
     bare = question._replace(arm=_bare(question.arm), around=Around())
     left = np.arange(len(at))
     for one, without in zip(each_value(question), each_value(bare), strict=True):
-        some, found = left, counted(without, at[left])
+        some, found = left, reached_counts(without, at[left])
         if blocked:
             some = left[(found > counts[left]).any(axis=1)]
         if len(some):
-            counts[some] = np.maximum(counts[some], counted(one, at[some]) if blocked else found)
+            counts[some] = np.maximum(counts[some], reached_counts(one, at[some]) if blocked else found)
         left = left[(counts[left] < len(question.targets)).any(axis=1)]
         if not len(left):
             break
@@ -132,7 +132,7 @@ def at_value(question: Question, at: Array, turn: float) -> Question:
         return question
     k, most, best = round(turn / question.step), -1, question
     for one in each_value(question):
-        if (count := int(counted(one, at[None])[0, k])) > most:
+        if (count := int(reached_counts(one, at[None])[0, k])) > most:
             most, best = count, one
         if most == len(question.targets):
             break

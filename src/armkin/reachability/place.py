@@ -37,9 +37,17 @@ from armkin.model.lock import unlock
 from armkin.reachability import keeping, planning
 from armkin.reachability.answers import TURN, limit_margin
 from armkin.reachability.cells import STRAIGHT
-from armkin.reachability.from_place import Question, Solve, at_value, counted, each_value, free_from, positions_of
+from armkin.reachability.from_place import (
+    Question,
+    Solve,
+    at_value,
+    each_value,
+    free_from,
+    positions_of,
+    reached_counts,
+)
 from armkin.reachability.planning import Planned
-from armkin.reachability.standing import apart
+from armkin.reachability.standing import split_keep_outs
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -226,7 +234,7 @@ def _question(
         task, each_way = planning.ways(arm, file)
         targets, ways = np.concatenate(each_way), tuple(map(len, each_way))
         spare, held = planning.held(arm, file)
-    arm, around = apart(arm, scene)
+    arm, around = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
     values = read_targets(task, targets).values
     return Question(arm, task, values, yaws, settings["yaw"], settings["z"], around, ways, spare, held)
@@ -280,7 +288,7 @@ def _blocks(question: Question, at: Array) -> Iterator[Array]:
 
 def work(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
     """How many targets are reached from each position and yaw: (P K,)."""
-    return chunk.number, {"reached": counted(questions[chunk.which], chunk.at).ravel()}
+    return chunk.number, {"reached": reached_counts(questions[chunk.which], chunk.at).ravel()}
 
 
 def _margins(good: NDArray[np.bool_], step: float) -> Array:

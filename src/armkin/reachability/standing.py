@@ -32,7 +32,7 @@ class Around(NamedTuple):
     sha256: str = ""
 
 
-def apart(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm, Around]:
+def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm, Around]:
     """An arm with its own keep-outs alone, and those of its scene and of another.
 
     What the arm's bodies keep from each other is the arm's own, wherever it is asked for.

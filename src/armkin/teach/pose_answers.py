@@ -17,9 +17,9 @@ from armkin.inverse.solvers import recognise
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import hits
-from armkin.keep_out.clearance import said as hits_said
+from armkin.keep_out.clearance import hits_text as hits_said
 from armkin.model import units
-from armkin.model.limits import outside, said
+from armkin.model.limits import outside, outside_text
 from armkin.model.rotation import rpy
 from armkin.model.targets import label_units, targets_in, targets_out
 from armkin.motors import best_pulses, motor_names, outside_travel, pulses, rounding
@@ -151,7 +151,7 @@ def _row(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
         "name": branch.name,
         "joints": branch.joints,
         "within_limits": branch.within_limits,
-        "outside": [said(arm, i, float(branch.q[i])) for i in branch.outside],
+        "outside": [outside_text(arm, i, float(branch.q[i])) for i in branch.outside],
         "hits": hits_said(list(branch.hits)),
         "motion": branch.motion,
     }
@@ -177,7 +177,7 @@ def _red(arm: Arm, q: Array) -> list[int]:
 
 def _words(arm: Arm, q: Array) -> list[str]:
     """Each joint outside its limits, and what the pose hits, in words."""
-    found = [said(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
+    found = [outside_text(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
     if arm.keep_out and (hit := hits(arm, q[None])[0][1]):
         found.append(f"it {hits_said(hit)}")
     return found

@@ -26,7 +26,7 @@ from armkin.board.ports import BAUD, SIM
 from armkin.errors import LinkError, UsageError
 from armkin.motion.joint_moves import rate_lines, straight
 from armkin.motion.timing.trajectory import Trajectory
-from armkin.motors import settled
+from armkin.motors import legal_with_same_pulses
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned, StoppedError
@@ -219,7 +219,7 @@ class Board(ABC):
         while left > 0 and (more is None or more()):
             piece = left if more is None else min(JOG_PIECE, left)
             counts = self.machine.counts()
-            here = settled(arm, self.machine.joints())
+            here = legal_with_same_pulses(arm, self.machine.joints())
             goal = jog_goal(arm, here, joint, rate * piece, refuse=left == seconds)
             way = straight(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
             if not way.duration:

@@ -21,7 +21,7 @@ Lack = tuple[str, list[str]]  # what is missing in words, and lines to add
 _DRIVER = "A4988"  # in lines to add
 
 
-def needs(arm: Arm) -> dict[str, list[str]]:
+def missing_by_command(arm: Arm) -> dict[str, list[str]]:
     """What each of `pulses`, `simulate`, `send` and `home` lacks, in words; an empty list: nothing.
 
     >>> import armkin

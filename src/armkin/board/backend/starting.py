@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from armkin.board.ports import LOG
 from armkin.errors import NoSolutionError, UsageError
-from armkin.model.limits import SLACK, fields, said
+from armkin.model.limits import SLACK, fields, outside_text
 from armkin.motion.plan.proved_free import check_free, free_way
 from armkin.motion.timing.trajectory import Straight
-from armkin.motors import joints, pulses, resolution, settled
+from armkin.motors import joints, legal_with_same_pulses, pulses, resolution
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
@@ -92,7 +92,7 @@ def check_jog(arm: Arm, q: Array, joint: int, rate: float) -> None:
 def _farther(arm: Arm, joint: int, q: Array) -> NoSolutionError:
     value = float(q[joint])
     return NoSolutionError(
-        f"{said(arm, joint, value)}, where the arm stands, and this takes it farther out: nothing was moved",
+        f"{outside_text(arm, joint, value)}, where the arm stands, and this takes it farther out: nothing was moved",
         advice=f"move {arm.joint_names[joint]} inside its limits first",
         **fields(arm, joint, value),
     )
@@ -100,7 +100,7 @@ def _farther(arm: Arm, joint: int, q: Array) -> NoSolutionError:
 
 def beyond(arm: Arm, q: Array) -> Array:
     """How far joints are outside their limits: (..., n) [rad | mm]; 0 inside, and for half a step outside."""
-    values = settled(arm, q)
+    values = legal_with_same_pulses(arm, q)
     return np.abs(values - np.clip(values, arm.lower, arm.upper))
 
 
@@ -117,7 +117,8 @@ def unbelievable(arm: Arm, counts: Sequence[int]) -> str | None:
         return error.message
     most = np.where(arm.prismatic, arm.upper - arm.lower, _TURN)
     for k in np.flatnonzero(np.abs(q - np.clip(q, arm.lower, arm.upper)) > most + SLACK):
-        return f"{said(arm, int(k), float(q[k]))} by more than {'its travel' if arm.prismatic[k] else 'a whole turn'}"
+        far = "its travel" if arm.prismatic[k] else "a whole turn"
+        return f"{outside_text(arm, int(k), float(q[k]))} by more than {far}"
     return None
 
 

@@ -32,7 +32,7 @@ def home(
     ] = None,
     rest_at_home: Annotated[
         bool,
-        typer.Option("--rest-at-home", help="The joints without a switch stand in their home pose: take my word."),
+        typer.Option("--rest-at-home", help="Trust that joints without a switch stand in their home pose."),
     ] = False,
     stay: Annotated[bool, typer.Option("--stay", help="Stay at the switches; do not move to the home pose.")] = False,
     scene: Scene = None,
@@ -44,11 +44,11 @@ def home(
     """Find the limit switches, and with them the position.
 
     Each joint approaches its switch, backs off and touches it again slowly, in the order of the robot
-    file's homing; then the arm moves to its home pose. Where the position was known,
-    steps lost since are told. Keep clear of it: it moves as far as it must. With
+    file's homing; then the arm moves to its home pose. If the position was known,
+    the steps lost since are reported. Keep clear: a joint moves as far as its switch is away. With
     --port sim the switches are where the robot file says.
     """
-    from armkin.board.planner import where
+    from armkin.board.planner import where_arm_stands
 
     arm = keep_outs.moving(robot, scene)
     if arm.keep_out:
@@ -64,7 +64,7 @@ def home(
         if not stay:
             output.note("moving to the home pose")
             board.go_home()
-        found = {**render.head(arm), "port": machine.port.name, **where(machine), **told}
+        found = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine), **told}
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))
 

@@ -34,7 +34,7 @@ def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = 
 
 
 def _answer(arm: Arm, task: str | None) -> Info:
-    from armkin.board.backend.missing_keys import lines_to_add, needs
+    from armkin.board.backend.missing_keys import lines_to_add, missing_by_command
 
     file = arm.file
     assert file is not None  # it was read from one
@@ -58,7 +58,7 @@ def _answer(arm: Arm, task: str | None) -> Info:
         "resolution": _resolution(arm),
         "gripper": None if file.gripper is None else file.gripper.model_dump(exclude_none=True),
         "board": None if file.board is None else file.board.model_dump(exclude_none=True),
-        "lacks": needs(arm),
+        "lacks": missing_by_command(arm),
         "lines_to_add": lines_to_add(arm),
         **_keep_outs(arm),
     }

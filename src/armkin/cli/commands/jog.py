@@ -34,9 +34,9 @@ def jog(
     """Move one joint at a constant speed, for a short time.
 
     For setting up: it also works while the position is lost, at an eighth of max_speed. The board stops by
-    itself when this command falls silent, and before the joint limits and keep-outs if the position is known.
+    itself when this command is gone, and before the joint limits and keep-outs if the position is known.
     """
-    from armkin.board.planner import where
+    from armkin.board.planner import where_arm_stands
     from armkin.model.lock import joint_index
 
     arm = board_link.rehearsed(keep_outs.moving(robot, scene, ignore_keep_out), port)
@@ -57,6 +57,6 @@ def jog(
             slower = abs(rate * allowed / wanted)
             output.warn(f"the position is lost: {slower:g} instead of {speed}, and no limits")
         board.jog(j, allowed, time)
-        found = {**render.head(arm), "port": machine.port.name, **where(machine)}
+        found = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine)}
     with output.destination(None) as write:
         write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))

@@ -196,7 +196,7 @@ def _carried_out(
 ) -> None:
     """Plan from where the arm stands (or where the motion that is resumed began), then move it."""
     from armkin.board import path_run
-    from armkin.board.planner import where
+    from armkin.board.planner import where_arm_stands
     from armkin.board.stopping import planning
     from armkin.motors import joints as joints_of
 
@@ -218,7 +218,7 @@ def _carried_out(
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
         with board.under_way(laid, held) as (left, first, note), board_link.progress(left, note) as tell:
             path_run.follow(board, plan, left, tell, first, ask=_until_enter)
-        found = {**_found(plan, laid), "port": machine.port.name, **where(machine)}
+        found = {**_found(plan, laid), "port": machine.port.name, **where_arm_stands(machine)}
         if held is not None:
             found.pop("approach", None)  # where it began, that motion is over
     _print(plan, found, json=json, out=out)

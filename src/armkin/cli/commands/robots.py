@@ -30,11 +30,11 @@ def robots(json: Json = False, out: TextOut = None) -> None:
 
 def _entry(name: str) -> ShippedRobot:
     import armkin
-    from armkin.board.backend.missing_keys import needs
+    from armkin.board.backend.missing_keys import missing_by_command
 
     arm = armkin.load(name)
     task, labels, refused = _task(arm)
-    lacks = needs(arm)
+    lacks = missing_by_command(arm)
     return {
         **render.head(arm),
         "description": arm.description,

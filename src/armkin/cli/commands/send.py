@@ -93,7 +93,7 @@ def send(
     All joints start and stop together, within each joint's max_speed and max_accel. Ctrl-C stops the arm on
     its path; its position stays known.
     """
-    from armkin.board.planner import Planner, Stream, where
+    from armkin.board.planner import Planner, Stream, where_arm_stands
     from armkin.board.stopping import planning
 
     fraction = inputs.percent(speed, "--speed")
@@ -151,7 +151,7 @@ def send(
             began = machine.counts()
             _carry_out(planner, plans, held)
         planned = planner.done.summary(began)
-        found: dict[str, Any] = {**planned, "port": machine.port.name, **where(machine)}
+        found: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
     _tell(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
 
 

@@ -32,7 +32,7 @@ def status(
     Moves nothing and changes nothing. (Opening its port resets an Uno the first time: an arm that stood
     still keeps its position.)
     """
-    from armkin.board.planner import where
+    from armkin.board.planner import where_arm_stands
 
     arm = inputs.load(robot)
     new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
@@ -41,7 +41,7 @@ def status(
 
         def found() -> dict[str, Any]:
             head = {**render.head(arm), "port": machine.port.name, "board": board.kind}
-            return {**head, **where(machine), **machine.report()}
+            return {**head, **where_arm_stands(machine), **machine.report()}
 
         def text(found: dict[str, Any]) -> str:
             words = _servos if "servos" in found else _grbl if "settings" in found else _text
