@@ -48,14 +48,14 @@ NoReset = Annotated[
 ]
 Resume = Annotated[
     bool,
-    typer.Option("--resume", help="Go on with a motion that was held on its way: with the same arguments again."),
+    typer.Option("--resume", help="Go on with a motion that was stopped on its way; give the same arguments again."),
 ]
 Assume = Annotated[
     str | None,
     typer.Option(
         "--assume",
         metavar="home|POSE|Q,...",
-        help="The position is lost, and the arm stands there. Refused while it is known. "
+        help="Where the arm stands, if the board has lost its position; refused while it is known. "
         "--assume-home is --assume home.",
         autocompletion=completion.poses,
     ),
@@ -205,7 +205,7 @@ def prepare(arm: Arm, machine: Backend, text: str | None, assume: Array | None) 
 
 
 def where_text(arm: Arm, found: Mapping[str, Any]) -> str:
-    """What `armkin.board.planner.where` has found, as tables."""
+    """What `armkin.board.planner.where_arm_stands` has found, as tables."""
     from armkin.motors import motor_names, pulse_units
 
     if found["joints"] is None:

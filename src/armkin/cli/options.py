@@ -34,7 +34,9 @@ Joints = Annotated[
 ]
 Scene = Annotated[
     str | None,
-    typer.Option("--scene", metavar="FILE", help="Keep-outs in a file of their own, added to the robot's."),
+    typer.Option(
+        "--scene", metavar="FILE", help="File of keep-outs, what the arm must not touch, added to the robot file's."
+    ),
 ]
 Meshes = Annotated[
     str | None,
@@ -42,7 +44,11 @@ Meshes = Annotated[
 ]
 Tool = Annotated[
     str | None,
-    typer.Option("--tool", metavar="X,Y,Z[,R,P,Y]", help="After the last joint, in place of the robot file's tool."),
+    typer.Option(
+        "--tool",
+        metavar="X,Y,Z[,R,P,Y]",
+        help="Pose of the tool in the last joint's frame (mm, deg), in place of the robot file's.",
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object at full precision, instead of text.")]
 JsonLines = Annotated[bool, typer.Option("--json", help="One JSON object at full precision; with --batch one a line.")]
@@ -51,7 +57,8 @@ Batch = Annotated[
     typer.Option(
         "--batch",
         metavar="FILE|-",
-        help="Many at once, a row each: CSV (or standard input), .npz, .parquet, .jsonl. Gives CSV; see --out.",
+        help="Many inputs, one a row: .csv, .npz, .parquet, .jsonl; -: CSV on standard input. Gives CSV, or as --out "
+        "ends.",
     ),
 ]
 
@@ -92,7 +99,7 @@ BatchOut = Annotated[
         help="Write to a file, whole or not at all: .txt, .json; a batch .csv, .npz, .parquet, .jsonl.",
     ),
 ]
-Resume = Annotated[bool, typer.Option("--resume", help="With --batch and --out: go on where an earlier run was ended.")]
+Resume = Annotated[bool, typer.Option("--resume", help="With --batch and --out: go on where an interrupted run ended.")]
 Cluster = Annotated[
     str | None,
     typer.Option(
@@ -116,7 +123,7 @@ Compiled = Annotated[
     typer.Option(
         "--compiled",
         callback=_built,
-        help="Run machine code that this computer's C compiler builds, in place of Python: for batches.",
+        help="Compute by machine code that this computer's C compiler builds: faster, for batches.",
     ),
 ]
 
@@ -132,7 +139,7 @@ Workers = Annotated[
         metavar="N",
         parser=str,
         callback=_workers,
-        help="Processes that share the work, the same answers.",
+        help="How many processes share the work; the answers are the same.",
     ),
 ]
 Target = Annotated[
@@ -144,7 +151,11 @@ Target = Annotated[
 AllBranches = Annotated[bool, typer.Option("--all-branches", help="List all branches, also those outside limits.")]
 Near = Annotated[
     str | None,
-    typer.Option("--near", metavar="Q,...", help="Joint values (or a pose) to stay close to. [default: the home pose]"),
+    typer.Option(
+        "--near",
+        metavar="Q,...",
+        help="Joint values or a named pose that the answer stays close to. [default: the home pose]",
+    ),
 ]
 BranchName = Annotated[
     str | None,
@@ -160,7 +171,7 @@ TaskName = Annotated[
     typer.Option(
         "--task",
         metavar="TASK",
-        help="What the target prescribes. [default: the robot file's]",
+        help="What a target prescribes: xyz, xyz_axis, pose, ... [default: the robot file's]",
         autocompletion=completion.tasks,
     ),
 ]
@@ -174,7 +185,10 @@ PositionFirst = Annotated[
 Lock = Annotated[
     list[str] | None,
     typer.Option(
-        "--lock", metavar="JOINT=VALUE", help="Hold a joint. Repeatable.", autocompletion=completion.assignments
+        "--lock",
+        metavar="JOINT=VALUE",
+        help="Hold a joint at a value, in deg or mm. Repeatable.",
+        autocompletion=completion.assignments,
     ),
 ]
 Sweep = Annotated[

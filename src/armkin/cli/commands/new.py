@@ -59,7 +59,8 @@ def new(
     """A robot file from a DH table, commented.
 
     Without --dh or --batch it asks on the terminal. Entries may be written as papers do: pi/2 for an angle,
-    q2 + 90 or d3 for the variable. What the table does not say stands in the file as comments.
+    q2 + 90 or d3 for the variable. Keys that the table does not give stand in the file as
+    comments, to be filled in.
     """
     from armkin.robot_file.new import text
 

@@ -32,7 +32,9 @@ def place(
         ),
     ] = None,
     step: Annotated[str, typer.Option("--step", metavar="MM", help="Distance between places.")] = "50",
-    yaw: Annotated[str, typer.Option("--yaw", metavar="DEG", help="Angle between yaws of a place.")] = "15",
+    yaw: Annotated[
+        str, typer.Option("--yaw", metavar="DEG", help="Step of the yaws that are tried at each place.")
+    ] = "15",
     z: Annotated[str, typer.Option("--z", metavar="MM", help="Height of the places.")] = "0",
     scene: Scene = None,
     compiled: Compiled = False,
@@ -47,9 +49,9 @@ def place(
 ) -> None:
     """Where to put an arm, for all targets or a whole path.
 
-    Each robot by itself, as a comparison. A place is a position on a grid and a yaw, in the targets' frame; the best
-    one is farthest from places that do not reach all. Of a path the best places are planned. Exit code 3: no place
-    reaches all; the one that reaches most is shown.
+    Several robots are compared, each by itself. A place is a position on a grid and a yaw, in the targets' frame; the
+    best one is farthest from places that do not reach all. Of a path the best places are planned. Exit code 3: no
+    place reaches all; the one that reaches most is shown.
     """
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")

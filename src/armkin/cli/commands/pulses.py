@@ -41,7 +41,7 @@ def pulses(
 ) -> None:
     """Motor pulses from home to a pose.
 
-    Whole steps counted from home, halves away from zero; for RC servos the pulse width, for bus servos
+    Whole steps counted from home, rounded half away from zero; for RC servos the pulse width, for bus servos
     the count. Also where these pulses put the joints and the tip.
     """
     if batch is not None:

@@ -37,7 +37,7 @@ def reach(
     """Where the arm reaches, with which orientations.
 
     Cells are sectors of rings about joint 1's axis, so that one solve answers whole arcs of azimuths and rolls,
-    exactly. Columns: centre, share of orientations, branches, places that one branch alone reaches, measures.
+    exactly. Columns of --out: centre, share of orientations, branches, places that one branch alone reaches, measures.
     """
     import armkin
     from armkin.reachability.cells import MOST, Grid
