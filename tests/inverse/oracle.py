@@ -91,23 +91,23 @@ def screws(file: Any) -> Screws:
 
 def exponential(screw: Screws, joint: int, q: Array) -> Array:
     """exp([S] q) of one joint: (..., 4, 4) (Rodrigues' formula)."""
-    once, twice = _generators(screw.w[joint].tobytes(), screw.p[joint].tobytes(), bool(screw.prismatic[joint]))
-    angle = q[..., None, None]
-    if twice is None:
-        return np.eye(4) + angle * once
-    return np.eye(4) + np.sin(angle) * once + 2 * np.sin(angle / 2) ** 2 * twice
+    E = np.zeros((*q.shape, 4, 4)) + np.eye(4)
+    if screw.prismatic[joint]:
+        E[..., :3, 3] = q[..., None] * screw.w[joint]
+        return E
+    p, (once, twice) = screw.p[joint], _generators(screw.w[joint].tobytes())
+    s, c1 = np.sin(q)[..., None, None], 2 * np.sin(q / 2)[..., None, None] ** 2
+    E[..., :3, :3] += s * once + c1 * twice
+    E[..., :3, 3] = p - E[..., :3, :3] @ p
+    return E
 
 
 @lru_cache(maxsize=1024)
-def _generators(direction: bytes, point: bytes, slides: bool) -> tuple[Array, Array | None]:
-    """[S] of a joint, 4 x 4, and of one that turns its square."""
-    w, p, S = np.frombuffer(direction), np.frombuffer(point), np.zeros((4, 4))
-    if slides:
-        S[:3, 3] = w
-        return S, None
-    S[:3, :3] = [[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]
-    S[:3, 3] = -S[:3, :3] @ p
-    return S, S @ S
+def _generators(direction: bytes) -> tuple[Array, Array]:
+    """[w] of an axis, and its square."""
+    w = np.frombuffer(direction)
+    K = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+    return K, K @ K
 
 
 def forward(screw: Screws, q: Array) -> Array:
