@@ -38,7 +38,7 @@ def screws(arm: Arm, tool: Array | None = None) -> dict[str, Any]:
     links = _canonical(arm)
     for i in range(arm.n):
         T = T @ links[i]
-        direction, point = [tidy(x, 15) for x in T[:3, 2]], [tidy(x, 12) for x in T[:3, 3]]
+        direction, point = [tidy(x, 15) for x in T[:3, 2].tolist()], [tidy(x, 12) for x in T[:3, 3].tolist()]
         rows.append({"screw": {"w": [0, 0, 0], "v": direction} if arm.prismatic[i] else {"w": direction, "q": point}})
     tool = tool_of(arm) if tool is None else tool
     zero = T @ links[-1] @ inverse(tool)

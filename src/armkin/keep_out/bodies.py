@@ -57,8 +57,8 @@ def bodies(arm: Arm) -> Bodies:
 
     >>> import armkin
     >>> found = bodies(armkin.load("three_dof"))
-    >>> found.names, found.radius.tolist(), found.end[found.owner == 2].tolist()
-    (('base', 'q1', 'q2', 'q3'), [12.7, 12.7, 12.7, 12.7], [[197.0, 0.0, 0.0]])
+    >>> found.names, found.radius.round(1).tolist(), found.end[found.owner == 2].tolist()
+    (('base', 'q1', 'q2', 'q3'), [12.5, 12.5, 12.5, 12.5], [[0.0, 0.0, -10.0], [197.0, 0.0, -10.0]])
     """
     said = np.full(arm.n + 1, np.nan) if arm.body_radius is None else arm.body_radius
     assumed = np.isnan(said)

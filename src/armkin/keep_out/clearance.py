@@ -38,7 +38,7 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
     >>> arm = armkin.load("three_dof", scene="examples/scenes/three_dof.yaml")
     >>> found = armkin.clearance(arm, np.deg2rad([0, 0, -45]))
     >>> found.mm.round(3), str(found.body), str(found.other)
-    (np.float64(-37.434), 'q3', 'floor')
+    (np.float64(-47.505), 'q3', 'table')
     """
     values = as_joints(arm, q)
     whole, full = whole_arm(arm, values.reshape(-1, arm.n))

@@ -49,8 +49,8 @@ def shape(arm: Arm) -> Shape:
     """The bodies of an arm.
 
     >>> import armkin
-    >>> [body.round(6).tolist() for body in shape(armkin.load("robots/yaw_two_link.yaml")).bodies][1:]
-    [[[0.0, 0.0, 0.0], [0.0, 0.0, 100.0]], [[0.0, 0.0, 0.0], [150.0, 0.0, 0.0]], [[0.0, 0.0, 0.0], [120.0, 0.0, 0.0]]]
+    >>> [body.round(6)[-1].tolist() for body in shape(armkin.load("robots/yaw_two_link.yaml")).bodies][1:]
+    [[0.0, 0.0, 660.0], [430.0, 0.0, 0.0], [430.0, 0.0, 0.0]]
     """
     bodies = [np.array([arm.base[:3, 3], arm.link[0][:3, 3]])]
     at = np.zeros(arm.n)

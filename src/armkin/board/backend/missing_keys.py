@@ -25,7 +25,7 @@ def missing_by_command(arm: Arm) -> dict[str, list[str]]:
     """What each of `pulses`, `simulate`, `send` and `home` lacks, in words; an empty list: nothing.
 
     >>> import armkin
-    >>> found = needs(armkin.load("three_dof"))
+    >>> found = missing_by_command(armkin.load("three_dof"))
     >>> found["send"], found["home"]
     ([], ['its joints have no homing'])
     """
