@@ -125,11 +125,10 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]
     candidates = geometry.pairs(entries, prefer)
     values = np.broadcast_arrays(*cast("list[Array]", candidates.values()))
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
-    B = q.shape[1]
-    missing = newton.missing(arm, task, q.reshape(-1, arm.n), np.repeat(goal, B, axis=0))
-    edge = np.broadcast_to(candidates.doubt.edge, values[0].shape).reshape(B, -1).T
-    valid = (missing < SOLUTION).reshape(-1, B) & ~edge
-    return postures, q, valid
+    # branch by branch, by the formulas of a small batch: those of a large one would be recorded for this alone
+    missing = np.stack([newton.missing(arm, task, branch, goal) for branch in q.swapaxes(0, 1)], axis=1)
+    edge = np.broadcast_to(candidates.doubt.edge, values[0].shape).reshape(q.shape[1], -1).T
+    return postures, q, (missing < SOLUTION) & ~edge
 
 
 def _own_branch(arm: Arm, postures: Array, q: Array, valid: Bool) -> Array:
