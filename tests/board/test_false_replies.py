@@ -72,7 +72,7 @@ INFO_LIES: list[dict[str, int]] = [
 def test_an_info_that_cannot_be_is_refused(three_dof: Arm, lie: dict[str, int]) -> None:
     port = LyingPort(None, **lie)
     port.lying = True
-    with pytest.raises(BoardSaysError, match=f"says {next(iter(lie))} "):
+    with pytest.raises(BoardSaysError, match=f"answers {next(iter(lie))} "):
         Machine(port, three_dof, configure(three_dof))
 
 

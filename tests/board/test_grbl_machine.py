@@ -178,7 +178,7 @@ def test_arms_that_grbl_cannot_drive_are_refused() -> None:
     text = (ROOT / THREE_DOF).read_text().replace("board: {kind: uno_cnc_shield, driver: A4988}", "")
     for old, new, message in (
         ("axis: X", "axis: Q", "motor q1 is on axis Q; GRBL has X, Y, Z, A, B, C"),
-        ("microsteps: 16", "microsteps: 256", "which tell up to 500 apart"),
+        ("microsteps: 16", "microsteps: 256", "enough for 500 steps a unit at most"),
     ):
         with pytest.raises(UsageError, match=message):
             axes_of(build(parse(text.replace(old, new))))

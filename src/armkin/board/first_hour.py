@@ -97,7 +97,7 @@ def zeros(board: Board, person: Operator, *, forget: bool = False) -> dict[int, 
         person.say(f"Zeros: the board knows where the arm stands: {_standing(board)}.")
         if person.ask("Does it stand so? y yes, n no", "yn") == "n":
             raise UsageError(
-                "the board believes another position than the arm's: home it (armkin home), or switch the board off "
+                "the board has another position than the arm stands in: home it (armkin home), or switch the board off "
                 "and on so that it forgets, then begin again"
             )
         return {}

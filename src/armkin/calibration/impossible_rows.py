@@ -40,8 +40,8 @@ def _moves(arm: Arm, data: Measured) -> None:
     if len(still):
         names = ", ".join(arm.joint_names[j] for j in still)
         raise UsageError(
-            f"{names} never move{'s' if len(still) == 1 else ''} in the rows: what belongs to "
-            f"{'it' if len(still) == 1 else 'them'} cannot be seen; measure poses that move every joint"
+            f"{names} never move{'s' if len(still) == 1 else ''} in the rows: corrections of "
+            f"{'it' if len(still) == 1 else 'them'} cannot be determined; measure poses that move every joint"
         )
     unit = radian_or_reach(arm)
     sizes = np.linalg.svd((data.c - data.c.mean(axis=0)) / unit, compute_uv=False)
@@ -58,7 +58,9 @@ def _spread(data: Measured) -> None:
     near = np.argsort(np.linalg.norm(centred, axis=1))[: max(LEAST_ROWS, math.ceil(0.8 * len(centred)))]
     sizes = np.linalg.svd(centred[near] - centred[near].mean(axis=0), compute_uv=False)
     if sizes[1] < ON_A_LINE * sizes[0] or sizes[0] == 0:
-        raise UsageError("the measured points lie on a line: a turn about it cannot be seen; measure points all around")
+        raise UsageError(
+            "the measured points lie on a line: a turn about it leaves them where they are; measure points all around"
+        )
 
 
 class _Reading(NamedTuple):

@@ -80,7 +80,6 @@ _NEEDED = {
     "blend": "--blend 5 alone gives one, or blend: 5 at the head of the path file",
     "task": "--task pose asks for whole poses, some of which it reaches; so does task: pose in the robot file",
     "task pose": "add --task pose",
-    "pose": "--pose NAME|Q,... says which pose the middles of all ranges are",
     "other joint": "write two paths, or hold another joint with --lock JOINT=VALUE",
 }
 _ONE_LINE = (RedundantArmError, PortInUseError, NoHomingError, UnfinishedError)

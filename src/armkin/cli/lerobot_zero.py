@@ -41,7 +41,7 @@ def record(
         found = board.calibration(path, q)
     except UsageError as error:
         if "middle" in error.fields:
-            error.advice = "--pose NAME|Q,... says it"
+            error.advice = "the middles of all ranges are another pose: --pose NAME|Q,... says it"
         raise
     port = check(found)
     if out is not None:

@@ -281,6 +281,6 @@ def _check(arm: Arm, data: dict[str, Any], links: Array) -> None:
     angle = f"{math.degrees(sines[k]):.2g}"
     raise UsageError(
         f"{arm.name}: no DH table gives its poses to {COORDINATES:g} mm: the axes of {arm.joint_names[k]} and "
-        f"{arm.joint_names[k + 1]} are {angle} deg from parallel, and their common normal is far away; screws say it "
-        "exactly"
+        f"{arm.joint_names[k + 1]} are {angle} deg from parallel, so that their common normal is far away; "
+        "screws say it exactly"
     )

@@ -37,7 +37,7 @@ def image(kind: str, folder: Path = FOLDER) -> Image:
     except (OSError, ValueError):
         raise MissingExtraError(
             f"this armkin holds no firmware for {kind}: it was installed from a clone, not from a release\n"
-            "pip install armkin has it; in a clone scripts/release builds it, make -C firmware flash needs no image"
+            "pip install armkin brings it; in a clone scripts/release builds it, or make -C firmware flash compiles it"
         ) from None
     if sums.get(path.name) != hashlib.sha256(data).hexdigest():
         raise MissingExtraError(

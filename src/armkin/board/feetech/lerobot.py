@@ -70,7 +70,7 @@ class Calibrated:
             if found != motor.homing_offset:
                 raise LinkError(
                     f"servo {motor.id} ({motor.name}): its homing offset (register 31) is {found}, the file says "
-                    f"{motor.homing_offset}: it is the file of another arm, or was calibrated again since"
+                    f"{motor.homing_offset}: the file is another arm's, or the servo was calibrated again since"
                 )
 
 
@@ -155,7 +155,6 @@ def _check_middle(arm: Arm, joint: int) -> None:
             f"{arm.name}: the zero of {arm.joint_names[joint]} lies {abs(middle):.4g} deg from the middle of its "
             f"limits, more than {_MIDDLE:g}",
             advice="say which pose the middles of all ranges are",
-            needs="pose",
             joint=arm.joint_names[joint],
             middle=middle,
         )

@@ -26,7 +26,7 @@ def axes_of(arm: Arm) -> list[Axis]:
         if steps > COARSE:
             raise UsageError(
                 f"{arm.path or arm.name}: motor {name} makes {steps:.4g} steps a unit; GRBL reports positions with "
-                f"three decimals, which tell up to {COARSE:g} apart"
+                f"three decimals, enough for {COARSE:g} steps a unit at most"
             )
         found.append(Axis(motor.axis, name, steps, motor.invert, speed, accel, _upward(arm, k)))
     return found

@@ -94,7 +94,7 @@ class Session:
         """Raise LinkError unless GRBL stands still and takes lines: a motion that goes on is another program's."""
         if report.state in ("Run", "Jog", "Home"):
             raise LinkError(
-                f"GRBL on {self.port.name} moves (state {report.state}): another program drives it, or what is left of "
+                f"GRBL on {self.port.name} moves (state {report.state}): another program drives it, or the rest of "
                 "a command that was killed; wait until it stands"
             )
         if report.state not in ("Idle", "Alarm"):

@@ -171,8 +171,8 @@ def _check_rows_are_kept(batch: str | None) -> None:
     """Raise UsageError where --resume cannot have the rows again."""
     if batch == "-":
         raise UsageError(
-            "--resume needs the rows that were held once more, and --batch - does not keep what it has read\n"
-            "save the rows in a file and send --batch FILE; or leave --resume out: they start where the arm stands"
+            "--resume needs the same rows again, and standard input (--batch -) cannot be read a second time\n"
+            "give a file with the rows, --batch FILE; without --resume they start where the arm stands"
         )
 
 

@@ -1,7 +1,7 @@
 """How far a target's numbers may be off by their rounding: what `near` may miss and still stand there.
 
 An arm that is asked for its own pose, printed in six digits or kept in float32, is asked for another pose: near a
-singular posture the exact answer to that one is far away: docs/solver.md, "Edges".
+singular posture the exact answer to that one is far away: docs/solution.md, "Rounded targets".
 """
 
 from __future__ import annotations

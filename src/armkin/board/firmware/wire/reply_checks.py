@@ -37,8 +37,8 @@ class BoardSaysError(LinkError):
 
 def _impossible(port: str, field: str, value: object, allowed: str) -> BoardSaysError:
     return BoardSaysError(
-        f"the board on {port} says {field} {value}; {allowed} can be: its answers are not to be trusted\n"
-        "flash the firmware that came with this armkin, or look for another program on the line",
+        f"the board on {port} answers {field} {value}, but only {allowed} is possible: its answers cannot be trusted\n"
+        "flash the firmware that came with this armkin, or look for another program that uses the port",
         port=port,
         field=field,
         value=value,
@@ -49,7 +49,7 @@ def other_version(port: str, version: int) -> LinkError:
     """The board's firmware speaks another version of the protocol."""
     return LinkError(
         f"the firmware of the board on {port} speaks protocol {version}, this armkin {VERSION}: nothing was moved\n"
-        "flash the firmware that came with this armkin: make -C firmware flash BOARD=... PORT=...",
+        "armkin flash writes the firmware that came with this armkin (in a clone: make -C firmware flash BOARD=...)",
         port=port,
         board_protocol=version,
         protocol=VERSION,

@@ -124,7 +124,7 @@ class Session:
         """Raise LinkError if the board has neither gone on nor come to rest in all the time that it may take."""
         if self.port.now() > self._until:
             raise LinkError(
-                f"the board on {self.port.name} answers, but does not go on: it stays {State(self.state).name}\n"
+                f"the board on {self.port.name} answers, but its motion stays {State(self.state).name}\n"
                 "if the arm moves, cut the motors' power; armkin status tells what the board says",
                 port=self.port.name,
                 state=State(self.state).name.lower(),
