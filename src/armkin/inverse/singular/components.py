@@ -324,6 +324,9 @@ class _Groups:
             self._ask(*np.nonzero(some))
         if few:
             self._plain()
+            some = self.open & self.asked & ~self.pushed  # of one target eight in a row take five times as long
+            if 0 < some.sum() <= AT_ONCE:
+                self._push(*np.nonzero(some))
         while self.open.any():
             k = np.flatnonzero(self.open.any(axis=1))
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
