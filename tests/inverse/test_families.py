@@ -5,6 +5,7 @@ import pytest
 
 import armkin
 from armkin import Status
+from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.redundant.follower import Follower
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import redundancy
@@ -103,7 +104,9 @@ def count_over_a_turn(arm: armkin.Arm, target: np.ndarray, values: np.ndarray) -
     """Legal postures of joint 7 at values (K,): its closed form asked at each."""
     find = Follower(ik, arm, redundancy(arm, None), target[None], np.zeros((1, 7)))  # type: ignore[arg-type]
     rows = np.zeros(len(values), np.intp)
-    return np.asarray(find._legal(rows, find.found(rows, values)).legal.sum(axis=1))
+    q = find.found(rows, values)
+    _, legal = nearest_row(arm, np.nan_to_num(q), np.zeros(arm.n))
+    return np.asarray((legal & ~np.isnan(q[:, :, 0])).sum(axis=1))
 
 
 @pytest.mark.parametrize("seed", range(3))

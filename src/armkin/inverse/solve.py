@@ -24,6 +24,7 @@ from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination.merge import projection
+from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.redundant.families import families
 from armkin.inverse.redundant.position_first import check as check_position_first
@@ -223,7 +224,7 @@ def _rows(
     out.status[count == 0] = Status.UNREACHABLE
     for start in range(0, len(count), arrays.CHUNK):
         rows = slice(start, start + arrays.CHUNK)
-        pack(out.part(rows), count[rows])
+        pack(rows_of(out, rows), count[rows])
     goals = Goals(arm, task, target, near)
     if examine:
         doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, position(arm, near)))] = True
@@ -254,24 +255,4 @@ def _solved(solve: Callable[[Array], Rows], target: Array, workers: int) -> Rows
     """What threads find, together: columns that only some need are nan in the others."""
     if workers == 1:
         return solve(target)
-    parts = shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
-    columns = list(zip(*parts, strict=True))
-    q, doubt, complete, lost, guesses = (
-        None if column[0] is None else _stacked([np.asarray(part) for part in column]) for column in columns
-    )
-    assert q is not None
-    assert doubt is not None
-    assert complete is not None
-    return Rows(q, doubt, complete, lost, guesses)
-
-
-def _stacked(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    """Arrays (N, ...), or (N, B, n) of unlike B, one below the other."""
-    if parts[0].ndim < 3:
-        return np.concatenate(parts)
-    out = np.full((sum(map(len, parts)), max(part.shape[1] for part in parts), *parts[0].shape[2:]), np.nan)
-    start = 0
-    for part in parts:
-        out[start : start + len(part), : part.shape[1]] = part
-        start += len(part)
-    return out
+    return stacked(shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH))

@@ -60,7 +60,7 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
 def _values(arm: Arm, free: Redundancy) -> Array:
     """Values of the redundant joint that are asked [rad], home first."""
     low, high, home = (float(limit[free.joint]) for limit in (arm.lower, arm.upper, arm.home))
-    if not free.labelled:
+    if not free.by_formula:
         return np.array([home])
     low, high = (low if np.isfinite(low) else home - np.pi), (high if np.isfinite(high) else home + np.pi)
     return np.append(home, np.linspace(low, high, VALUES - 1))

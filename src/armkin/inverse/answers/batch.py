@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.branches.whole_turns import nearest_row
+from armkin.inverse.numeric.rows import widened
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -48,18 +49,6 @@ class Seeds(NamedTuple):
         sure = np.zeros(q.shape, bool)
         return cls(q, none if loose is None else loose, label, sure, none if simple is None else simple)
 
-    @classmethod
-    def joined(cls, parts: list[Seeds]) -> Seeds:
-        """Those of several groups of targets, one below the other."""
-        K, width = sum(len(part.q) for part in parts), max(part.q.shape[1] for part in parts)
-        out, start = cls.of(np.full((K, width, parts[0].q.shape[2]), np.nan), np.zeros((K, 1), int)), 0
-        out = out._replace(label=out.label.copy(), simple=out.simple.copy())
-        for part in parts:
-            for whole, some in zip(out, part, strict=True):
-                whole[start : start + len(some), : some.shape[1]] = some
-            start += len(part.q)
-        return out
-
 
 class Batch(NamedTuple):
     """q (N, B, n), valid, within, branch (N, B), status (N,), free (N, n), complete (N,)."""
@@ -71,10 +60,6 @@ class Batch(NamedTuple):
     status: NDArray[np.int8]
     free: Bool
     complete: Bool
-
-    def part(self, rows: slice) -> Batch:
-        arrays: tuple[NDArray[Any], ...] = self
-        return Batch(*(array[rows] for array in arrays))
 
 
 def empty(N: int, B: int, n: int) -> Batch:
@@ -120,18 +105,14 @@ def named(label: NDArray[np.int64], valid: Bool) -> NDArray[np.int64]:
 
 def wider(out: Batch, width: int) -> Batch:
     """The same with more columns, empty."""
-    N, B, n = out.q.shape
-    wide = empty(N, width, n)
-    wide.q[:, :B], wide.valid[:, :B], wide.within[:, :B], wide.branch[:, :B] = out.q, out.valid, out.within, out.branch
-    wide.status[...], wide.free[...], wide.complete[...] = out.status, out.free, out.complete
-    wide.q[:, B:], wide.valid[:, B:], wide.within[:, B:], wide.branch[:, B:] = np.nan, False, False, -1
-    return wide
+    q, valid, within, branch = (widened(array, width) for array in (out.q, out.valid, out.within, out.branch))
+    return out._replace(q=q, valid=valid, within=within, branch=branch)
 
 
 def replaced(out: Batch, rows: NDArray[np.intp], by: Batch) -> Batch:
     """The same with other results for some rows, in as many columns as both need."""
     width = max(out.q.shape[1], by.q.shape[1])
-    out, by = (one if one.q.shape[1] == width else wider(one, width) for one in (out, by))
+    out, by = wider(out, width), wider(by, width)
     arrays: tuple[NDArray[Any], ...] = out
     for array, some in zip(arrays, by, strict=True):
         array[rows] = some

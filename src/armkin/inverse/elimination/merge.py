@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination.polish import pose_error, tip
+from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import ALIKE, EXAMINED, HALFWAY, ILL
 
 Int = NDArray[np.int64]
@@ -28,20 +29,6 @@ class Answers(NamedTuple):
     q: Array
     residual: Array
     weakness: Array
-
-    def take(self, index: Int | Bool) -> "Answers":
-        """Some of the answers, by index or mask."""
-        return Answers(self.pose[index], self.q[index], self.residual[index], self.weakness[index])
-
-
-def concatenate(parts: list[Answers]) -> Answers:
-    """All answers of several sets."""
-    return Answers(
-        np.concatenate([part.pose for part in parts]),
-        np.concatenate([part.q for part in parts]),
-        np.concatenate([part.residual for part in parts]),
-        np.concatenate([part.weakness for part in parts]),
-    )
 
 
 def weights(joints: int) -> Array:
@@ -81,7 +68,7 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
     """
     key = projection(prismatic, answers.q)
     order = np.lexsort((key, answers.pose))
-    key, answers = key[order], answers.take(order)
+    key, answers = key[order], rows_of(answers, order)
     pose, q, residual = answers.pose, answers.q, answers.residual
     keep, merged = np.ones(pose.size, dtype=np.bool_), np.zeros(goal.shape[0], dtype=np.bool_)
     widest = float(np.abs(_WEIGHTS).sum()) * EXAMINED
@@ -106,7 +93,7 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
         worse = residual[second] > residual[first]
         keep[np.where(worse, second, first)[same]] = False
         merged[pose[first[same & (distance > 1e-2 * ALIKE)]]] = True
-    return answers.take(keep), merged
+    return rows_of(answers, keep), merged
 
 
 def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
@@ -121,7 +108,7 @@ def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
     if number.max(initial=0) > MOST:
         rank = np.empty(answers.pose.size, dtype=np.int64)
         rank[np.lexsort((answers.weakness, answers.pose))] = _column(number)
-        answers, number = answers.take(rank < MOST), np.minimum(number, MOST)
+        answers, number = rows_of(answers, rank < MOST), np.minimum(number, MOST)
     q = np.full((count, int(number.max(initial=0)), 6), np.nan)
     q[answers.pose, _column(number)] = answers.q
     return q, near_singular
@@ -129,7 +116,7 @@ def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
 
 def best(answers: Answers, count: int, most: int) -> Array:
     """Of every pose (N = count) at most so many answers, those of the smallest residual: (N, B, 6), NaN past them."""
-    answers = answers.take(np.lexsort((answers.residual, answers.pose)))
+    answers = rows_of(answers, np.lexsort((answers.residual, answers.pose)))
     number = np.bincount(answers.pose, minlength=count)
     column = _column(number)
     q = np.full((count, min(int(number.max(initial=0)), most), 6), np.nan)

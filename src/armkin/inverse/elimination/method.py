@@ -45,9 +45,10 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import three_prismatic
 from armkin.inverse.elimination.choose_variable import Elimination, Kind, kinds, prepare
 from armkin.inverse.elimination.closed_loop import Loop
-from armkin.inverse.elimination.merge import Answers, best, concatenate, merge, pack
+from armkin.inverse.elimination.merge import Answers, best, merge, pack
 from armkin.inverse.elimination.passes import answers_of, attempt, none
 from armkin.inverse.elimination.polish import refine, tip
+from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING, SHAKES
 
 __all__ = ["Branches", "Elimination", "left_open", "prepare", "solve"]
@@ -105,16 +106,8 @@ def solve(elimination: Elimination, T: Array, moved: bool = True) -> Branches:
         shaken: (N,), targets of which no pass that left them where they are did: a singular posture may be missing.
         guesses: (N, G, 6) postures close to answers of these, NaN past the last: to be corrected.
     """
-    count = T.shape[0]
-    parts = [_solve_block(elimination, T[begin : begin + BLOCK], moved) for begin in range(0, count, BLOCK)]
-    q = np.full((count, max((part.q.shape[1] for part in parts), default=0), 6), np.nan)
-    near_singular, settled, shaken = np.zeros((3, count), dtype=np.bool_)
-    guesses = np.full((count, max((part.guesses.shape[1] for part in parts), default=0), 6), np.nan)
-    for number, part in enumerate(parts):
-        rows = slice(number * BLOCK, number * BLOCK + len(part.near_singular))
-        q[rows, : part.q.shape[1]], near_singular[rows], settled[rows], shaken[rows] = part[:4]
-        guesses[rows, : part.guesses.shape[1]] = part.guesses
-    return Branches(q, near_singular, settled, shaken, guesses)
+    blocks = range(0, max(len(T), 1), BLOCK)
+    return stacked([_solve_block(elimination, T[begin : begin + BLOCK], moved) for begin in blocks])
 
 
 def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:
@@ -128,11 +121,11 @@ def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:
         near = none()
     else:
         answers, near, touching, settled, shaken = _passes(elimination, goal, moved)
-    answers = answers.take(finite[answers.pose])
+    answers = rows_of(answers, finite[answers.pose])
     answers, merged = merge(closed.chain, closed.prismatic, goal, answers)
     q, weak = pack(answers, count)
     unit = np.where(closed.prismatic, closed.length, 1.0)
-    guesses = best(near.take((finite & shaken)[near.pose]), count, GUESSES)
+    guesses = best(rows_of(near, (finite & shaken)[near.pose]), count, GUESSES)
     return Branches(q * unit, (weak | merged | touching) & finite, settled, shaken & finite, guesses * unit)
 
 
@@ -162,7 +155,7 @@ def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers
             if open_poses.size == 0:
                 break
         settled[open_poses] = False
-    return concatenate(found), concatenate(guesses), touching, settled, shaken
+    return stacked(found), stacked(guesses), touching, settled, shaken
 
 
 def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
@@ -181,4 +174,4 @@ def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
         good = done.residual < GRAZING * far
         touching[begin + pose[good & (done.residual > ELIMINATED * far)]] = True
         found.append(answers_of(closed, begin + pose, done, good))
-    return concatenate(found), touching, all_
+    return stacked(found), touching, all_

@@ -12,6 +12,7 @@ from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, difference, projection
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import Polished, pose_error, refine, tip
+from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import (
     ALONE,
     BLURRED_ROOT,
@@ -87,7 +88,7 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
     close &= ~(own[stands][order][1:] & own[stands][order][:-1])
     unsettled[pose[order][1:][close]] = True
     # Two real roots that led to one answer: one of them stands for another.
-    real = answers.take(seed.tilt[good] == 0)
+    real = rows_of(answers, seed.tilt[good] == 0)
     key = projection(closed.prismatic, real.q)
     order = np.lexsort((key, real.pose))
     twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < SAME_KEY)
@@ -136,7 +137,7 @@ def shaken_goal(goal: Array, size: float) -> Array:
 def answers_of(closed: Loop, pose: Int, done: Polished, good: Bool) -> Answers:
     """The good ones, their revolute joints wrapped to (-pi, pi]."""
     wrapped = np.where(closed.prismatic, done.q, np.pi - np.mod(np.pi - done.q, 2 * np.pi))
-    return Answers(pose, wrapped, done.residual, done.weakness).take(good)
+    return rows_of(Answers(pose, wrapped, done.residual, done.weakness), good)
 
 
 def none() -> Answers:

@@ -160,9 +160,6 @@ class Linear(NamedTuple):
         r, J = scaled(arm, task, q, target)
         return cls(r, *np.linalg.svd(J))
 
-    def of(self, rows: NDArray[np.intp]) -> Linear:
-        return Linear(self.r[rows], self.U[rows], self.S[rows], self.V[rows])
-
 
 class Lost(NamedTuple):
     """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many

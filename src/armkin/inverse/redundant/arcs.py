@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
+from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import CONVERGING, PAIR_SETTLED, SAME_SEED, SHORTEST_ARC
 from armkin.inverse.redundant.follower import Follower, over_a_turn
 from armkin.inverse.redundant.pieces import Int
@@ -35,9 +36,6 @@ class Points(NamedTuple):
     q: Array
     tangent: Array
     miss: Array
-
-    def of(self, some: Int | Bool) -> Points:
-        return Points(self.q[some], self.tangent[some], self.miss[some])
 
 
 def onto(find: Follower, row: Int, q: Array, last: Array, fixed: bool = False) -> Points:
@@ -111,7 +109,7 @@ def _trace(find: Follower, seeds: _Seeds, ray: Int, side: Int) -> _Arcs:
     """From seeds ray (M,) to their sides (M,), 1 where the joint grows, else -1."""
     j, unit, wide = find.free.joint, radian_or_reach(find.arm), 2 * np.pi / PLANES
     row, plane = seeds.row[ray], seeds.plane[ray]
-    now = seeds.points.of(ray)
+    now = rows_of(seeds.points, ray)
     now = now._replace(tangent=now.tangent * side[:, None])
     low = over_a_turn(PLANES)[plane]
     h = np.full(len(ray), LONGEST)
@@ -121,7 +119,7 @@ def _trace(find: Follower, seeds: _Seeds, ray: Int, side: Int) -> _Arcs:
     for _ in range(TRIES):
         if not len(going):
             break
-        here = now.of(going)
+        here = rows_of(now, going)
         then = onto(find, row[going], here.q + h[going, None] * here.tangent * unit, here.tangent)
         moved = newton.difference(find.arm, then.q, here.q)
         aside = np.linalg.norm(moved - h[going, None] * here.tangent, axis=1)
@@ -143,15 +141,14 @@ def _trace(find: Follower, seeds: _Seeds, ray: Int, side: Int) -> _Arcs:
             end[some] = np.where((there.miss <= CONVERGING)[:, None], there.q, np.nan)
         inside = good & ~left
         if inside.any():
-            passed.append((going[inside], then.of(inside)))
+            passed.append((going[inside], rows_of(then, inside)))
             for one, new in zip(now, then, strict=True):
                 one[going[inside]] = new[inside]
         going = going[~left & (h[going] > SHORTEST_ARC)]
     rays = np.concatenate([np.zeros(0, np.intp), *(some for some, _ in passed)])
     order = np.argsort(rays, kind="stable")
-    columns = [np.concatenate(column) for column in zip(*(points for _, points in passed), strict=True)]
-    points = Points(*(column[order] for column in columns)) if columns else now.of(rays)
-    return _Arcs(rays[order], points, end, out)
+    points = stacked([points for _, points in passed] or [rows_of(now, rays)])
+    return _Arcs(rays[order], rows_of(points, order), end, out)
 
 
 class Curve(NamedTuple):
@@ -192,8 +189,7 @@ def curves_of(find: Follower) -> list[Curve]:
                 ways[back] = own[::-1], (seed, s)
         passed.append(arcs.points)
         count += len(arcs.ray)
-    points = Points(*(np.concatenate(column) for column in zip(*passed, seeds.points, strict=True)))
-    return _chained(seeds, points, ways)
+    return _chained(seeds, stacked([*passed, seeds.points]), ways)
 
 
 def _matched(find: Follower, seeds: _Seeds, row: Int, arcs: _Arcs) -> tuple[_Seeds, Int]:
@@ -224,9 +220,7 @@ def _matched(find: Follower, seeds: _Seeds, row: Int, arcs: _Arcs) -> tuple[_See
             ends[i] = len(seeds.row) + len(new) - 1
     if new:
         more = _seeds(find, row[new], arcs.plane[new], arcs.end[new])
-        points = Points(*(np.concatenate(pair) for pair in zip(seeds.points, more.points, strict=True)))
-        row, plane = np.concatenate([seeds.row, more.row]), np.concatenate([seeds.plane, more.plane])
-        seeds = _Seeds(row, plane, points)
+        seeds = stacked([seeds, more])
     return seeds, ends
 
 
@@ -248,5 +242,5 @@ def _chained(seeds: _Seeds, points: Points, ways: dict[tuple[int, int], tuple[In
             some, (seed, came) = ways[seed, side]
             parts.append(some)
             side, closed = -came, seed == begin
-        out.append(Curve(int(seeds.row[begin]), points.of(np.concatenate(parts)), closed))
+        out.append(Curve(int(seeds.row[begin]), rows_of(points, np.concatenate(parts)), closed))
     return out

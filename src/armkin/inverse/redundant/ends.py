@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array
+from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, BESIDE_CROSSING, JOINED, NO_ROOM, SAME_END, TINY
 from armkin.inverse.redundant.pieces import Int, golden_section, margin
 from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
@@ -183,9 +184,9 @@ def places_of(find: Follower, found: Seen) -> Places:
     to_end = ending & (outside >= 0.0)
     legal = np.empty(len(ending))
     legal[to_end] = merged[which[to_end]]
-    crossing, which = illegal.some(~to_end), which[~to_end]
+    crossing, which = rows_of(illegal, ~to_end), which[~to_end]
     lone = (room >= 0.0) & ~found.gone.legal
-    short = gone.some(lone)
+    short = rows_of(gone, lone)
     row, branch = np.concatenate([crossing.row, short.row]), np.concatenate([crossing.branch, short.branch])
     far = crossing.value(1, t)
     if len(gone.row):

@@ -22,6 +22,7 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
+from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import PROBE, SAME, SOLUTION
 from armkin.inverse.redundant.arcs import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
@@ -68,14 +69,14 @@ def families(
     known, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
     stands = (newton.missing(true, task, each, goal) <= most) & ~outside(true, each).any(axis=1)
     rows = _Rows(true, turned.joint, each, stands)
-    some = CIRCLES if of else AT_ONCE // SAMPLES if turned.labelled else TRACED
+    some = CIRCLES if of else AT_ONCE // SAMPLES if turned.by_formula else TRACED
     for k in range(0, len(goal), some):
         if of:
             rows.add(k, Turning.along(of, goal[k : k + some], each[k : k + some]))
         else:
             find = Follower(ik, true, turned, goal[k : k + some], each[k : k + some])
-            rows.add(k, Followed.along(find) if turned.labelled else Traced.along(find))
-    rows.add_points(task, goal, not turned.labelled)
+            rows.add(k, Followed.along(find) if turned.by_formula else Traced.along(find))
+    rows.add_points(task, goal, not turned.by_formula)
     q, interval, legal, branch = rows.stacked()
     valid = branch >= 0
     B = valid.shape[1]
@@ -142,7 +143,7 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
         how, complete = "in closed form by the arm angle", True
     elif free.joint and free.by_formula and boundaries(true) is not None:
         how, complete = f"{free.geometry.name}, between all values of it where a limit or a merging may be", True
-    elif free.labelled:
+    elif free.by_formula:
         how = f"{free.geometry.name}, at {SAMPLES} values of it"
     else:
         how = f"{free.geometry.name}, at {PLANES} values of it, and traced between them"
@@ -170,7 +171,7 @@ class _Rows:
         near = self.near[begin + pieces.row]
         q = _nearest(self.arm, curves, near)
         some = np.flatnonzero(self.stands[begin + pieces.row])
-        q[some] = _standing(self.arm, self.joint, pieces.of(some), q[some], near[some])
+        q[some] = _standing(self.arm, self.joint, rows_of(pieces, some), q[some], near[some])
         if self.arm.keep_out:
             q = _free(self.arm, curves, q, near)
         whole = pieces.b - pieces.a >= 2 * np.pi
@@ -228,7 +229,7 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
 
     def costs(some: NDArray[np.intp], t: Array) -> Array:
         """Of legal postures; better ones are kept."""
-        q, legal = curves.at(curves.pieces.of(some), t)
+        q, legal = curves.at(rows_of(curves.pieces, some), t)
         cost = np.where(legal, motion(arm, q, near[some]), np.inf)
         better = cost < least[some]
         best[some[better]], least[some[better]] = q[better], cost[better]
@@ -237,13 +238,13 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
     some = np.flatnonzero(curves.pieces.legal)
     if not len(some):
         return best
-    for t in curves.tried(curves.pieces.of(some), near[some]):
+    for t in curves.tried(rows_of(curves.pieces, some), near[some]):
         costs(some, t)
     # beside a kink or a limit the motion grows on both sides: it is the nearest posture
-    p = curves.pieces.of(some)
+    p = rows_of(curves.pieces, some)
     beside = [costs(some, p.at + PROBE * (end - p.at)) for end in (p.low, p.high)]
     some = some[np.minimum(*beside) < motion(arm, p.start, near[some])]
-    p = curves.pieces.of(some)
+    p = rows_of(curves.pieces, some)
     low, high, *_ = golden_section(lambda t: costs(some, t), p.low, p.high, curves.steps)
     if len(some):  # where a joint passes its near in what is left the motion has a kink: by a secant
         ends = [curves.at(p, t)[0] - near[some] for t in (low, high)]
@@ -277,7 +278,7 @@ def _free(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
     for p in np.flatnonzero(pieces.legal & ~clear(arm, q)):
         a, b = pieces.first[p], pieces.last[p]
         t = np.linspace(a, b, max(int((b - a) / FREE) + 2, 2))[1:-1]
-        there, legal = curves.at(pieces.of(np.full(len(t), p)), t)
+        there, legal = curves.at(rows_of(pieces, np.full(len(t), p)), t)
         good = legal & clear(arm, np.nan_to_num(there))
         if good.any():
             out[p] = there[np.where(good, motion(arm, there, near[p]), np.inf).argmin()]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import SOLUTION
 from armkin.inverse.redundant.boundaries import boundaries, places
 from armkin.inverse.redundant.ends import crossed_at, hidden_stretches, number_of, places_of
@@ -36,7 +37,7 @@ class Followed(NamedTuple):
         """Of some targets; in two ways: those of which all places are known where something changes, and others."""
         N = len(find.target)
         curves = cls(find, none(find.arm.n), np.zeros(N, bool), np.zeros(N, bool))
-        of = boundaries(find.arm) if find.free.by_formula and find.free.joint == find.arm.n - 1 else None
+        of = boundaries(find.arm) if find.free.joint == find.arm.n - 1 else None
         left = np.ones(N, bool)
         if of is not None:
             at, known = places(of, find.target)
@@ -44,7 +45,7 @@ class Followed(NamedTuple):
             own, short, explained = _between_places(find.of(some), at[some])
             left[some] = ~explained
             curves = curves._with(
-                some[explained], own.of(explained[own.row]), np.cumsum(explained) - 1, short[explained], True
+                some[explained], rows_of(own, explained[own.row]), np.cumsum(explained) - 1, short[explained], True
             )
         some = np.flatnonzero(left)
         if len(some):
@@ -55,9 +56,7 @@ class Followed(NamedTuple):
     def _with(self, rows: Int, pieces: Pieces, number: Int, short: Bool, complete: bool) -> Followed:
         """Those of targets rows as well; number: of the pieces' targets, in rows."""
         self.short[rows], self.complete[rows] = short, complete
-        new = pieces._replace(row=rows[number[pieces.row]])
-        both = Pieces(*(np.concatenate(pair) for pair in zip(self.pieces, new, strict=True)))
-        return self._replace(pieces=both)
+        return self._replace(pieces=stacked([self.pieces, pieces._replace(row=rows[number[pieces.row]])]))
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
         """Where near has the joint, and beside the best sample."""
@@ -67,8 +66,7 @@ class Followed(NamedTuple):
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Curves.at`."""
-        there = self.find.one(pieces.row, pieces.branch, parameter)
-        return there.q, there.legal
+        return self.find.one(pieces.row, pieces.branch, parameter)
 
 
 def _between_places(find: Follower, at: Array) -> tuple[Pieces, Bool, Bool]:
@@ -78,13 +76,13 @@ def _between_places(find: Follower, at: Array) -> tuple[Pieces, Bool, Bool]:
     changes = found.crossed.at, found.gone.at
     legal, there = ends = [place_between(found.t, one, at) for one in changes]
     crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(found.crossed.rooms).any(axis=1))
-    legal[crossing] = crossed_at(find, changes[0].some(crossing), legal[crossing])
+    legal[crossing] = crossed_at(find, rows_of(changes[0], crossing), legal[crossing])
     explained = np.ones(len(at), bool)
     for one, end in zip(changes, ends, strict=True):
         explained[one.row[np.isinf(end)]] = False
     parts = [_of_runs(found.t, found.legal, True, changes[0], legal)]
-    parts.append(_of_runs(found.t, found.there, False, changes[1], there).of(~found.there.within))
-    return Pieces(*(np.concatenate(pair) for pair in zip(*parts, strict=True))), found.short, explained
+    parts.append(rows_of(_of_runs(found.t, found.there, False, changes[1], there), ~found.there.within))
+    return stacked(parts), found.short, explained
 
 
 def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
@@ -100,8 +98,8 @@ def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
             each = max(SAMPLES // more, 1)
             for some in (again[k : k + each] for k in range(0, len(again), each)):
                 part, few = _sampled(find.of(some), more)
-                kept, new = pieces.of(~np.isin(pieces.row, some)), part._replace(row=some[part.row])
-                pieces = Pieces(*(np.concatenate(pair) for pair in zip(kept, new, strict=True)))
+                kept, new = rows_of(pieces, ~np.isin(pieces.row, some)), part._replace(row=some[part.row])
+                pieces = stacked([kept, new])
                 short[some] = few
     return pieces, short
 
@@ -112,20 +110,20 @@ def _pieces(find: Follower, found: Seen) -> Pieces:
     places = places_of(find, found)
     hidden, stretch = hidden_stretches(find, t, found.turns)
     gaps = hidden.set_before
-    more, short = hidden.some(~gaps), places.short
+    more, short = rows_of(hidden, ~gaps), places.short
     parts = [_of_runs(t, found.legal, True, found.crossed.at, places.legal)]
     sample = np.append(hidden.k, short.sample(0, K))
     held = _holding(found.there, np.append(hidden.row, short.row), sample, np.append(hidden.branch, short.branch), K)
-    parts.append(_of_runs(t, found.there, False, found.gone.at, places.there).of(~(found.there.within | held)))
-    parts[0] = _cut(find, parts[0], hidden.some(gaps), stretch[:, gaps])
+    families = _of_runs(t, found.there, False, found.gone.at, places.there)
+    parts.append(rows_of(families, ~(found.there.within | held)))
+    parts[0] = _cut(find, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
     row, branch = np.append(short.row, more.row), np.append(short.branch, more.branch)
     if len(row):
         a, b = np.concatenate([np.sort(places.ends, axis=0), stretch[:, ~gaps]], axis=1)
         middle = 0.5 * (a + b)
-        one = find.one(row, branch, middle)
-        tiny = Pieces(row, branch, one.legal, a, b, a, b, a, middle, b, one.q)
-        parts.append(tiny.of(one.legal))
-    return Pieces(*(np.concatenate(pair) for pair in zip(*parts, strict=True)))
+        q, legal = find.one(row, branch, middle)
+        parts.append(rows_of(Pieces(row, branch, legal, a, b, a, b, a, middle, b, q), legal))
+    return stacked(parts)
 
 
 def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -> Pieces:
@@ -156,18 +154,18 @@ def _cut(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
         turns = 2 * np.pi * np.round((0.5 * (pieces.a + pieces.b) - begin) / (2 * np.pi))
         inside = (pieces.row == row) & (pieces.branch == branch) & (pieces.a < begin + turns) & (end + turns < pieces.b)
         for p in np.flatnonzero(inside):
-            one = pieces.of(np.array([p]))
+            one = rows_of(pieces, np.array([p]))
             before, behind = np.array([begin + turns[p]]), np.array([end + turns[p]])
             sides = [(one.a, before), (behind, one.b)]
             if pieces.b[p] - pieces.a[p] >= 2 * np.pi:  # a whole turn is one piece that begins behind the gap
                 sides = [(behind, before + 2 * np.pi)]
-            parts = [pieces.of(np.arange(len(pieces.row)) != p)]
+            parts = [rows_of(pieces, np.arange(len(pieces.row)) != p)]
             for a, b in sides:
                 holds = (a <= one.at) & (one.at <= b)
                 at = np.where(holds, one.at, 0.5 * (a + b))
                 low, high = (np.clip(one.low, a, b), np.clip(one.high, a, b)) if holds else (a, b)
-                start = find.one(one.row, one.branch, at).q
+                start, _ = find.one(one.row, one.branch, at)
                 parts.append(one._replace(a=a, b=b, first=a, last=b, low=low, at=at, high=high, start=start))
-            pieces = Pieces(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+            pieces = stacked(parts)
             break
     return pieces

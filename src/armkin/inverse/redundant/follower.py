@@ -29,14 +29,6 @@ Ik = Callable[..., Solutions]
 AT_A_TIME = 2_000  # targets of a formula: they stay in the cache
 
 
-class Postures(NamedTuple):
-    """Answers at values of the redundant joint: q (..., B, n), whether they are there and within limits (..., B)."""
-
-    q: Array
-    valid: Bool
-    legal: Bool
-
-
 class Sampled(NamedTuple):
     """Answers of targets S at K values of the redundant joint, in the columns of their branches."""
 
@@ -91,20 +83,15 @@ class Follower(NamedTuple):
         return self._replace(target=self.target[some], near=self.near[some])
 
     def found(self, rows: NDArray[np.intp], t: Array) -> Array:
-        """Branches (M, B, n) of targets (M,) at values t (M,), each in the column of its index, nan where there is
-        none."""
+        """Branches (M, B, n) of targets (M,) at values t (M,), of a closed form each in the column of its index, nan
+        where there is none."""
         if self.free.by_formula:
             q, missed = self._by_formula(rows, t)
             np.copyto(q, np.nan, where=~(missed <= ACCEPTED**2)[..., None])
             return q
         goal = moved(self.arm, self.free, self.target[rows], t)
         s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
-        M, B, r = len(t), s.q.shape[1], self.free.joint
-        number = s.branch if self.free.labelled else np.where(s.valid, np.arange(B), -1)
-        out = np.full((M, B + 1, self.arm.n), np.nan)
-        place = np.arange(M)[:, None], np.where(number < 0, B, number)
-        out[*place, :r], out[*place, r], out[*place, r + 1 :] = s.q[:, :, :r], t[:, None], s.q[:, :, r:]
-        return out[:, : max(B, 1)]  # a column, where no target of them has an answer
+        return np.insert(s.q, self.free.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
 
     def _by_formula(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
         """The candidates of a closed form (M, B, n), real or not, one joint after another in memory; what they miss,
@@ -133,21 +120,10 @@ class Follower(NamedTuple):
         values.insert(self.free.joint, t)
         return [*values, miss, room]
 
-    def _legal(self, rows: NDArray[np.intp], q: Array) -> Postures:
-        """Postures (M, B, n) at their nearest legal copies."""
-        valid = ~np.isnan(q[:, :, 0])
-        q, legal = nearest_row(self.arm, np.where(valid[:, :, None], q, 0.0), self.near[rows][:, None])
-        np.copyto(q, np.nan, where=~valid[:, :, None])
-        return Postures(q, valid, legal & valid)
-
     def sampled(self, some: NDArray[np.intp], t: Array, more: Array | None = None) -> Sampled:
-        """Some of the targets (S,) at all of t (K,) and, of a closed form, at more values (S, M), inf where there are
-        fewer, or between those at which more may happen."""
+        """Some of the targets (S,), of a closed form, at all of t (K,) and at more values (S, M), inf where there are
+        fewer; by default between those at which more may happen."""
         rows, values = np.repeat(some, len(t)), np.tile(t, len(some))
-        if not self.free.by_formula:
-            q = self.found(rows, values)
-            columns, missed = list(q.T), np.where(np.isnan(q[..., 0].T), np.inf, 0.0)
-            return self._within(some, np.tile(t, (len(some), 1)), columns, missed, q.shape[1:2])
         axes = _recorded(self.arm, self.free)[1]
         *columns, missed, _ = self._candidates(rows, values, [])
         if more is None:
@@ -188,8 +164,6 @@ class Follower(NamedTuple):
 
     def own(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Array:
         """One branch each (M, n), as `found`."""
-        if not self.free.by_formula:
-            return np.asarray(self.found(rows, t)[np.arange(len(rows)), branch])
         *columns, miss, _ = self._candidates(rows, t, [])
         place = np.unravel_index(branch, _recorded(self.arm, self.free)[1])
 
@@ -202,7 +176,9 @@ class Follower(NamedTuple):
         q[~(picked(miss) <= ACCEPTED**2)] = np.nan
         return q
 
-    def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Postures:
-        """One branch each (M,), at its nearest legal copy."""
-        one = self._legal(rows, self.own(rows, branch, t)[:, None])
-        return Postures(one.q[:, 0], one.valid[:, 0], one.legal[:, 0])
+    def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> tuple[Array, Bool]:
+        """One branch each (M, n), at its nearest legal copy, nan where there is none; which are within limits (M,)."""
+        own = self.own(rows, branch, t)
+        there = ~np.isnan(own[:, 0])
+        q, legal = nearest_row(self.arm, np.where(there[:, None], own, 0.0), self.near[rows])
+        return np.where(there[:, None], q, np.nan), legal & there

@@ -31,11 +31,6 @@ class Pieces(NamedTuple):
     high: Array
     start: Array  # (P, n) the posture of the best sample: the one nearest to near
 
-    def of(self, some: Bool | Int) -> Pieces:
-        """Some of them."""
-        row, branch, legal, *real = self
-        return Pieces(row[some], branch[some], legal[some], *(column[some] for column in real))
-
 
 class Curves(Protocol):
     """The answers of some targets N, as curves with a parameter."""

@@ -5,12 +5,12 @@ All that stands of every sample is asked for a few targets at a time, while it i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.inverse.numeric.rows import stacked
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.redundant.boundaries import on_both_sides
 from armkin.inverse.redundant.pieces import Int, best_samples, holding_none, runs, turning
@@ -34,9 +34,6 @@ class Changes(NamedTuple):
         """All of flags (N, K, B)."""
         row, k, branch = np.nonzero(flags != np.roll(flags, -1, axis=1))
         return cls(row, k, branch, flags[row, k, branch])
-
-    def some(self, which: Bool | Int) -> Changes:
-        return Changes(self.row[which], self.k[which], self.branch[which], self.set_before[which])
 
     def sample(self, offset: int, K: int) -> Int:
         """The sample 0, 1, ... steps from the side where they are set towards the other one; -1: away from it."""
@@ -109,14 +106,12 @@ def seen(find: Follower, t: Array, known: Array | None = None) -> Seen:
     """What samples of all targets along t (K,) show, and others between them; known: all places where something may
     change (N, V), with samples beside each."""
     N = len(find.target)
-    each = max(AT_A_TIME // len(t), 1) if find.free.by_formula else max(N, 1)
+    each = max(AT_A_TIME // len(t), 1)
     some = (np.arange(k, min(k + each, N)) for k in range(0, max(N, 1), each))
     if known is None:
-        found: Seen = _together([_seen(find.sampled(rows, t), rows, False) for rows in some])
-    else:
-        more = on_both_sides(known)
-        found = _together([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in some])
-    return found
+        return stacked([_seen(find.sampled(rows, t), rows, False) for rows in some])
+    more = on_both_sides(known)
+    return stacked([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in some])
 
 
 def place_between(t: Array, at: Changes, known: Array) -> Array:
@@ -127,13 +122,6 @@ def place_between(t: Array, at: Changes, known: Array) -> Array:
     with np.errstate(invalid="ignore"):
         on = np.remainder(own - low, 2 * np.pi)
         return np.asarray(np.where(on <= width, low + on, np.inf).min(axis=1, initial=np.inf))
-
-
-def _together(parts: Sequence[Any]) -> Any:
-    """Parts one after the other."""
-    if isinstance(parts[0], tuple):
-        return type(parts[0])(*(_together(column) for column in zip(*parts, strict=True)))
-    return np.concatenate(parts)
 
 
 def _seen(found: Sampled, rows: Int, known: bool) -> Seen:

@@ -9,6 +9,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.rows import stacked
 from armkin.inverse.numeric.tolerances import CONVERGING, REACH
 from armkin.inverse.redundant.arcs import Points, curves_of, onto
 from armkin.inverse.redundant.follower import Follower
@@ -47,8 +48,7 @@ class Traced(NamedTuple):
         branch = np.array([int((row[:k] == row[k]).sum()) for k in range(len(row))], np.intp)
         curve = np.zeros((N, int(branch.max(initial=0)) + 1), np.intp)
         curve[row, branch] = np.arange(len(row))
-        parts = [one.points for one in found]
-        points = Points(*(np.concatenate(column) for column in zip(*parts, strict=True))) if parts else _nothing(n)
+        points = stacked([one.points for one in found] or [_nothing(n)])
         curves = cls(find, points, after, begin, count, curve, none(n), np.zeros(N, bool))
         if not len(row):
             return curves
@@ -121,7 +121,7 @@ class Traced(NamedTuple):
                 now_up[some], alive[point[some]], int(self.counts[c]),
             )  # fmt: skip
             parts.append(nodes.pieces(int(row[c]), int(branch[c]), j))
-        return Pieces(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+        return stacked(parts)
 
     def _postures(self, whose: Int, point: Int, share: Array) -> tuple[Array, Bool]:
         """Nodes at their nearest legal copies, and whether they are legal."""

@@ -18,6 +18,7 @@ from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
 from armkin.inverse.run.edges import AT_ONCE, decided
 from armkin.inverse.run.folds import Doubted, tell
@@ -87,7 +88,7 @@ def solve(
                 first = goal[:, 0] if columns is None else cast("Array", columns[9])
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             goals = Goals(arm, task, goal, near[some])
-            edge = _keep(goals, runner.axes, out.part(some), found, close, there)
+            edge = _keep(goals, runner.axes, rows_of(out, some), found, close, there)
             if len(edge.rows):
                 left.append(edge._replace(rows=start + edge.rows))
         return left
@@ -100,7 +101,7 @@ def solve(
         if examine and doubted:
             goals = Goals(arm, task, target, near)
             if any(some.plain.any() for some in doubted) and not geometry.ends:
-                edge = tell(goals, runner, out, Doubted.joined(doubted))
+                edge = tell(goals, runner, out, stacked(doubted))
             for start in range(0, len(edge), AT_ONCE):
                 out = decided(goals, runner, out, edge[start : start + AT_ONCE])
         edge = edge[:0]

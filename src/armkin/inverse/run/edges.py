@@ -12,6 +12,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
+from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, NEARBY, SAME
 from armkin.inverse.singular import components, linkages, near_itself, surfaces
 
@@ -57,8 +58,7 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) 
             whole = rows[part]
             doubts.first[part], other, _ = _at_two(runner, target[whole], near[whole], near[whole] + 1.0)
             doubts.other[part] = np.where(doubts.loose[part][:, :, None], other, np.nan)
-        arrays: tuple[NDArray[Any], ...] = doubts
-        open_, tight, first, other, loose, _, at_ends, _, simple = (array[left] for array in arrays)
+        open_, tight, first, other, loose, _, at_ends, _, simple = rows_of(doubts, left)
         # with the preferred values for joints that are free, and those that other values would change
         more = [first, other] if loose.any() else [first]
         if runner.geometry.ends:
@@ -74,7 +74,7 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) 
         parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(left), seeds)]
     elif runner.geometry.ends:
         return out
-    seeds = parts[0][1] if len(parts) == 1 else Seeds.joined([seeds for _, seeds in parts])
+    seeds = stacked([seeds for _, seeds in parts])
     return examined(goals, out, rows[np.concatenate([part for part, _ in parts])], seeds, runner.others, unsettled)
 
 
@@ -189,14 +189,11 @@ def examined(
         def more(which: NDArray[np.int64], lost: Bool, some: Goals = some, incomplete: Bool = incomplete) -> Any:
             return others(some.target[which], some.near[which], lost | incomplete[which])
 
-        arrays: tuple[NDArray[Any], ...] = seeds
-        part = Seeds(*(array[start : start + AT_ONCE] for array in arrays))
+        part = rows_of(seeds, slice(start, start + AT_ONCE))
         seen = components.examine(some, part, more, None if unsettled is None else unsettled[rows])
         if seen.surface.any():
             seen = surfaces.swept(some, seen)
-        width = seen.q.shape[1]
-        if width > out.q.shape[1]:
-            out = wider(out, width)
+        out = wider(out, seen.q.shape[1])
         write(goals.arm, out, rows, seen.q, seen.valid, seen.label, some.near)
         out.status[rows], out.free[rows] = seen.status, seen.free
         out.complete[rows] &= ~seen.again

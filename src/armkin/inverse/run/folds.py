@@ -53,11 +53,6 @@ class Doubted(NamedTuple):
     edge: Bool
     plain: Bool
 
-    @classmethod
-    def joined(cls, parts: list[Doubted]) -> Doubted:
-        """Those of several parts of a batch; at least one."""
-        return parts[0] if len(parts) == 1 else cls(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
-
 
 def tell(goals: Goals, runner: Recorded, out: Batch, at: Doubted) -> NDArray[np.intp]:
     """Write what the doubted targets are that can be told; returns the rows of those that are left.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from armkin.inverse.answers.batch import Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
+from armkin.inverse.numeric.rows import rows_of, widened
 from armkin.inverse.numeric.tolerances import (
     CLOSE_BY,
     CLOSED,
@@ -52,8 +53,9 @@ class Examined(NamedTuple):
     """What is known of K targets.
 
     q: (K, W, n) branches, nan past the last.  valid: (K, W).  label: (K, W) the branch that a posture is, of the
-    solver's own numbering.  status: (K,).  free: (K, n).  again, surface: (K,) whether more postures had to be tried,
-    and whether a self-motion is a surface.
+    solver's own numbering.  status: (K,).  free: (K, n).  again, surface: (K,) whether more postures have to be tried,
+    and whether a self-motion is a surface.  moved: (K, n) joints that move along self-motions other than those of which
+    all is known.  beyond: (K,) all that is near lies beyond a fold.
     """
 
     q: Array
@@ -63,24 +65,13 @@ class Examined(NamedTuple):
     free: Bool
     again: Bool
     surface: Bool
-
-
-class _Settled(NamedTuple):
-    """The same; whether a loose candidate came to nothing, and whether a self-motion is a surface, (K,) each.
-
-    moved: (K, n) joints that move along self-motions other than those of which all is known. beyond: (K,) all that is
-    near lies beyond a fold.
-    """
-
-    q: Array
-    valid: Bool
-    label: Int
-    status: NDArray[np.int8]
-    free: Bool
-    open: Bool
-    surface: Bool
     moved: Bool
     beyond: Bool
+
+    def wider(self, width: int) -> Examined:
+        """In at least so many columns."""
+        q, valid, label = (widened(array, width) for array in (self.q, self.valid, self.label))
+        return self._replace(q=q, valid=valid, label=label)
 
 
 def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None) -> Examined:
@@ -92,7 +83,7 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     that loses singular ones: more are asked for these and for what is singular.
     """
     found = _settle(goals, seeds, SEED)
-    again = found.open | found.surface | ~(found.valid.any(axis=1) | (found.beyond & (unsettled is None)))
+    again = found.again | found.surface | ~(found.valid.any(axis=1) | (found.beyond & (unsettled is None)))
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
         first, last = found.moved.argmax(axis=1), goals.arm.n - 1 - found.moved[:, ::-1].argmax(axis=1)
@@ -100,7 +91,7 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     else:
         more_of = again | unsettled | (found.status != Status.EXACT)
     if not more_of.any():
-        return Examined(*found[:5], again, found.surface)
+        return found._replace(again=again)
     rows = np.flatnonzero(more_of)
     others, labels, open_ = more(rows, again[rows])
     if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
@@ -111,18 +102,15 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     there = again[rows] | ~np.isnan(others[:, :, 0]).all(axis=1)
     rows, others = rows[there], others[there]
     if not len(rows):
-        return Examined(*found[:5], again, found.surface)
+        return found._replace(again=again)
     again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
     whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
     second = _settle(goals.of(rows), Seeds.of(np.concatenate([found.q[rows], others], axis=1), whose), HOPELESS)
-    wider = ((0, 0), (0, max(second.q.shape[1] - found.q.shape[1], 0)))
-    q, valid = np.pad(found.q, (*wider, (0, 0)), constant_values=np.nan), np.pad(found.valid, wider)
-    out = Examined(q, valid, np.pad(found.label, wider, constant_values=OWN), *found[3:5], again, found.surface)
-    out.q[rows], out.valid[rows], out.label[rows] = np.nan, False, OWN
-    own = second.q.shape[1]
-    out.q[rows, :own], out.valid[rows, :own], out.label[rows, :own] = second[:3]
-    out.status[rows], out.free[rows], out.surface[rows] = second.status, second.free, second.surface
-    return out
+    out = found.wider(second.q.shape[1])
+    arrays: tuple[NDArray[Any], ...] = out
+    for array, some in zip(arrays, second.wider(out.q.shape[1]), strict=True):
+        array[rows] = some
+    return out._replace(again=again)
 
 
 class _Candidates(NamedTuple):
@@ -214,7 +202,7 @@ class _Groups:
         one = self.lost.nullity[k, b] < 2
         if one.any():
             i, c = k[one], b[one]
-            at = local_structure(arm, task, q[i, c], target[i], self.lost.weak.of(self.lost.place[i, c]))
+            at = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
             self.known[i, c], self.moves[i, c] = at.known, at.manifold
             self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
             on, self.ended[i, c], self.alone[i, c], self.which[i, c] = chains.whole(
@@ -314,7 +302,7 @@ class _Groups:
             mine[i, c] &= ~(self.moves[k[i], c] & (joints[i] & rests).any(axis=1))
         return np.asarray(mine)
 
-    def settled(self, missed: Bool, beyond: Bool) -> _Settled:
+    def settled(self, missed: Bool, beyond: Bool) -> Examined:
         """All candidates grouped; missed, beyond: (K,) of which targets a loose one came to nothing, and of which all
         that are near lie beyond a fold."""
         few = self.valid.shape[1] <= FEW
@@ -349,7 +337,7 @@ class _Groups:
         surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity > 1) & self.curve.any(axis=2))
         if len(k):
             surface[k[self_motions.on_surface(arm, task, q[k, b], self.lost.V[k, b], target[k])]] = True
-        return _Settled(
+        return Examined(
             np.where(there[:, :, None], q[each, order], np.nan),
             there,
             np.where(there, self.at.label[each, order], OWN),
@@ -362,7 +350,7 @@ class _Groups:
         )
 
 
-def _settle(goals: Goals, seeds: Seeds, most: float) -> _Settled:
+def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
     arm, task, target, near = goals
     K, _, n = seeds.q.shape

@@ -51,8 +51,7 @@ def with_legal_postures(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Bat
         _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
         if not (inside & found.valid[0]).any():
             continue
-        if found.q.shape[1] > out.q.shape[1]:
-            out = wider(out, found.q.shape[1])
+        out = wider(out, found.q.shape[1])
         row = np.array([k])
         write(arm, out, row, found.q, found.valid, found.label, near[row])
         out.status[k] = max(out.status[k], found.status[0])  # of two roots in one, one was listed

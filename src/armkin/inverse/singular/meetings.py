@@ -18,6 +18,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import ACCEPTED, BENT, FOLD_WAY, GROWTH, HIGH, SOLUTION
 from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
 from armkin.inverse.tasks.residuals import residual
@@ -49,12 +50,12 @@ def ways_out(
     arm, task, target, _ = goals
     k, b = np.nonzero((size[:, 1:] <= SOLUTION) & (lost.nullity[:, 1:] > 1))
     b += 1
-    at, nullity = lost.weak.of(lost.place[k, b]), lost.nullity[k, b]
+    at, nullity = rows_of(lost.weak, lost.place[k, b]), lost.nullity[k, b]
     rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / HIGH)
     _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     row = k[first]
     most = np.maximum(ACCEPTED, 2.0 * size[row, b[first]])
-    who, there, rests = _steps_out(arm, task, q[row, b[first]], at.of(first), nullity[first], target[row], most)
+    who, there, rests = _steps_out(arm, task, q[row, b[first]], rows_of(at, first), nullity[first], target[row], most)
     size[k, b] = np.where(np.isin(same.reshape(-1), who), np.inf, size[k, b])
     order = np.argsort(row[who], kind="stable")
     who, there = who[order], there[order]

@@ -122,8 +122,7 @@ def stand(goals: Goals, out: Batch, most: Array) -> Batch:
     there[some] = newton.missing(arm, task, between, target[rows[some]]) <= most[rows[some]]
     count = out.valid[rows].sum(axis=1)
     place = np.where(there, place, count)
-    if int(place.max(initial=-1)) >= out.q.shape[1]:
-        out = wider(out, int(place.max()) + 1)
+    out = wider(out, int(place.max()) + 1)
     out.q[rows, place], out.valid[rows, place], out.within[rows, place] = near[rows], True, True
     out.branch[rows] = named(out.branch[rows].astype(np.int64), out.valid[rows])
     out.status[rows[count == 0]] = Status.BOUNDARY

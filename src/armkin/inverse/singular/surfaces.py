@@ -61,15 +61,8 @@ def _with_curves(goals: Goals, seen: Examined, k: np.intp) -> Examined:
         return seen
     on = _about_one_line(at, pair)
     rows, names = np.concatenate([q[~on], rows]), np.append(label[~on], names)
-    width = max(seen.q.shape[1], len(rows))
-    wider = ((0, 0), (0, width - seen.q.shape[1]))
-    out = seen._replace(
-        q=np.pad(seen.q, (*wider, (0, 0)), constant_values=np.nan),
-        valid=np.pad(seen.valid, wider),
-        label=np.pad(seen.label, wider, constant_values=OWN),
-        free=seen.free.copy(),
-    )
-    there = np.arange(width) < len(rows)
+    out = seen.wider(len(rows))._replace(free=seen.free.copy())
+    there = np.arange(out.q.shape[1]) < len(rows)
     out.q[k], out.valid[k], out.label[k] = np.nan, there, OWN
     out.q[k, there], out.label[k, there] = rows, names
     out.free[k] |= free

@@ -30,6 +30,7 @@ from armkin.inverse.closed.candidates import Recorded, recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.rows import stacked, widened
 from armkin.inverse.numeric.tolerances import (
     ALIKE,
     ANSWERED,
@@ -89,16 +90,9 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     def rows(target: Array) -> Rows:
         starts = range(0, max(len(target), 1), CHUNK)
         parts = [_solve(arm, task, alike, off, elimination, target[k : k + CHUNK]) for k in starts]
-        width = max(part[0].shape[1] for part in parts)
-        q, guesses = (np.full((len(target), width, arm.n), np.nan) for _ in range(2))
-        for k, (part, _, about) in zip(starts, parts, strict=True):
-            q[k : k + len(part), : part.shape[1]] = part
-            guesses[k : k + len(about), : about.shape[1]] = about
-        doubt = np.concatenate([part[1] for part in parts])
-        complete = _four(arm, q) if counted else np.zeros(len(target), bool)
-        return Rows(
-            q, doubt & ~complete, complete, None, guesses if elimination is None else None
-        )  # four roots apart are simple ones
+        found = stacked(parts)
+        complete = _four(arm, found.q) if counted else found.complete
+        return found._replace(doubt=found.doubt & ~complete, complete=complete)  # four roots apart are simple ones
 
     steps = newton_steps.steps(arm, task, off, alike.pairs) if alike.pairs is not None else None
     corrected, counted = steps or (None, False)
@@ -186,21 +180,19 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
 
 def _solve(
     arm: Arm, task: Task, alike: Geometry, off: float, elimination: Callable[[], Geometry | None] | None, target: Array
-) -> tuple[Array, Bool, Array]:
-    """Branches (N, B, n), doubts (N,) and guesses of some targets; the similar arm's branches keep their places."""
-    source = recorded(arm, task, alike)
+) -> Rows:
+    """What is found of some targets, none of them complete; the similar arm's branches keep their places."""
+    source, complete = recorded(arm, task, alike), np.zeros(len(target), bool)
     off_here = off * np.maximum(1.0, distance(arm, task, target))  # the error grows with the slide's extension
     if elimination is None:
         known = pairs.settled(arm, task, source, off_here, target)
         q, doubt = known.q, known.doubt
         if len(rest := np.flatnonzero(known.open)):
             more, doubt[rest] = _by_neighbours(arm, task, source, off, off_here[rest], None, target[rest])
-            q = np.full((len(target), more.shape[1], arm.n), np.nan)
-            q[:, : known.q.shape[1]] = known.q
+            q = widened(known.q, more.shape[1])
             q[rest] = more
-        return q, doubt, known.guesses
-    q, doubt = _by_neighbours(arm, task, source, off, off_here, elimination, target)
-    return q, doubt, np.full_like(q, np.nan)
+        return Rows(q, doubt, complete, None, known.guesses)
+    return Rows(*_by_neighbours(arm, task, source, off, off_here, elimination, target), complete)
 
 
 def _by_neighbours(
@@ -228,8 +220,7 @@ def _by_neighbours(
         rings = (around(arm, task, goals, size * off_here[few]) for size in RINGS)
         others = [source.rows(there)[0] for ring in rings for there in ring]
     more = _settled(arm, task, np.concatenate([found.q[few], *others], axis=1), goals, found.q.shape[1])
-    out = np.full((len(target), more.shape[1], arm.n), np.nan)
-    out[:, : q.shape[1]] = q
+    out = widened(q, more.shape[1])
     out[few] = more
     return out, found.doubt
 

@@ -26,6 +26,7 @@ from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
+from armkin.inverse.numeric.rows import stacked
 from armkin.inverse.numeric.tolerances import (
     ANSWERED,
     APART_ROOTS,
@@ -135,17 +136,15 @@ def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | Non
         return None
 
     def rows(target: Array) -> Rows:
-        parts = [_solved(pencil, target[k : k + CHUNK]) for k in range(0, max(len(target), 1), CHUNK)]
-        q, doubt, guesses = (np.concatenate(column) for column in zip(*parts, strict=True))
-        order = _order(newton.distances(arm, seeds.rows(target)[0], q))
-        q = np.take_along_axis(q, order[:, :, None], axis=1)
-        return Rows(q, doubt, np.ones(len(target), bool), None, guesses)
+        found = stacked([_solved(pencil, target[k : k + CHUNK]) for k in range(0, max(len(target), 1), CHUNK)])
+        order = _order(newton.distances(arm, seeds.rows(target)[0], found.q))
+        return found._replace(q=np.take_along_axis(found.q, order[:, :, None], axis=1))
 
     return Geometry(f"near {alike.name}", why, True, rows=rows, labels=alike.labels, ordered=alike.ordered, branches=4)
 
 
-def _solved(pencil: Pencil, target: Array) -> tuple[Array, Bool, Array]:
-    """Branches (N, 4, 3), nan where a root is not real; which targets are in doubt; complex roots that all but are."""
+def _solved(pencil: Pencil, target: Array) -> Rows:
+    """Branches (N, 4, 3), nan where a root is not real; guesses are complex roots that all but are."""
     arm, task, found = pencil.arm, pencil.task, pencil.roots(target)
     row, place = np.nonzero(found.real)
     better, size = newton.correct(arm, task, found.q[row, place], target[row])
@@ -157,7 +156,7 @@ def _solved(pencil: Pencil, target: Array) -> tuple[Array, Bool, Array]:
         apart = newton.distances(arm, q, q) + 9.0 * np.eye(4)
         merged = (apart < max(APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
     doubt = beside.any(axis=1) | merged | found.loose
-    return q, doubt, np.where(beside[:, :, None], found.q, np.nan)
+    return Rows(q, doubt, np.ones(len(target), bool), None, np.where(beside[:, :, None], found.q, np.nan))
 
 
 def _order(away: Array) -> NDArray[np.intp]:

@@ -38,14 +38,10 @@ class Redundancy(NamedTuple):
         return bool(self.joint) and self.task.orientation == "axis"
 
     @property
-    def labelled(self) -> bool:
-        """Whether a branch keeps its index along the turn, as that of a closed form does."""
-        return self.geometry.ordered and self.geometry.pairs is not None
-
-    @property
     def by_formula(self) -> bool:
-        """Whether the others have a closed form that needs no more than its recorded formula."""
-        return self.labelled and self.geometry.doubts is None
+        """Whether the others have a closed form that needs no more than its recorded formula, whose branches keep their
+        index along the turn."""
+        return self.geometry.ordered and self.geometry.pairs is not None and self.geometry.doubts is None
 
 
 @lru_cache(maxsize=64)
