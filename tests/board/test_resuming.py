@@ -167,9 +167,7 @@ def test_what_cannot_be_gone_on_with_is_refused_with_the_next_step(
     refused(2, "another motion than the one that was held", 20, 80, -80)
     refused(2, "--resume and --dry-run", *motions["single"], "--dry-run")
     refused(2, "--resume and --assume", *motions["single"], "--assume-home")
-    refused(
-        2, "--resume needs the rows .* once more.*\n.*save the rows in a file and send --batch FILE", "--batch", "-"
-    )
+    refused(2, "--resume needs the same rows again.*\n.*give a file with the rows, --batch FILE", "--batch", "-")
     assert run("jog", THREE_DOF, "q1", 10, "--seconds", 0.3, "--port", arm.name).code == 0
     refused(5, "the arm has moved since", *motions["single"])
     assert arm.send(*motions["single"])[0] == 0
