@@ -94,6 +94,8 @@ def _check_reached(address: str) -> None:
         raise ClusterError(f"'{address}' is no address of a scheduler, which is tcp://HOST:PORT", address=address)
     try:
         socket.create_connection((host.strip("[]"), int(port)), REACHED).close()
+    except UnicodeError:  # an empty part between two dots, or one above 63 characters
+        raise _no_scheduler(address, f"{host} is no name of a computer") from None
     except OSError as error:
         why = f"no connection in {REACHED:g} s" if isinstance(error, TimeoutError) else error.strerror or str(error)
         raise _no_scheduler(address, why) from None
