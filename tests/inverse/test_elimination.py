@@ -20,8 +20,9 @@ from general_arms import (
 
 import armkin
 from armkin.inverse.elimination import method
-from armkin.inverse.elimination.polish import refine, shrink
+from armkin.inverse.elimination.polish import refine
 from armkin.inverse.numeric.newton import nudged
+from armkin.model.rotation import shrunk
 
 
 def jacobian(arm: Arm, q: Array) -> Array:
@@ -45,7 +46,7 @@ def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped:
     """Guesses (M, 6) moved onto their targets (M, 4, 4), and the residuals (M,), lengths over the links' sum."""
     length = float(np.linalg.norm(link[1:, :3, 3], axis=1).sum()) or 300.0
     unit = np.where(prismatic, length, 1.0)
-    found = refine(shrink(link, length), prismatic, q / unit, shrink(T, length), steps, damped)
+    found = refine(shrunk(link, length), prismatic, q / unit, shrunk(T, length), steps, damped)
     return found.q * unit, found.residual
 
 

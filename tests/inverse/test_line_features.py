@@ -5,6 +5,7 @@ import pytest
 from general_arms import rigid
 
 from armkin.inverse.elimination import line_features
+from armkin.model.rotation import joint_motion
 
 
 def test_rep_is_a_homomorphism() -> None:
@@ -34,5 +35,5 @@ def test_a_joints_rep_is_affine_in_two_numbers(prismatic: bool, inverse: bool) -
     U = line_features.joint_rep(prismatic, inverse)
     for q in (-2.5, -0.4, 0.0, 1.3, 3.1):
         b = (q, q * q) if prismatic else (np.cos(q), np.sin(q))
-        motion = line_features.joint_motion(prismatic, -q if inverse else q)
+        motion = joint_motion(prismatic, -q if inverse else q)
         np.testing.assert_allclose(U[0] + U[1] * b[0] + U[2] * b[1], line_features.rep(motion), atol=1e-13)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
-from armkin.model.rotation import rotation_about
+from armkin.model.rotation import joint_motion
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -39,7 +39,7 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     links, frame, kept = [arm.link[0]], [], []
     for i, name in enumerate(arm.joint_names):
         if name in held:
-            links[-1] = links[-1] @ _motion(bool(arm.prismatic[i]), held[name] * arm.ratio[i]) @ arm.link[i + 1]
+            links[-1] = links[-1] @ joint_motion(bool(arm.prismatic[i]), held[name] * arm.ratio[i]) @ arm.link[i + 1]
         else:
             kept.append(i)
             frame.append(arm.frame[i])
@@ -103,12 +103,3 @@ def joint_index(arm: Arm, name: str) -> int:
     close = get_close_matches(name, arm.joint_names, 1, 0.5)
     hint = f" (did you mean {close[0]}?)" if close else ""
     raise UsageError(f"{arm.name} has no joint '{name}'{hint}; its joints are {', '.join(arm.joint_names)}")
-
-
-def _motion(prismatic: bool, value: float) -> Array:
-    Z = np.eye(4)
-    if prismatic:
-        Z[2, 3] = value
-    else:
-        Z[:3, :3] = rotation_about(2, value)
-    return Z

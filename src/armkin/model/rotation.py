@@ -77,6 +77,23 @@ def rotation_about(axis: int, angle: ArrayLike) -> Array:
     return R
 
 
+def joint_motion(prismatic: bool, q: ArrayLike) -> Array:
+    """Z(q) (..., 4, 4): turns of q (...) [rad] about z, or shifts of q along z."""
+    Z = np.zeros((*np.shape(q), 4, 4)) + np.eye(4)
+    if prismatic:
+        Z[..., 2, 3] = q
+    else:
+        Z[..., :3, :3] = rotation_about(2, q)
+    return Z
+
+
+def shrunk(motion: Array, length: float) -> Array:
+    """Motions (..., 4, 4) with their translations divided by a length."""
+    out = np.array(motion, float)
+    out[..., :3, 3] /= length
+    return out
+
+
 def inverse(T: Array) -> Array:
     """Inverse of rigid transforms (..., 4, 4)."""
     out = np.zeros(T.shape)

@@ -29,6 +29,8 @@ from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import NAMED, NO_LENGTH, SOLUTION
 from armkin.inverse.tasks.task import targets_of
+from armkin.model.chain import Chain, axes
+from armkin.model.rotation import joint_motion
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -169,10 +171,8 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
 
 def _bends_upright(arm: Arm) -> bool:
     """Whether the elbow's axis is not along the base's z."""
-    P = arm.link[0]
-    for i in range(1, min(arm.n, 3)):
-        P = P @ arm.link[i]
-    return bool(abs(P[2, 2]) < 0.9)
+    _, directions = axes(Chain(arm.link, arm.prismatic))
+    return bool(abs(directions[: min(arm.n, 3)][-1, 2]) < 0.9)
 
 
 def _points(arm: Arm, q: Array) -> Array:
@@ -180,13 +180,6 @@ def _points(arm: Arm, q: Array) -> Array:
     P = np.broadcast_to(arm.link[0], (len(q), 4, 4))
     points = [P[:, :3, 3]]
     for i in range(min(arm.n, 3)):
-        Z = np.broadcast_to(np.eye(4), (len(q), 4, 4)).copy()
-        if arm.prismatic[i]:
-            Z[:, 2, 3] = q[:, i]
-        else:
-            Z[:, 0, 0] = Z[:, 1, 1] = np.cos(q[:, i])
-            Z[:, 1, 0] = np.sin(q[:, i])
-            Z[:, 0, 1] = -Z[:, 1, 0]
-        P = P @ Z @ arm.link[i + 1]
+        P = P @ joint_motion(bool(arm.prismatic[i]), q[:, i]) @ arm.link[i + 1]
         points.append(P[:, :3, 3])
     return np.stack(points, axis=1)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.task import Task
 
 if TYPE_CHECKING:
@@ -68,15 +69,10 @@ def _is_path(arm: Arm, task: Task, target: Array) -> Bool:
 
 def _links(arm: Arm, now: Array, then: Array) -> Int:
     """For every branch of targets (M, B, n) its partner at the target before, or -1: (M, B)."""
-    M, B, _ = now.shape
-    apart = np.zeros((M, B, B))
-    for joint, prismatic in enumerate(arm.prismatic):
-        d = now[:, :, None, joint] - then[:, None, :, joint]
-        d = d / arm.reach if prismatic else wrapped(d)
-        np.maximum(apart, np.abs(d), out=apart)
+    apart = newton.distances(arm, now, then)
     apart[np.isnan(apart)] = np.inf
     partner, back = apart.argmin(axis=2), apart.argmin(axis=1)
     nearest, second = np.moveaxis(np.partition(apart, 1, axis=2)[:, :, :2], 2, 0)
     clear = (nearest < CLOSE) & (second > CLEAR * nearest)
-    mutual = np.take_along_axis(back, partner, axis=1) == np.arange(B)
+    mutual = np.take_along_axis(back, partner, axis=1) == np.arange(now.shape[1])
     return np.where(clear & mutual, partner, -1)

@@ -19,7 +19,7 @@ the loop is a planar arm of three joints, or a wrist: 8 branches.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,13 +40,14 @@ from armkin.inverse.closed.subproblems import (
     one_root,
     rotation_between,
     spin,
+    walked_back,
 )
 from armkin.inverse.closed.three_link import ThreeLink
 from armkin.inverse.closed.wrist import Wrist, meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, LOOSE, LOOSE_DOUBLE, NEAR, NO_SIZE
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain, is_parallel, reverse
-from armkin.model.rotation import inverse
+from armkin.model.rotation import inverse, shrunk
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -69,17 +70,13 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
             how = f"a quartic gives joint {c}" if loop.ends.regular else f"special axes give joint {c} by itself"
             why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {what}; {how}"
             name = "three parallel axes" if loop.three_link else "three axes that meet"
-            solve = _backward(loop.solve) if backward else loop.solve
+            solve = walked_back(loop.solve) if backward else loop.solve
             # where one of these is free, its values at which the rest reaches may be few, and other motions cross there
             ends = tuple(5 - j if backward else j for j in loop.joints)
             geometry = Geometry(name, why, True, solve, ordered=not loop.ends.regular, ends=ends)
             if is_sound(arm, task, geometry):
                 return geometry
     return None
-
-
-def _backward(solve: Callable[[Pose, Prefer], Candidates]) -> Callable[[Pose, Prefer], Candidates]:
-    return lambda goal, prefer: solve(pose.inverse(goal), prefer[::-1]).reversed()
 
 
 class _Ends:
@@ -157,7 +154,7 @@ class _Loop:
         """first: the joint (0..5) of the first axis, 1 or 3; points: where they meet, seen before the first and after
         the last of them [units of the reach], None of parallel axes; tolerance: as in `recognise`."""
         self.unit = 1.0 / reach
-        link = _shrunk(chain.link, reach)
+        link = shrunk(chain.link, reach)
         self.from_base, self.from_tool = pose.constant(inverse(link[0])), pose.constant(inverse(link[6]))
         self.first = first
         self.joints = [(first + k) % 6 for k in (3, 4, 5)]  # a, b and c
@@ -216,13 +213,6 @@ class _Loop:
         if known:
             angles[self.first : self.first + 3] = known
         return Candidates(pairs, doubt | doubt3, None, angles)
-
-
-def _shrunk(link: Array, reach: float) -> Array:
-    """Links with their lengths in units of the reach."""
-    out = np.array(link)
-    out[:, :3, 3] /= reach
-    return out
 
 
 def _mixed(weights: Array, sides: list[list[Entry]]) -> list[Entry]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 FEW = 8  # targets that plain Python does sooner than arrays
 FREED = 24  # values tried for joints that a target leaves free
 CLOSER = 7  # times that the best of these is sought sixteen times closer: to 1e-9 rad
-BESIDE_ROUND = 0.37  # of a step between them: so far from `near` they begin
+# all round, as steps from `near` [rad], beside round values: where a wrist is straight its joints are free, too, and
+# jump to what is preferred
+ROUND = np.asarray((np.arange(FREED)[:, None] + 0.37) * (2.0 * np.pi / FREED) - np.pi, np.float64)
 SHAKEN = 8  # moves of a target to where nothing is free
 
 
@@ -154,7 +156,7 @@ class Recorded:
         Where none of the values all round solves the target by a loose candidate (N, B), they are sought closer and
         closer about the best one; also of which targets (N,) that is so.
         """
-        shift, apart = self._steps(), 2.0 * np.pi / FREED
+        shift, apart = ROUND, 2.0 * np.pi / FREED
         best, open_, single = np.zeros((len(target), 1)), np.arange(len(target)), np.zeros(len(target), bool)
         for closer in range(CLOSER):
             single[open_] = closer > 0
@@ -168,14 +170,9 @@ class Recorded:
             shift = apart * np.arange(-16.0, 17.0)[:, None]
         return best, single
 
-    def _steps(self) -> Any:
-        """Values of a joint all round, as steps from `near` [rad]: (FREED, 1)."""
-        # beside round values: where a wrist is straight its joints are free, too, and jump to what is preferred
-        return (np.arange(FREED)[:, None] + BESIDE_ROUND) * (2.0 * np.pi / FREED) - np.pi
-
     def _all_round(self, target: Array, near: Array) -> tuple[Array, Array]:
         """Candidates (N, FREED, B, n) with values for free joints all round; squared residuals."""
-        return self._shifted(target, near, self._steps())
+        return self._shifted(target, near, ROUND)
 
     def _shifted(self, target: Array, near: Array, shift: Array) -> tuple[Array, Array]:
         """Candidates (N, S, B, n) with free joints so far from `near`, (S, 1) or (N, S, 1); squared residuals."""

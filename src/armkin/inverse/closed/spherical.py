@@ -18,13 +18,7 @@ from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
 from armkin.inverse.closed.elbow import Elbow
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import (
-    Candidates,
-    Doubt,
-    Pair,
-    Prefer,
-    distance2,
-)
+from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, distance2, walked_back
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.closed.wrist import Wrist, meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH
@@ -44,26 +38,17 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     if task.name != "pose" or arm.n != 6:
         return None
     chain = Chain(arm.link, arm.prismatic)
-    centre = wrist_centre(chain, tolerance * arm.reach)
-    if centre is not None:
-        wrist = SphericalWrist(chain, *centre, tolerance)
-        if wrist.close:
-            return None
-        why = f"axes 4, 5 and 6 meet in a point; {wrist.why}"
-        return Geometry("spherical wrist", why, True, wrist.solve, labels=wrist.labels, ordered=wrist.ordered)
-    chain = reverse(chain)
-    centre = wrist_centre(chain, tolerance * arm.reach)
+    centre, shoulder = wrist_centre(chain, tolerance * arm.reach), False
     if centre is None:
+        chain, shoulder = reverse(chain), True
+        centre = wrist_centre(chain, tolerance * arm.reach)
+    if centre is None or (wrist := SphericalWrist(chain, *centre, tolerance)).close:
         return None
-    shoulder = SphericalWrist(chain, *centre, tolerance)
-    if shoulder.close:
-        return None
-
-    def solve(goal: Pose, prefer: Prefer) -> Candidates:
-        return shoulder.solve(pose.inverse(goal), prefer[::-1]).reversed()
-
-    why = f"axes 1, 2 and 3 meet in a point; walked from the tool, {shoulder.why}"
-    return Geometry("spherical shoulder", why, True, solve, ordered=shoulder.ordered)
+    if shoulder:
+        why = f"axes 1, 2 and 3 meet in a point; walked from the tool, {wrist.why}"
+        return Geometry("spherical shoulder", why, True, walked_back(wrist.solve), ordered=wrist.ordered)
+    why = f"axes 4, 5 and 6 meet in a point; {wrist.why}"
+    return Geometry("spherical wrist", why, True, wrist.solve, labels=wrist.labels, ordered=wrist.ordered)
 
 
 def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:

@@ -11,13 +11,13 @@ The caller says which axis by the shape of `signs`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from armkin.formula import arrays
+from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry, Truth
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.numeric.tolerances import (
@@ -96,6 +96,11 @@ class Candidates(NamedTuple):
     def reversed(self) -> Candidates:
         """The same for the chain walked the other way."""
         return self._replace(pairs=self.pairs[::-1], angles=self.angles[::-1])
+
+
+def walked_back(solve: Callable[[pose.Pose, Prefer], Candidates]) -> Callable[[pose.Pose, Prefer], Candidates]:
+    """The closed form of an arm from that of its chain walked from the tool to the base."""
+    return lambda goal, prefer: solve(pose.inverse(goal), prefer[::-1]).reversed()
 
 
 def spin(c: Entry, s: Entry, v: Sequence[Entry]) -> list[Entry]:

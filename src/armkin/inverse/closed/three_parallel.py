@@ -19,7 +19,7 @@ from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.precision import precision
-from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, linear, rotation_between
+from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, linear, rotation_between, walked_back
 from armkin.inverse.closed.three_link import ThreeLink
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, PARALLEL
 from armkin.inverse.tasks.task import Task
@@ -42,11 +42,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     chain = reverse(chain)
     if not fits(chain, tolerance, arm.reach):
         return None
-    solver = ThreeParallel(chain)
-
-    def solve(goal: Pose, prefer: Prefer) -> Candidates:
-        return solver.solve(pose.inverse(goal), prefer[::-1]).reversed()
-
+    solve = walked_back(ThreeParallel(chain).solve)
     return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve)
 
 

@@ -62,17 +62,13 @@ class Elimination:
 
     def of_kind(self, kind: Kind) -> tuple[Pencil, ...]:
         """The pencils of poses of a kind."""
-        if kind == Kind.PARALLEL:
-            return self._parallel
-        return self._meeting if kind == Kind.MEETING else self.plans
+        if kind not in self._known:
+            self._known[kind] = _of_special_poses(self, kind)
+        return self._known[kind]
 
     @cached_property
-    def _parallel(self) -> tuple[Pencil, ...]:
-        return _of_special_poses(self, Kind.PARALLEL)
-
-    @cached_property
-    def _meeting(self) -> tuple[Pencil, ...]:
-        return _of_special_poses(self, Kind.MEETING)
+    def _known(self) -> dict[Kind, tuple[Pencil, ...]]:
+        return {Kind.PLAIN: self.plans}
 
 
 def kinds(closed: Loop, goal: Array) -> NDArray[np.int64]:

@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.elimination.polish import shrink
 from armkin.inverse.numeric.tolerances import RANK
-from armkin.model.rotation import inverse
+from armkin.model.rotation import inverse, shrunk
 
 NO_LENGTH = 300.0  # unit [mm] of a chain whose links have no length of their own
 
@@ -31,7 +30,7 @@ class Loop(NamedTuple):
 
     def goal(self, T: Array) -> Array:
         """Targets (N, 4, 4) [mm] as poses of `chain`."""
-        return inverse(self.base) @ shrink(T, self.length) @ inverse(self.tool)
+        return inverse(self.base) @ shrunk(T, self.length) @ inverse(self.tool)
 
 
 def close(link: Array, prismatic: Bool) -> Loop:
@@ -58,5 +57,5 @@ def close(link: Array, prismatic: Bool) -> Loop:
         moved[i + 1, :3, 3] -= move
     size = float(np.linalg.norm(moved[1:6, :3, 3], axis=1).sum()) / 3
     length = size if size > RANK * (1 + float(np.abs(link[:, :3, 3]).max())) else NO_LENGTH
-    moved = shrink(moved, length)
+    moved = shrunk(moved, length)
     return Loop(np.array(prismatic, dtype=np.bool_), moved[0], moved[1:6], moved[6], length)

@@ -17,7 +17,7 @@ from armkin.inverse.elimination import line_features
 from armkin.inverse.elimination.joint_order import Role
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import RANK, TINY
-from armkin.model.rotation import inverse
+from armkin.model.rotation import inverse, joint_motion
 
 # The columns of Q as (b, a).  The five that give the joints back come last: with Q = (orthonormal)(triangle)
 # they follow from the last five rows of the triangle alone.
@@ -27,9 +27,9 @@ _READ = 4  # from here on
 # A few arbitrary poses, from turns about z, x and z: they show ranks that all poses share.
 _SAMPLES: Array = np.stack(
     [
-        line_features.joint_motion(False, 1.0 + i)
+        joint_motion(False, 1.0 + i)
         @ np.array([[1, 0, 0, 0.3 - i], [0, 0.6, -0.8, 0.5 * i], [0, 0.8, 0.6, 0.7], [0, 0, 0, 1]])
-        @ line_features.joint_motion(False, 2.0 - 0.7 * i)
+        @ joint_motion(False, 2.0 - 0.7 * i)
         for i in range(3)
     ]
 )

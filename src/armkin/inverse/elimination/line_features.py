@@ -21,6 +21,7 @@ from functools import cache
 import numpy as np
 
 from armkin.formula.arrays import Array
+from armkin.model.rotation import joint_motion
 
 SIZE = 15
 _P, _L, _PP, _PL, _M, _W, _ONE = slice(0, 3), slice(3, 6), 6, 7, slice(8, 11), slice(11, 14), 14
@@ -76,17 +77,6 @@ def rep(motion: Array) -> Array:
     out[..., _W, _M] = -2 * cross_R
     out[..., _W, _L] = t_t[..., None, None] * R - 2 * t[..., :, None] * t_R[..., None, :]
     out[..., _W, _PL] = -2 * t
-    return out
-
-
-def joint_motion(prismatic: bool, q: float) -> Array:
-    """Z(q): a turn of q [rad] about z, or a shift of q along z, as a (4, 4) matrix."""
-    out = np.eye(4)
-    if prismatic:
-        out[2, 3] = q
-    else:
-        c, s = np.cos(q), np.sin(q)
-        out[:2, :2] = [[c, -s], [s, c]]
     return out
 
 

@@ -148,10 +148,3 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         move[:, ~np.isfinite(longest)] = 0.0  # the inverse of an all but singular Jacobian has overflown
         value = value + move * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
     return Polished(best.T, residual, guess, weakness)
-
-
-def shrink(motion: Array, length: float) -> Array:
-    """Motions (..., 4, 4) with their translations divided by ``length``."""
-    out = motion.copy()
-    out[..., :3, 3] /= length
-    return out

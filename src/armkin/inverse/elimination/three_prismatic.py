@@ -20,8 +20,8 @@ Where these are coplanar, slides can move alone: of the values that place the to
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.elimination.line_features import joint_motion
 from armkin.inverse.numeric.tolerances import COPLANAR, MERGED_SLIDES, NEARLY_COPLANAR, PARALLEL_SLIDES
+from armkin.model.rotation import joint_motion, rotation_about
 
 FREE = 0.7321  # [rad] its value there
 OTHERS = (0.0, 1.3, 2.9)  # [rad] values of it at which the slides' directions are compared, beside that one
@@ -50,13 +50,13 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
     square[(square < MERGED_SLIDES) & ~free] = 0.0
     half = np.arctan2(np.sqrt(np.maximum(square, 0.0)), B[:, 2, 2] - u[2] * v[2])
     q2 = np.arctan2(odd, even) + np.stack([half, -half], axis=1)
-    middle = A[1] @ _turns(q2)[..., :3, :3] @ A[2]
+    middle = A[1] @ rotation_about(2, q2) @ A[2]
     q1 = np.arctan2(B[:, None, 1, 2], B[:, None, 0, 2]) - np.arctan2(middle[..., 1, 2], middle[..., 0, 2])
     q1[free] = FREE
 
     def whole(q1: Array, rows: Bool) -> tuple[Array, Array]:
         """Solutions (K, 2, 6) of some goals for values of q1 (K, 2), and the weakest of the slides' directions (K,)."""
-        last = np.swapaxes(_turns(q1)[..., :3, :3] @ middle[rows], -1, -2) @ B[rows, None]
+        last = np.swapaxes(rotation_about(2, q1) @ middle[rows], -1, -2) @ B[rows, None]
         q3 = np.arctan2(last[..., 1, 0] - last[..., 0, 1], last[..., 0, 0] + last[..., 1, 1])
         return _with_slides(chain, prismatic, np.stack([q1, q2[rows], q3], axis=-1), goal[rows])
 
@@ -79,7 +79,7 @@ def _with_slides(chain: Array, prismatic: Bool, turned: Array, goal: Array) -> t
             axes.append(frame[..., :3, 2])
             frame = frame @ chain[i + 1]
         else:
-            frame = frame @ _turns(q[..., i]) @ chain[i + 1]
+            frame = frame @ joint_motion(False, q[..., i]) @ chain[i + 1]
     rest = goal[:, None, :3, 3] - frame[..., :3, 3]
     # an explicit pseudoinverse would lose as many digits as the weakest direction has
     U, S, Vt = np.linalg.svd(np.stack(axes, axis=-1))
@@ -87,12 +87,3 @@ def _with_slides(chain: Array, prismatic: Bool, turned: Array, goal: Array) -> t
     moves = np.divide(ahead, S[..., None], out=np.zeros_like(ahead), where=S[..., None] > COPLANAR)
     q[..., prismatic] = (np.swapaxes(Vt, -1, -2) @ moves)[..., 0]
     return q, S[..., -1].min(axis=1)
-
-
-def _turns(q: Array) -> Array:
-    """Rz(q) as (..., 4, 4)."""
-    out = np.zeros((*q.shape, 4, 4)) + joint_motion(False, 0.0)
-    out[..., 0, 0] = out[..., 1, 1] = np.cos(q)
-    out[..., 1, 0] = np.sin(q)
-    out[..., 0, 1] = -out[..., 1, 0]
-    return out

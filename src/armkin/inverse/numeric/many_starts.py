@@ -22,15 +22,13 @@ ROUND = np.pi / 4  # [rad] roots of high order nearly always stand where axes ar
 def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
     """What Newton's method leads to from the same random postures for each target that may lack branches.
 
-    target: (N, m) or (N, 4, 4); lost: (N,). Returns (N, STARTS, n) postures that miss their target by less than
+    target: (N, m) or (N, 4, 4); lost: (N,), some. Returns (N, STARTS, n) postures that miss their target by less than
     `SEED`, nan elsewhere. Of roots that Newton's method only approaches, the nearest round posture, if that is better.
     """
     rng = np.random.default_rng(13)
     start = rng.uniform(-1.0, 1.0, (STARTS, arm.n)) * np.where(arm.prismatic, arm.reach, np.pi)
     row, which = np.nonzero(np.repeat(lost[:, None], STARTS, axis=1))
     out = np.full((len(target), STARTS, arm.n), np.nan)
-    if not len(row):
-        return out
     q, size = newton.correct(arm, task, start[which], target[row], steps=STEPS, patience=PATIENCE)
     slow = np.flatnonzero((size > CONVERGING) & (size < SEED))
     if len(slow):

@@ -126,14 +126,9 @@ def distances(arm: Arm, a: Array, b: Array) -> Array:
 
 def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array, NDArray[np.int64]]:
     """Smallest singular value (M,) of the task's Jacobian, right vectors (M, n, n), and nullity (M,) below 1e-6."""
-    return null_space_of(arm, task, scaled(arm, task, q, target)[1])
-
-
-def null_space_of(arm: Arm, task: Task, J: Array) -> tuple[Array, Array, NDArray[np.int64]]:
-    """The same of Jacobians J (M, r, n)."""
-    _, S, Vt = np.linalg.svd(J, full_matrices=True)
-    sigma, nullity = _smallest(arm, task, S)
-    return sigma, Vt, nullity
+    at = Linear.at(arm, task, q, target)
+    sigma, nullity = _smallest(arm, task, at.S)
+    return sigma, at.V, nullity
 
 
 def _smallest(arm: Arm, task: Task, S: Array) -> tuple[Array, NDArray[np.int64]]:

@@ -21,7 +21,7 @@ from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.wrist import meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
 from armkin.inverse.redundant.pieces import Int, Pieces, best_samples, holding_none, none, runs
-from armkin.model.rotation import inverse
+from armkin.model.rotation import inverse, rotation_about
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -104,10 +104,7 @@ def _circles(of: ArmAngle, target: Array) -> _Circles:
     one = (apart == 0.0) | (apart == np.pi)  # the two elbows are the same
     row, half = np.nonzero(np.stack([there, there & ~one], axis=1))
     q4 = np.arctan2(b, a) + np.where(half == 0, apart[row], -apart[row])
-    c, s = np.cos(q4), np.sin(q4)
-    Z = np.zeros((len(q4), 3, 3))
-    Z[:, 0, 0], Z[:, 0, 1], Z[:, 1, 0], Z[:, 1, 1], Z[:, 2, 2] = c, -s, s, c, 1.0
-    elbow = L[3][:3, :3] @ Z
+    elbow = L[3][:3, :3] @ rotation_about(2, q4)
     # columns first, targets last
     f, g = (_frame(v).transpose(2, 1, 0) for v in (d[row], elbow @ p + L[3][:3, :3] @ u))
     dyad = np.einsum("aim,bjm->abijm", f, g)

@@ -21,7 +21,7 @@ from armkin.inverse.closed.wrist import foot, meeting_point
 from armkin.inverse.numeric.tolerances import BESIDE_END, EXACT, NO_LENGTH, PARALLEL, SAME_END
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
 from armkin.model.chain import is_parallel
-from armkin.model.rotation import inverse, rotation_about
+from armkin.model.rotation import inverse, rotation_about, shrunk
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -75,8 +75,7 @@ def boundaries(arm: Arm) -> Boundaries | None:
     """What is constant of an arm of seven joints with such a shoulder and wrist, else None."""
     if arm.n != 7 or arm.prismatic.any():
         return None
-    L = arm.link.copy()
-    L[:, :3, 3] /= arm.reach
+    L = shrunk(arm.link, arm.reach)
     shoulder = meeting_point(L[1], L[2], EXACT)
     if shoulder is None or is_parallel(L[5], PARALLEL):
         return None
@@ -108,8 +107,7 @@ class _Held:
 
     def __init__(self, of: Boundaries, target: Array, t: Complex) -> None:
         self.of, self.t = of, t
-        self.target = target.copy()
-        self.target[:, :3, 3] /= of.arm.reach
+        self.target = shrunk(target, of.arm.reach)
         base = of.link[0] @ [*of.shoulder, 1.0]
         shoulder = (of.link[7] @ inverse(self.target) @ base)[:, :3]
         self.to = self.turned(shoulder) + (of.link[6][:3, 3] - of.wrist)[:, None, None]  # the shoulder

@@ -89,11 +89,6 @@ def _tangent(at: _Local, held: Bool) -> _Tangent:
     return _Tangent(P, back, multipliers, P @ H @ P, slope)
 
 
-class State(NamedTuple):
-    q: Array
-    done: Bool
-
-
 class _Move(NamedTuple):
     """A step (M, n) of each posture, and what is to be done with it."""
 
@@ -146,8 +141,8 @@ def _tried(arm: Arm, box: Box, x: Array, goal: Array, move: _Move, trust: Array)
     return trial, hit
 
 
-def descend(arm: Arm, box: Box, q: Array, target: Array) -> State:
-    """Newton's method along the postures at a position, from each of them to its local minimum."""
+def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
+    """Newton's method along the postures at a position, from each (M, n) to a local minimum; which got there (M,)."""
     q, M = q.copy(), len(q)
     held = np.zeros(q.shape, bool)
     trust = np.full(M, 0.5)
@@ -175,7 +170,7 @@ def descend(arm: Arm, box: Box, q: Array, target: Array) -> State:
         refused = active[~better & ~move.rest & ~move.blocked & ~move.leaves]
         trust[refused] *= 0.25
         active = active[~move.rest & (trust[active] > SOLUTION)]
-    return State(q, done)
+    return q, done
 
 
 def flat_minima(arm: Arm, q: Array, target: Array) -> Bool:

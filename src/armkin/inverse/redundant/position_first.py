@@ -125,8 +125,8 @@ def _of_chunk(ik: Ik, arm: Arm, task: Task, target: Array, near: Array) -> list[
     """The minima (B, n) of each of some targets, sorted."""
     box = box_of(arm)
     q, row = _seeds(arm, box, target, near)
-    state = descend(arm, box, q, target[row])
-    q, row = state.q[state.done], row[state.done]
+    q, done = descend(arm, box, q, target[row])
+    q, row = q[done], row[done]
     exact = _exact(ik, arm, target, near)
     out = []
     for k, goal in enumerate(target):

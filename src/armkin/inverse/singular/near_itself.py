@@ -30,18 +30,21 @@ COARSE = 1e4 * ROOM  # and to a pose that is rounded where its rotation does not
 ROUNDED = 1.001 * SOLUTION  # residual that solves a rounded target, if it is more
 
 
-def reached(arm: Arm, task: Task, target: Array, tip: Array, first: Array | None = None) -> NDArray[np.intp]:
+def reached(
+    arm: Arm, task: Task, target: Array, tip: Array, first: Array | None = None, room: Array | None = None
+) -> NDArray[np.intp]:
     """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`.
 
-    tip: (3,) or (N, 3), its `position`; first: (N,) the targets' first coordinate, where it stands by itself.
+    tip: (3,) or (N, 3), its `position`; first: (N,) the targets' first coordinate, where it stands alone; room: (N,)
+    how far off they may be [reaches], by default `ROOM`.
     """
     point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
-    most = ROOM * arm.reach
+    most = ROOM * arm.reach if room is None else room * arm.reach
     x = point[:, 0] if first is None else first
     rows = np.flatnonzero(np.abs(x - tip[..., 0]) <= most)  # one coordinate tells nearly all others
     if len(rows):
-        away = point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position]
-        rows = rows[(np.abs(away) <= most).all(axis=1)]
+        away = np.abs(point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position])
+        rows = rows[away.max(axis=1) <= (most if isinstance(most, float) else most[rows])]
     return rows
 
 
@@ -91,11 +94,7 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> N
     if not known.any():
         return np.flatnonzero(known)
     close = np.broadcast_to(near, (len(target), arm.n))
-    tip = position(arm, near)
-    point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
-    rows = np.flatnonzero(known & (np.abs(point[:, 0] - tip[..., 0]) <= most * arm.reach))  # tells nearly all others
-    away = np.abs(point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position]).max(axis=1)
-    rows = rows[away <= most[rows] * arm.reach]
+    rows = reached(arm, task, target, position(arm, near), room=np.where(known, most, -1.0))
     rows = rows[~limits.outside(arm, close[rows]).any(axis=1)]
     there: NDArray[np.intp] = rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]]
     return there

@@ -177,11 +177,6 @@ def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Arr
     return there, size, np.where(far, size - newton.missing(arm, task, q, target), np.inf) / step
 
 
-def _slow(grown: Array) -> Bool:
-    """Whether the residual grows slowly enough on a short step and on a long one: (2, M)."""
-    return np.asarray(grown <= GROWTH * STEPS)
-
-
 def _apart(away: Array, push: Array) -> Bool:
     """Whether motions (2, 2, M, n), by a short step and a long one, both ways along push (M, n), are about as long."""
     least = 0.3 * STEPS * np.abs(push).max(axis=1)  # (2, M)
@@ -225,7 +220,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     there, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[who]] * 8))
     away, size = (there.reshape(start.shape)[:, :, 0] - q[who]) / unit, size.reshape(start.shape[:4])
     grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[who]  # (2, m)
-    short, long = _slow(grown) & _apart(away, push)
+    short, long = (grown <= GROWTH * STEPS) & _apart(away, push)
     # where the residual grows at all, it must do so slowly as far as the long step: near a fold the first tenth of a
     # radian costs nothing
     along = (short & ((grown[0] <= CLOSED) | long)) | (long & several)

@@ -182,17 +182,17 @@ def _solve(
     arm: Arm, task: Task, alike: Geometry, off: float, elimination: Callable[[], Geometry | None] | None, target: Array
 ) -> Rows:
     """What is found of some targets, none of them complete; the similar arm's branches keep their places."""
-    source, complete = recorded(arm, task, alike), np.zeros(len(target), bool)
+    source = recorded(arm, task, alike)
     off_here = off * np.maximum(1.0, distance(arm, task, target))  # the error grows with the slide's extension
     if elimination is None:
-        known = pairs.settled(arm, task, source, off_here, target)
-        q, doubt = known.q, known.doubt
-        if len(rest := np.flatnonzero(known.open)):
-            more, doubt[rest] = _by_neighbours(arm, task, source, off, off_here[rest], None, target[rest])
-            q = widened(known.q, more.shape[1])
-            q[rest] = more
-        return Rows(q, doubt, complete, None, known.guesses)
-    return Rows(*_by_neighbours(arm, task, source, off, off_here, elimination, target), complete)
+        known, open_ = pairs.settled(arm, task, source, off_here, target)
+        if len(rest := np.flatnonzero(open_)):
+            more, known.doubt[rest] = _by_neighbours(arm, task, source, off, off_here[rest], None, target[rest])
+            known = known._replace(q=widened(known.q, more.shape[1]))
+            known.q[rest] = more
+        return known
+    found = _by_neighbours(arm, task, source, off, off_here, elimination, target)
+    return Rows(*found, np.zeros(len(target), bool))
 
 
 def _by_neighbours(

@@ -9,13 +9,14 @@ every root of the class is accounted for, or the target remains open.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.closed.candidates import Recorded
+from armkin.inverse.closed.geometry import Rows
 from armkin.inverse.closed.newton_steps import ABSENT
 from armkin.inverse.numeric import newton, root_pairs
 from armkin.inverse.numeric.tolerances import ANSWERED, APART_ROOTS
@@ -29,16 +30,6 @@ if TYPE_CHECKING:
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
 TOUCHING = APART_ROOTS**2  # square of half of what lies between complex roots, up to which they may be one real root
 MOVED = 0.3  # [rad, reaches] a pair may stand from the class's
-
-
-class Settled(NamedTuple):
-    """q (N, B, n) branches, nan where there is none; open (N,): not all roots are accounted for; doubt (N,): two roots
-    are one, or nearly; guesses (N, B, n): where these are."""
-
-    q: Array
-    open: Bool
-    doubt: Bool
-    guesses: Array
 
 
 def around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
@@ -59,10 +50,11 @@ def around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
                 yield there
 
 
-def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -> Settled:
+def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -> tuple[Rows, Bool]:
     """The branches of an arm that is close to a class; off (N,): how close, at each target [reaches].
 
-    source: the class. Its own doubts stay open.
+    source: the class. Targets in doubt are those of which two roots are one, or nearly; guesses (N, B, n): where these
+    are. Also of which targets (N,) not all roots are accounted for: the class's own doubts stay open.
     """
     seed, miss, open_ = source.rows(target)
     tried = ~(miss >= ABSENT * off[:, None]) | arm.prismatic.any()  # the error grows with the slide's extension
@@ -74,14 +66,12 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
         beside = (newton.distances(arm, seed, seed) + np.diag(np.full(seed.shape[1], np.inf))).min(axis=2)
         jumped = newton.wrapped_distance(arm, q, seed) > 0.5 * beside
     bad = (np.isnan(q[:, :, 0]) & tried) | jumped | _merged(arm, q)
-    doubt: Bool = np.zeros(len(target), bool)
+    doubt, complete = np.zeros((2, len(target)), bool)
     left = np.flatnonzero(bad.any(axis=1) & ~open_)
     others = _others(source)
-    if not len(left):
-        return Settled(q, open_, doubt, guesses)
-    if task.constraints != arm.n or not len(others):
+    if not len(left) or task.constraints != arm.n or not len(others):
         open_[left] = True
-        return Settled(q, open_, doubt, guesses)
+        return Rows(q, doubt, complete, None, guesses), open_
     away = newton.wrapped_distance(arm, seed[left][:, others], seed[left][:, None])
     partner = others[np.where(bad[left][:, None], away, np.inf).min(axis=2).argmin(axis=1)]
     k, one = np.nonzero(
@@ -101,7 +91,7 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
         q[row, place] = np.where((found & (pair.square > 0.0) & (size <= ANSWERED))[:, None], better, np.nan)
         doubt[row] |= np.isnan(q[row, place, 0]) & (pair.square > -TOUCHING)
     doubt |= _merged(arm, q).any(axis=1)
-    return Settled(q, open_, doubt & ~open_, guesses)
+    return Rows(q, doubt & ~open_, complete, None, guesses), open_
 
 
 def _merged(arm: Arm, q: Array) -> Bool:

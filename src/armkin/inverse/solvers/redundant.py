@@ -18,7 +18,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.lock import lock
-from armkin.model.rotation import inverse
+from armkin.model.rotation import inverse, joint_motion
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -82,9 +82,7 @@ def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
     """Targets (M, m) or (M, 4, 4) as those of the rest, for values t (M,) of the redundant joint."""
     if free.still:
         return target.copy()
-    c, s = np.cos(t), np.sin(t)
-    Z = np.broadcast_to(np.eye(4), (len(t), 4, 4)).copy()
-    Z[:, 0, 0], Z[:, 0, 1], Z[:, 1, 0], Z[:, 1, 1] = c, s, -s, c
+    Z = joint_motion(False, -t)
     if free.joint:
         return np.asarray(target @ (inverse(arm.link[-1]) @ Z @ arm.link[-1]))
     G = arm.link[0] @ Z @ inverse(arm.link[0])
