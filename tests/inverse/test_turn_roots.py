@@ -63,8 +63,8 @@ def test_where_a_joint_stands_on_a_limit_there_is_a_place() -> None:
                 arm = class_arm(np.random.default_rng(100 + seed), limits)
                 of = boundaries(arm)
                 assert of is not None
-                found = places(of, armkin.fk(arm, q)[None])
-                assert np.abs(np.remainder(found.at[0] - q[6] + np.pi, 2 * np.pi) - np.pi).min() < 1e-7
+                [at], _ = places(of, armkin.fk(arm, q)[None])
+                assert np.abs(np.remainder(at - q[6] + np.pi, 2 * np.pi) - np.pi).min() < 1e-7
 
 
 def test_an_arm_without_such_a_shoulder_or_wrist_has_none() -> None:

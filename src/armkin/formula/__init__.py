@@ -3,6 +3,7 @@
 arrays.py       entries: arrays over the batch, or numbers known to be constant
 pose.py         transforms as twelve entries
 shapes.py       names for the shapes of arrays
+rows.py         named tuples of arrays with a row a target: some rows, several parts one below the other
 recording.py    a formula run once on symbols, its operations kept as a list
 numpy_code.py   that list as numpy calls, for batches
 python_code.py  as plain Python, for one pose

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import rows_of, stacked
 from armkin.forward import position
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, empty, pack, replaced
@@ -24,7 +25,6 @@ from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination.merge import projection
-from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.redundant.families import families
 from armkin.inverse.redundant.position_first import check as check_position_first

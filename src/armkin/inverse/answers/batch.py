@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import widened
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.numeric.rows import widened
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

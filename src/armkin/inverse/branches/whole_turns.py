@@ -142,7 +142,9 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool
     if not q.size:
         return out, inside
     for i in range(arm.n):
-        out[..., i], ok = nearest_of_joint(arm, i, q[..., i], near[..., i])
+        slides, value = bool(arm.prismatic[i]), q[..., i]
+        limits = float(arm.lower[i]), float(arm.upper[i])
+        out[..., i], ok = nearest_copy(value if slides else wrapped(value), near[..., i], *limits, slides)
         inside &= ok
     return out, inside
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import rows_of
 from armkin.inverse.elimination.polish import pose_error, tip
-from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import ALIKE, EXAMINED, HALFWAY, ILL
 
 Int = NDArray[np.int64]
@@ -107,25 +107,24 @@ def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
     near_singular[answers.pose[answers.weakness > ILL]] = True
     if number.max(initial=0) > MOST:
         rank = np.empty(answers.pose.size, dtype=np.int64)
-        rank[np.lexsort((answers.weakness, answers.pose))] = _column(number)
-        answers, number = rows_of(answers, rank < MOST), np.minimum(number, MOST)
-    q = np.full((count, int(number.max(initial=0)), 6), np.nan)
-    q[answers.pose, _column(number)] = answers.q
-    return q, near_singular
+        rank[np.lexsort((answers.weakness, answers.pose))] = _column(answers.pose)
+        answers = rows_of(answers, rank < MOST)
+    return _table(answers, count, MOST), near_singular
 
 
 def best(answers: Answers, count: int, most: int) -> Array:
     """Of every pose (N = count) at most so many answers, those of the smallest residual: (N, B, 6), NaN past them."""
-    answers = rows_of(answers, np.lexsort((answers.residual, answers.pose)))
-    number = np.bincount(answers.pose, minlength=count)
-    column = _column(number)
-    q = np.full((count, min(int(number.max(initial=0)), most), 6), np.nan)
-    some = column < most
+    return _table(rows_of(answers, np.lexsort((answers.residual, answers.pose))), count, most)
+
+
+def _table(answers: Answers, count: int, most: int) -> Array:
+    """At most so many answers of each pose, poses ascending, in their order: (N, B, 6), NaN past the last one."""
+    column = _column(answers.pose)
+    q, some = np.full((count, min(int(column.max(initial=-1)) + 1, most), 6), np.nan), column < most
     q[answers.pose[some], column[some]] = answers.q[some]
     return q
 
 
-def _column(number: Int) -> Int:
-    """0, 1, .. for each of the runs of lengths ``number`` (N,)."""
-    end = np.cumsum(number)
-    return np.arange(int(number.sum()), dtype=np.int64) - np.repeat(end - number, number)
+def _column(pose: Int) -> Int:
+    """The numbers 0, 1, .. of answers among those of the same pose, poses (M,) ascending."""
+    return np.arange(len(pose)) - np.searchsorted(pose, pose)

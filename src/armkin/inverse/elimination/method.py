@@ -42,13 +42,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.elimination import three_prismatic
 from armkin.inverse.elimination.choose_variable import Elimination, Kind, kinds, prepare
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, best, merge, pack
 from armkin.inverse.elimination.passes import answers_of, attempt, none
 from armkin.inverse.elimination.polish import refine, tip
-from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING, SHAKES
 
 __all__ = ["Branches", "Elimination", "left_open", "prepare", "solve"]

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import rows_of
 from armkin.inverse.elimination import roots
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, difference, projection
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import Polished, pose_error, refine, tip
-from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import (
     ALONE,
     BLURRED_ROOT,

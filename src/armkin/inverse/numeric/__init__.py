@@ -1,7 +1,6 @@
 """What serves every solver.
 
 tolerances.py  every tolerance
-rows.py        arrays with a row a target: some rows, several parts one below the other
 newton.py      corrections of joint values for any arm and task
 root_pairs.py  the same for two roots at once, which may meet
 many_starts.py a search, for targets that no method settled

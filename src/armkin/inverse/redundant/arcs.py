@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, wrapped
+from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import CONVERGING, PAIR_SETTLED, SAME_SEED, SHORTEST_ARC
 from armkin.inverse.redundant.follower import Follower, over_a_turn
 from armkin.inverse.redundant.pieces import Int

@@ -216,7 +216,7 @@ def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
 
 
 class Turning(NamedTuple):
-    """`Curves` of targets (N, 4, 4) by the arm angle: it is their parameter."""
+    """`families.Curves` of targets (N, 4, 4) by the arm angle: it is their parameter."""
 
     of: ArmAngle
     circles: _Circles
@@ -238,11 +238,12 @@ class Turning(NamedTuple):
         return self.circles.complete
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
-        """None: they are samples."""
+        """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: none,
+        as they are samples."""
         return []
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
-        """As `Curves.at`."""
+        """A posture (P, n) on each piece, at its legal copy nearest to near, and whether it is legal."""
         place = np.zeros((len(self.near), 2), np.intp)
         place[self.circles.row, self.circles.half] = np.arange(len(self.circles.row))
         circle = place[pieces.row, pieces.branch // 4]

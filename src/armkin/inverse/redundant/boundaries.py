@@ -182,15 +182,9 @@ def _equations(of: Boundaries, target: Array) -> Complex:
     return np.stack(out)
 
 
-class Places(NamedTuple):
-    """Where something may change at targets (S, V), sorted, inf where there are fewer; whether these are all (S,)."""
-
-    at: Array
-    all: Bool
-
-
-def places(of: Boundaries, target: Array) -> Places:
-    """Those of targets (S, 4, 4)."""
+def places(of: Boundaries, target: Array) -> tuple[Array, Bool]:
+    """Where something may change at targets (S, 4, 4): (S, V), sorted, inf where there are fewer; whether these are all
+    (S,)."""
     values = _equations(of, target)
     F, S, M = values.shape
     found = roots(values.reshape(-1, M), DEGREE)
@@ -205,7 +199,7 @@ def places(of: Boundaries, target: Array) -> Places:
     count = np.bincount(row, minlength=S)
     out = np.full((S, int(count.max(initial=0))), np.inf)
     out[row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)] = at
-    return Places(out, np.asarray(found.decided.reshape(F, S).all(axis=0)))
+    return out, np.asarray(found.decided.reshape(F, S).all(axis=0))
 
 
 def on_both_sides(at: Array) -> Array:

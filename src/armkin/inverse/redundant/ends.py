@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.inverse.numeric.rows import rows_of
+from armkin.formula.rows import rows_of
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, BESIDE_CROSSING, JOINED, NO_ROOM, SAME_END, TINY
 from armkin.inverse.redundant.pieces import Int, golden_section, margin
 from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
@@ -122,16 +122,11 @@ def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, A
     return Changes(row, k, branch, sign > 0), ends.reshape(2, -1)
 
 
-class Merged(NamedTuple):
-    """Where branches end to be there (G,), in the order of `Gone`, and how far within limits they are then."""
+def _merged(find: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
+    """Where branches end to be there (G,), in the order of `Gone`, and how far within limits they are then.
 
-    value: Array
-    room: Array
-
-
-def _merged(find: Follower, t: Array, gone: Gone) -> Merged:
-    """Of two branches that are nearest to each other before both vanish one is asked, if it has joined the other one
-    there."""
+    Of two that are nearest to each other before both vanish one is asked, if it has joined the other one there.
+    """
     at, every = gone.at, np.arange(len(gone.twin))
     good = at.value(0, t)
     number = {key: i for i, key in enumerate(zip(*(column.tolist() for column in at), strict=True))}
@@ -155,7 +150,7 @@ def _merged(find: Follower, t: Array, gone: Gone) -> Merged:
         joined[some] = (first[some] == some) | (there & (apart <= JOINED * gone.apart[some, 0]))
         own = some[~joined[some]]
         first[own] = own
-    return Merged(value, room)
+    return value, room
 
 
 class Places(NamedTuple):

@@ -17,19 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.rows import rows_of
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import PROBE, SAME, SOLUTION
 from armkin.inverse.redundant.arcs import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
 from armkin.inverse.redundant.followed import SAMPLES, Followed
 from armkin.inverse.redundant.follower import Follower, Ik
-from armkin.inverse.redundant.pieces import Curves, Pieces, golden_section, motion
+from armkin.inverse.redundant.pieces import Pieces, golden_section, motion
 from armkin.inverse.redundant.traced import Traced
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
@@ -45,6 +45,10 @@ AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 64  # targets whose arm angles are worked on together
 TRACED = 48  # and whose curves are traced together
 FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free
+
+# The answers of some targets N, as curves with a parameter: all their `pieces`; whether no curve can be missing,
+# `complete` (N,), and whether no joint moves by REACH along any, `short` (N,); `steps` of the golden section.
+Curves = Turning | Followed | Traced
 
 
 def families(

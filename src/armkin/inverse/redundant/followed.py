@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.rows import rows_of, stacked
+from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import SOLUTION
 from armkin.inverse.redundant.boundaries import boundaries, places
 from armkin.inverse.redundant.ends import crossed_at, hidden_stretches, number_of, places_of
@@ -24,7 +24,7 @@ STEPS = 16  # of the golden section
 
 
 class Followed(NamedTuple):
-    """`Curves` followed along the redundant joint, a turn by samples: it is their parameter."""
+    """`families.Curves` followed along the redundant joint, a turn by samples: it is their parameter."""
 
     find: Follower
     pieces: Pieces
@@ -65,7 +65,7 @@ class Followed(NamedTuple):
         return [np.where((own >= pieces.a) & (own <= pieces.b), own, pieces.at), pieces.low, pieces.high]
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
-        """As `Curves.at`."""
+        """As `Turning.at`."""
         return self.find.one(pieces.row, pieces.branch, parameter)
 
 

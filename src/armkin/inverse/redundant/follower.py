@@ -85,19 +85,12 @@ class Follower(NamedTuple):
     def found(self, rows: NDArray[np.intp], t: Array) -> Array:
         """Branches (M, B, n) of targets (M,) at values t (M,), of a closed form each in the column of its index, nan
         where there is none."""
-        if self.free.by_formula:
-            q, missed = self._by_formula(rows, t)
-            np.copyto(q, np.nan, where=~(missed <= ACCEPTED**2)[..., None])
-            return q
-        goal = moved(self.arm, self.free, self.target[rows], t)
-        s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
-        return np.insert(s.q, self.free.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
-
-    def _by_formula(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
-        """The candidates of a closed form (M, B, n), real or not, one joint after another in memory; what they miss,
-        squared (M, B)."""
+        if not self.free.by_formula:
+            goal = moved(self.arm, self.free, self.target[rows], t)
+            s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
+            return np.insert(s.q, self.free.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
         axes = _recorded(self.arm, self.free)[1]
-        out = np.empty((self.arm.n, math.prod(axes), len(t)))
+        out = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
         missed = np.empty(out.shape[1:])
         room: list[NDArray[Any]] = []
         for start in range(0, len(t), AT_A_TIME):
@@ -107,7 +100,9 @@ class Follower(NamedTuple):
             for j, q in enumerate(values):
                 out[j, :, some] = np.broadcast_to(q, shape).reshape(-1, shape[-1])
             missed[:, some] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
-        return out.transpose(2, 1, 0), missed.T
+        q = out.transpose(2, 1, 0)
+        np.copyto(q, np.nan, where=~(missed.T <= ACCEPTED**2)[..., None])
+        return q
 
     def _candidates(self, rows: NDArray[np.intp], t: Array, room: list[NDArray[Any]]) -> list[Any]:
         """The values of all joints and what they miss, squared, on their own branch axes before targets (M,); the

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,38 +30,6 @@ class Pieces(NamedTuple):
     at: Array
     high: Array
     start: Array  # (P, n) the posture of the best sample: the one nearest to near
-
-
-class Curves(Protocol):
-    """The answers of some targets N, as curves with a parameter."""
-
-    @property
-    def complete(self) -> Bool:
-        """Whether no curve can be missing (N,)."""
-        ...
-
-    @property
-    def short(self) -> Bool:
-        """Whether no joint moves by REACH along any family (N,)."""
-        ...
-
-    @property
-    def pieces(self) -> Pieces:
-        """All pieces of their curves."""
-        ...
-
-    @property
-    def steps(self) -> int:
-        """Of the golden section that leads from a best sample to the nearest posture."""
-        ...
-
-    def tried(self, pieces: Pieces, near: Array) -> list[Array]:
-        """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample."""
-        ...
-
-    def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
-        """A posture (P, n) on each piece, at its legal copy nearest to near, and whether it is legal."""
-        ...
 
 
 def none(n: int) -> Pieces:

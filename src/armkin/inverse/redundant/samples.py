@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.inverse.numeric.rows import stacked
+from armkin.formula.rows import stacked
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.redundant.boundaries import on_both_sides
 from armkin.inverse.redundant.pieces import Int, best_samples, holding_none, runs, turning

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.rows import stacked
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.rows import stacked
 from armkin.inverse.numeric.tolerances import CONVERGING, REACH
 from armkin.inverse.redundant.arcs import Points, curves_of, onto
 from armkin.inverse.redundant.follower import Follower
@@ -22,7 +22,7 @@ STEPS = 16  # of the golden section
 
 
 class Traced(NamedTuple):
-    """`Curves` of targets N by tracing: their parameter counts the points of a curve."""
+    """`families.Curves` of targets N by tracing: their parameter counts the points of a curve."""
 
     find: Follower
     points: Points  # of all curves, one after the other
@@ -67,7 +67,7 @@ class Traced(NamedTuple):
         return [pieces.low, pieces.high]
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
-        """As `Curves.at`."""
+        """As `Turning.at`."""
         curve = self.curve[pieces.row, pieces.branch]
         whole = np.floor(parameter)
         point = self.begin[curve] + whole.astype(np.intp) % self.counts[curve]

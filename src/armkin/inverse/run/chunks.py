@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, Truth
+from armkin.formula.rows import rows_of, stacked
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
 from armkin.inverse.run.edges import AT_ONCE, decided
 from armkin.inverse.run.folds import Doubted, tell

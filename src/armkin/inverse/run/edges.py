@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import rows_of, stacked
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
-from armkin.inverse.numeric.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, NEARBY, SAME
 from armkin.inverse.singular import components, linkages, near_itself, surfaces
 

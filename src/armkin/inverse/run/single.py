@@ -114,10 +114,6 @@ class OneTarget:
             return None  # `near` may solve it to within a rounding that its position alone shows
         return self._found(kept, near, values, there, off, at_near)
 
-    def _stands(self, near: list[float]) -> bool:
-        """Whether `near`, where the tool is at the target, is within limits."""
-        return all(low - SLACK <= v <= high + SLACK for v, (low, high, _) in zip(near, self._joints, strict=True))
-
     def _beside(self, near: list[float], legal: list[float], there: list[int]) -> int | None:
         """Which of the branches that are there, at their nearest legal copies, is at `near`; None if none is."""
         for place, b in enumerate(there):
@@ -149,7 +145,9 @@ class OneTarget:
             for place, b in enumerate(there):
                 q[place] = self._rows[b](legal)[:-1]
         within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in there]
-        if at_near and self._stands(where):
+        if at_near and all(
+            low - SLACK <= v <= high + SLACK for v, (low, high, _) in zip(where, self._joints, strict=True)
+        ):
             own = self._beside(where, legal, there)
             if own is None:
                 return None

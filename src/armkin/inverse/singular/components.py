@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import rows_of, widened
 from armkin.inverse.answers.batch import Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.numeric.rows import rows_of, widened
 from armkin.inverse.numeric.tolerances import (
     CLOSE_BY,
     CLOSED,

@@ -161,10 +161,10 @@ def _follow(
 ) -> Bool:
     """Follow the curves of some postures as far as their spans, and write what those tell that stay at hand (m,)."""
     n = q.shape[1]
-    start = _Curve(q[rows], target[rows], U[rows, :, n - 1 :], V[rows, -1], w[rows], out.span[rows])
-    on, alone, x, g = _polynomials(arm, task, start)
+    span, u = out.span[rows], U[rows, :, n - 1 :]
+    on, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
     # where another curve is near, that may be the one which Newton's method found
-    on &= np.abs(x[0]).max(axis=1) <= 4.0 * (SMOOTH * start.span + SOLUTION / np.maximum(out.second[rows], TINY))
+    on &= np.abs(x[0]).max(axis=1) <= 4.0 * (SMOOTH * span + SOLUTION / np.maximum(out.second[rows], TINY))
     some = rows[on]
     out.x[:, some], out.g[:, some], out.alone[some] = x[:, on], g[:, on], alone[on]
     _decide(out, some)
@@ -227,39 +227,29 @@ def _second_order(
     return np.asarray(w)
 
 
-class _Curve(NamedTuple):
-    """Where M curves begin: q (M, n), target, directions out of reach u (M, rows, k), v (M, n), and span (M,).
-
-    w: (M, n) second derivative, as far as it is known.
-    """
-
-    q: Array
-    target: Array
-    u: Array
-    v: Array
-    w: Array
-    span: Array
-
-
-def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Bool, Array, Array]:
+def _polynomials(
+    arm: Arm, task: Task, q: Array, target: Array, u: Array, v: Array, w: Array, span: Array
+) -> tuple[Bool, Bool, Array, Array]:
     """Which curves (M,) stay at hand as far as their spans, on which of these no other crosses, and coefficients of x
     (NODES, M, n) and g (NODES, M, k).
 
+    q: (M, n) where they begin, along v (M, n); u: (M, rows, k) directions out of reach; w: (M, n) the second
+    derivative, as far as it is known; span: (M,).
     Each node is Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation
     problems, 1977).
     """
-    M, n = start.q.shape
-    rows, k = start.u.shape[1:]
-    t, who = np.multiply.outer(NODE, start.span).ravel(), np.tile(np.arange(M), NODES)
+    M, n = q.shape
+    rows, k = u.shape[1:]
+    t, who = np.multiply.outer(NODE, span).ravel(), np.tile(np.arange(M), NODES)
     unit = radian_or_reach(arm)
     bordered = np.zeros((len(t), rows + 1, rows + 1))
-    bordered[:, :rows, n:], bordered[:, rows, :n] = start.u[who], start.v[who]
-    away = t[:, None] * start.v[who] + 0.5 * (t * t)[:, None] * start.w[who]
+    bordered[:, :rows, n:], bordered[:, rows, :n] = u[who], v[who]
+    away = t[:, None] * v[who] + 0.5 * (t * t)[:, None] * w[who]
     g, active, regular = np.full((len(t), k), np.nan), np.arange(len(t)), np.zeros(len(t))
     for _ in range(ITERATIONS):
         one = who[active]
-        r, bordered[active, :rows, :n] = newton.scaled(arm, task, start.q[one] + away[active] * unit, start.target[one])
-        ahead = t[active] - (start.v[one] * away[active]).sum(axis=1)
+        r, bordered[active, :rows, :n] = newton.scaled(arm, task, q[one] + away[active] * unit, target[one])
+        ahead = t[active] - (v[one] * away[active]).sum(axis=1)
         inverse = newton.nudged(np.linalg.inv, bordered[active])
         step = (inverse @ np.concatenate([r, ahead[:, None]], axis=1)[:, :, None])[:, :, 0]
         away[active] += step[:, :n]
@@ -278,11 +268,11 @@ def _polynomials(arm: Arm, task: Task, start: _Curve) -> tuple[Bool, Bool, Array
     # the polynomials are exact on the span if their last coefficients are small
     last = np.abs(chebyshev[-2:]).max(axis=0)
     with np.errstate(invalid="ignore"):
-        on &= last[:, :n].max(axis=1) < SMOOTH * start.span
+        on &= last[:, :n].max(axis=1) < SMOOTH * span
         on &= last[:, n:].max(axis=1) < 0.01 * SOLUTION
     # a crossing is a zero of the bordered Jacobian's smallest singular value, which no two nodes are as close to as it
     # changes between any two
-    weakest, apart = regular.reshape(NODES, M), np.multiply.outer(-np.diff(NODE), start.span)
+    weakest, apart = regular.reshape(NODES, M), np.multiply.outer(-np.diff(NODE), span)
     steepest = (np.abs(np.diff(weakest, axis=0)) / apart).max(axis=0)
     alone = (weakest[1:] + weakest[:-1] > 2.0 * steepest * apart).all(axis=0)
     power = np.tensordot(_POWERS, chebyshev, axes=1)

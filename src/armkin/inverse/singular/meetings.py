@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import rows_of
 from armkin.forward import fk
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.rows import rows_of
 from armkin.inverse.numeric.tolerances import ACCEPTED, BENT, FOLD_WAY, GROWTH, HIGH, SOLUTION
 from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
 from armkin.inverse.tasks.residuals import residual

@@ -24,13 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import stacked, widened
 from armkin.forward import fk
 from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.rows import stacked, widened
 from armkin.inverse.numeric.tolerances import (
     ALIKE,
     ANSWERED,

@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import stacked
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.rows import stacked
 from armkin.inverse.numeric.tolerances import (
     ANSWERED,
     APART_ROOTS,
