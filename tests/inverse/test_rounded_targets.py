@@ -99,7 +99,7 @@ def test_a_position_that_is_typed_beside_right_angles_is_exact() -> None:
     T = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (3, 1, 1))
     T[:, :3, 3] = [390.25, 120.0, 210.5], [390.123456789012, 120.0, 0.0], [390.123, 120.0, 0.0]
     task, _ = solver(arm, None)
-    most = of_targets(arm, task, T, (T, np.zeros(3)), False, None, (3,)).most
+    _, most = of_targets(arm, task, T, (T, np.zeros(3)), False, None, (3,))
     np.testing.assert_allclose(most, 1e-9 + np.array([0.0, 0.0, 3.0**0.5 * 0.5e-3 / arm.reach]))
 
 

@@ -6,7 +6,7 @@ singular posture the exact answer to that one is far away: docs/solution.md, "Ro
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,13 +36,6 @@ BLOCK = 2_048  # rows of which all arrays fit the cache
 FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
 
 
-class Rounding(NamedTuple):
-    """Of N targets: the rounding that is known (N,) and the residual that solves them (N,), both [reaches, rad]."""
-
-    known: Array
-    most: Array
-
-
 def of_targets(
     arm: Arm,
     task: Task,
@@ -51,8 +44,9 @@ def of_targets(
     single: bool,
     given: ArrayLike | None,
     lead: tuple[int, ...],
-) -> Rounding:
-    """The rounding of targets (N, ...), a batch of shape lead.
+) -> tuple[Array, Array]:
+    """The rounding of targets (N, ...), a batch of shape lead: known (N,), and the residual that solves them (N,), both
+    [reaches, rad].
 
     shown: targets as they were given, and how far their rotations were off (N,); single: they were given in float32;
     given: () or (...) what the caller says it is.
@@ -64,7 +58,7 @@ def of_targets(
             shapes = "() or " + str(lead) if lead else "()"
             raise UsageError(f"rounding: expected finite numbers from 0, of shape {shapes}; got shape {said.shape}")
         known = np.broadcast_to(said, lead).reshape(-1).astype(float)
-        return Rounding(known, SOLUTION + known)
+        return known, SOLUTION + known
     numbers, defect = shown
     known = defect
     if single:
@@ -82,7 +76,7 @@ def of_targets(
         rows = rows[(np.abs(R - np.rint(R)) <= ROUNDED).all(axis=(1, 2))]
         if len(rows):
             most[rows] = np.maximum(most[rows], last_place_of_position(numbers[rows, :3, 3]) / arm.reach)
-    return Rounding(known, SOLUTION + most)
+    return known, SOLUTION + most
 
 
 def last_place_of_position(p: Array) -> Array:

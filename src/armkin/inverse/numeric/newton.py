@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.forward import fk, tip_and_jacobian
-from armkin.inverse.numeric.tolerances import CONVERGING, FOLDED, LEFT_OUT, NOISE, ROUNDING, SOLUTION, TINY, WEAK
+from armkin.inverse.numeric.tolerances import CONVERGING, FOLDED, LEFT_OUT, NOISE, ROUNDING, TINY, WEAK
 from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.inverse.tasks.task import Task
 from armkin.model.units import radian_or_reach
@@ -166,15 +166,6 @@ class Lost(NamedTuple):
     V: Array
     weak: Linear
     place: NDArray[np.intp]
-
-    def tube(self) -> Array:
-        """How far a posture of residual `SOLUTION` may be off the curve through candidates (K, M) [rad, reaches]:
-        `SOLUTION` over the second smallest singular value, where that is small."""
-        out, n, S = np.zeros(self.place.shape), self.V.shape[2], self.weak.S
-        if S.shape[1] >= n > 1:
-            some = self.place >= 0
-            out[some] = SOLUTION / np.maximum(S[self.place[some], n - 2], WEAK)
-        return out
 
 
 def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) -> Lost:

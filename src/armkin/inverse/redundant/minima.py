@@ -175,8 +175,6 @@ def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
 
 def flat_minima(arm: Arm, q: Array, target: Array) -> Bool:
     """Whether minima (M, n) of one target lie on a curve of such."""
-    if not len(q):
-        return np.zeros(0, bool)
     box = box_of(arm)
     at = _local(arm, box, q, np.broadcast_to(target, (len(q), 4, 4)))
     held = (q <= box.lower) | (q >= box.upper)

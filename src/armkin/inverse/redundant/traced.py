@@ -32,6 +32,7 @@ class Traced(NamedTuple):
     curve: Int  # (N, B) which curve branch b of a target is
     pieces: Pieces
     short: Bool
+    complete: Bool  # never: a curve between two planes may be missing
     steps: int = STEPS
 
     @classmethod
@@ -48,19 +49,14 @@ class Traced(NamedTuple):
         branch = np.array([int((row[:k] == row[k]).sum()) for k in range(len(row))], np.intp)
         curve = np.zeros((N, int(branch.max(initial=0)) + 1), np.intp)
         curve[row, branch] = np.arange(len(row))
-        points = stacked([one.points for one in found] or [_nothing(n)])
-        curves = cls(find, points, after, begin, count, curve, none(n), np.zeros(N, bool))
+        points = stacked([one.points for one in found] or [Points(np.zeros((0, n)), np.zeros((0, n)), np.zeros(0))])
+        curves = cls(find, points, after, begin, count, curve, none(n), *np.zeros((2, N), bool))
         if not len(row):
             return curves
         extent = np.zeros(N)
         way = np.add.reduceat(np.abs(curves.chord(np.arange(len(after)))), begin, axis=0).max(axis=1)
         np.maximum.at(extent, row, 0.5 * way)
         return curves._replace(pieces=curves._pieces(row, branch), short=(extent > 0) & (extent < REACH))
-
-    @property
-    def complete(self) -> Bool:
-        """Never: a curve between two planes may be missing."""
-        return np.zeros(len(self.find.target), bool)
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
         """The samples beside the best one."""
@@ -194,7 +190,3 @@ class _Nodes(NamedTuple):
             at(np.maximum(on - 1, first)), at(on), at(np.minimum(on + 1, first + length)),
             self.q[on % K],
         )  # fmt: skip
-
-
-def _nothing(n: int) -> Points:
-    return Points(np.zeros((0, n)), np.zeros((0, n)), np.zeros(0))

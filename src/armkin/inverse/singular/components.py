@@ -34,6 +34,7 @@ from armkin.inverse.numeric.tolerances import (
     SEED,
     SOLUTION,
     TURNED,
+    WEAK,
 )
 from armkin.inverse.singular import chains, circuits, meetings, roots, self_motions
 from armkin.inverse.singular.local_structure import beyond_folds, local_structure
@@ -154,7 +155,13 @@ class _Groups:
 
     @cached_property
     def tube(self) -> Array:
-        return self.lost.tube()
+        """How far a posture of residual `SOLUTION` may be off the curve through candidates (K, M) [rad, reaches]:
+        `SOLUTION` over the second smallest singular value, where that is small."""
+        place, S, n = self.lost.place, self.lost.weak.S, self.goals.arm.n
+        out, some = np.zeros(place.shape), place >= 0
+        if S.shape[1] >= n > 1:
+            out[some] = SOLUTION / np.maximum(S[place[some], n - 2], WEAK)
+        return out
 
     def _plain(self) -> None:
         """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries

@@ -174,8 +174,6 @@ def _replaced(
     arm, _, _, near = goals
     k = np.flatnonzero(stands)
     known = np.ones(len(q), bool)
-    if not len(k):
-        return known
     held = _held(arm, near[k, None], at.base[k], at.d[k], at.line[k])
     held = np.where(loose[k], held, np.inf)
     b, least = held.argmin(axis=1), held.min(axis=1)
