@@ -351,7 +351,9 @@ class _Found:
             refused = _refused(request, [branch for branch, named in both if named])
         status = first.status
         if request.position_first and best is not None:
-            status = _status_of(request.arm, both[best][0])
+            row = both[best][0]
+            missed = math.hypot(row.residual_mm / request.arm.reach, math.radians(row.residual_deg))
+            status = (Status.EXACT if missed <= SOLUTION else Status.POSITION).name.lower()
         return Answer(
             status,
             first.method,
@@ -365,12 +367,6 @@ class _Found:
             self.legal,
             tuple(self.names),
         )
-
-
-def _status_of(arm: Arm, branch: Branch) -> str:
-    """What position first says of its best row."""
-    missed = math.hypot(branch.residual_mm / arm.reach, math.radians(branch.residual_deg))
-    return (Status.EXACT if missed <= SOLUTION else Status.POSITION).name.lower()
 
 
 def _rank(request: Request, branch: Branch) -> tuple[bool, bool, float, float]:

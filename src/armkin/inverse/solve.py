@@ -6,7 +6,7 @@ forward kinematics -> whole turns and limits -> the few doubted ones through `do
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.closed.geometry import Geometry, Rows
+from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.elimination.merge import projection
 from armkin.inverse.numeric.tolerances import FAR
 from armkin.inverse.redundant.families import families
@@ -212,7 +212,8 @@ def _rows(
     """Solvers that return joint values row by row. Also the number of branch columns."""
     assert geometry.rows is not None
     solve = (geometry.unmoved if examine else None) or geometry.rows
-    q, doubt, complete, lost, guesses = _solved(solve, target, workers)
+    parts = shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
+    q, doubt, complete, lost, guesses = stacked(parts)
     B = q.shape[1]
     out = empty(len(target), B, arm.n)
     out.q[...], inside = nearest_row(arm, q, near[:, None, :])
@@ -249,10 +250,3 @@ def _rows(
             some = array[doubted]
             array[doubted] = np.take_along_axis(some, order.reshape(order.shape + (1,) * (some.ndim - 2)), axis=1)
     return out, B
-
-
-def _solved(solve: Callable[[Array], Rows], target: Array, workers: int) -> Rows:
-    """What threads find, together: columns that only some need are nan in the others."""
-    if workers == 1:
-        return solve(target)
-    return stacked(shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH))

@@ -74,11 +74,6 @@ def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:
     return geometry.name, geometry.why, geometry.complete
 
 
-def _tool_axis(arm: Arm, task: Task) -> Geometry | None:
-    """The class of an arm of five joints with a virtual sixth one is asked of the same list."""
-    return tool_axis.recognise(arm, task, lambda six: solver(six, "pose")[1])
-
-
 _CLASSES: tuple[Callable[[Arm, Task], Geometry | None], ...] = (
     planar.recognise,
     elbow.recognise,
@@ -87,6 +82,7 @@ _CLASSES: tuple[Callable[[Arm, Task], Geometry | None], ...] = (
     three_parallel.recognise,
     anywhere.recognise,
     nearly_special.recognise,
-    _tool_axis,
+    # the class of the arm with a virtual sixth joint is asked of the same list
+    lambda arm, task: tool_axis.recognise(arm, task, lambda six: solver(six, "pose")[1]),
     general.recognise,
 )
