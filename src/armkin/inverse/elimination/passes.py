@@ -58,7 +58,7 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
     pair = PAIRED + 10 * np.sqrt(shake)
     maybe = seed.tilt < pair
     near = (done.residual < CLOSE_RESIDUAL) & (seed.tilt < max(pair, STRAY)) if careful else done.residual < STRAY
-    missed = ~good & ((seed.tilt < UPRIGHT) | near)
+    missed = ~good & ((seed.tilt < UPRIGHT) | near | seed.torn)
     touch = good & (seed.tilt > 0) & (seed.tilt < UPRIGHT)
     unsure = good & (seed.tilt > 0) & maybe
     # A real root that was far from the answer it led to may have stood for another one.

@@ -15,6 +15,7 @@ from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import advance, turn
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import (
+    ALONE,
     APART_VECTORS,
     EQUAL_ROOTS,
     FOLLOWS,
@@ -50,6 +51,11 @@ class Seeds(NamedTuple):
     rough: Bool
     defect: Array
     gap: Array
+
+    @property
+    def torn(self) -> Bool:
+        """(M,) What may be a part of a multiple root: rounding tears it apart and off the real line, but not far."""
+        return (self.defect > NO_PRODUCT) & (self.gap < ALONE) & (self.tilt < ALONE)
 
 
 def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> Seeds:
