@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import quickly_built
 
 import armkin
 from armkin.compiled import arm as compiled_arm
@@ -40,3 +43,13 @@ def test_the_usual_task_by_its_name_is_the_usual_one(monkeypatch: pytest.MonkeyP
     for task in ("xyz", None, "xyz"):
         assert armkin.compile(arm, task).ik([390, 80, 300], task).valid.sum() == 4
     assert len(contents) == 1
+
+
+def test_the_files_task_is_not_the_one_that_the_structure_suggests(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(toolchain, "load", quickly_built.load)
+    arm = replace(armkin.load("so101"), task="xyz_axis")
+    fast, T = armkin.compile(arm, "xyz_pitch_roll"), armkin.fk(arm, arm.home + 0.1)
+    target = np.concatenate([T[:3, 3], T[:3, 2]])
+    found = fast.ik(target)
+    assert found.task.name == "xyz_axis"
+    assert found.valid.sum() == armkin.ik(arm, target).valid.sum() > 0

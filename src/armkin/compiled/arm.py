@@ -116,7 +116,7 @@ class CompiledArm:
             with self._lock:
                 found = self._tasks.get(task)
                 if found is None:
-                    name = task or default_task(self.arm)
+                    name = task or self.arm.task or default_task(self.arm)
                     same = (built for built in self._tasks.values() if built.branches and built.task.name == name)
                     found = self._tasks[task] = next(same, None) or _CompiledTask(self.arm, task)
         return found
