@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import quickly_built
 
 import armkin
+import quickly_built
 from armkin.compiled import arm as compiled_arm
 from armkin.compiled import toolchain
 
