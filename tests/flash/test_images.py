@@ -10,9 +10,9 @@ from typing import cast
 
 import pytest
 
-from armkin.board.ports import Port
+from armkin.board.ports import Port, SerialPort
 from armkin.errors import LinkError, MissingExtraError
-from armkin.flash import avrdude, boot_drive, images, intel_hex, uploading
+from armkin.flash import avrdude, boot_drive, images, intel_hex, stk500v1, uploading
 from armkin.flash.images import Image
 from armkin.flash.stk500v1 import Stk500v1
 from armkin.flash.uploading import upload
@@ -156,6 +156,29 @@ def test_an_answer_of_the_boot_loader_is_framed() -> None:
 def test_an_answer_of_the_boot_loader_that_is_damaged_is_refused(answer: str) -> None:
     with pytest.raises(LinkError, match=f"the boot loader answered {bytes.fromhex(answer).hex(' ')}"):
         Stk500v1(cast(Port, BootLoader(bytes.fromhex(answer)))).signature()
+
+
+@pytest.mark.parametrize(("silent", "found"), [(2, True), (3, False)])
+def test_a_boot_loader_that_was_called_twice_and_is_silent_is_called_anew(
+    silent: int, found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a busy computer its first answer comes after a second call, of which it hears a part: it says no more."""
+
+    class Late(BootLoader):
+        resets = 0
+
+        def restart(self) -> None:
+            self.resets += 1
+
+        def write(self, data: bytes) -> None:
+            said = {b"\x30\x20": b"\x14\x10", b"\x75\x20": b"\x14\x1e\x95\x0f\x10"}[data]
+            self.left = b"" if data[0] == 0x75 and self.resets <= silent else said
+
+    monkeypatch.setattr(stk500v1, "_ANSWER", 0.01)
+    port = Late(b"")
+    heard = uploading._heard(Stk500v1, cast(SerialPort, port))
+    assert (heard is not None, port.resets) == (found, min(silent + 1, 3))
+    assert heard is None or heard[1].hex() == "1e950f"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell plays avrdude")

@@ -15,7 +15,7 @@ class Bar:
 
     def __init__(self, what: str, console: Console) -> None:
         self.what = what
-        columns = (BarColumn(_WIDTH), TextColumn("{task.fields[said]}"))
+        columns = (BarColumn(_WIDTH), TextColumn("{task.fields[progress_text]}"))
         self._drawn = Progress(*columns, console=console, auto_refresh=False, transient=True)
         self._task: TaskID = self._drawn.add_task("", total=None, progress_text="")
         self._drawn.start()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,6 +25,7 @@ _SIGNATURES = {
     bytes.fromhex("1e9801"): "atmega2560",
 }
 _LISTENS = 1.6  # [s] after a reset that a boot loader is asked for
+_CALLS = 3  # resets after which one that answers and then says no more is given up
 _TO_BOOT_DRIVE = 1200  # baud: opening its port so sends a Pico to its boot drive
 _RESTART = 10.0  # [s] that a Pico may take to show its serial port again
 
@@ -76,10 +78,8 @@ def _loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
     for make, baud in [(loader, baud) for loader in (wanted, *others) for baud in loader.bauds]:
         link = SerialPort(port, baud)
         try:
-            link.restart()
-            loader = make(link)
-            if loader.answers(time.monotonic() + _LISTENS):
-                found = loader.signature()
+            if heard := _heard(make, link):
+                loader, found = heard
                 if _SIGNATURES.get(found) == chip:
                     return loader, link, baud
                 name = _SIGNATURES.get(found, f"of signature {found.hex(' ')}")
@@ -96,6 +96,21 @@ def _loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
         f"no boot loader answers on {port} after a reset: nothing was written\n"
         "is it the right port (armkin ports), an Arduino with its boot loader, and a cable that carries data?"
     )
+
+
+def _heard(make: type[Stk500v1] | type[Stk500v2], link: SerialPort) -> tuple[Loader, bytes] | None:
+    """The boot loader behind a port, and its chip's signature; None if none answers.
+
+    One whose answer came late has been called twice, may have heard that in part and say no more: the board is reset.
+    """
+    for _ in range(_CALLS):
+        link.restart()
+        loader = make(link)
+        if not loader.answers(time.monotonic() + _LISTENS):
+            return None
+        with suppress(LinkError):
+            return loader, loader.signature()
+    return None
 
 
 def _write(loader: Loader, flash: bytes, tick: Tick) -> None:
