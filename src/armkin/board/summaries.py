@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, TypedDict
 
+from armkin.model.units import JointUnits
+
 
 class Where(TypedDict):
     """Where the arm stands."""
@@ -14,7 +16,7 @@ class Where(TypedDict):
     ]
     pulses: Annotated[list[int] | None, "position of every motor, as the board counts [pulses]; null while lost"]
     joints: Annotated[list[float] | None, "joint values [deg or mm]; null while lost"]
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     position_mm: Annotated[list[float] | None, "the tool's x, y, z in the base frame [mm]; null while lost"]
 
 
@@ -24,7 +26,7 @@ class Summary(TypedDict):
     waypoints: Annotated[int, "how many waypoints it goes through"]
     start_joints: Annotated[list[float], "joint values where it begins [deg or mm]"]
     joints: Annotated[list[float], "joint values where it ends, those of whole pulses [deg or mm]"]
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     motors: Annotated[list[str], "names of the motors"]
     pulse_units: Annotated[list[str], "unit of each motor's pulses: step, us or count"]
     start_pulses: Annotated[list[int], "position of every motor where it begins [pulses]"]

@@ -29,8 +29,7 @@ from armkin.inverse.redundant.families import intervals_out
 from armkin.inverse.redundant.held import arm_without, others, redundant_alone
 from armkin.inverse.redundant.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
-from armkin.keep_out.clearance import Hit, hits
-from armkin.keep_out.clearance import hits_text as hits_said
+from armkin.keep_out.clearance import Hit, hits, hits_text
 from armkin.model import limits, units
 from armkin.model.lock import unlock
 
@@ -229,7 +228,7 @@ def refusal(request: Request, answer: Answer, distance: float) -> NoSolutionErro
 
 def blocked(request: Request, answer: Answer) -> NoBranchError:
     """That every branch within limits hits something, and what."""
-    words = {f"{b.name or 'it'} {hits_said(list(b.hits))}": b.hits for b in answer.branches if b.within_limits}
+    words = {f"{b.name or 'it'} {hits_text(list(b.hits))}": b.hits for b in answer.branches if b.within_limits}
     return NoBranchError(
         f"every branch within limits hits something: {'; '.join(words)}",
         robot=request.arm.name,
@@ -382,7 +381,7 @@ def _refused(request: Request, named: Sequence[Branch]) -> str:
     said: dict[str, str] = {}  # of several poses with one name, as of --sweep, the nearest
     for branch in named:
         if branch.within_limits and branch.hits:
-            said.setdefault(branch.name, f"'{branch.name}' {hits_said(list(branch.hits))}")
+            said.setdefault(branch.name, f"'{branch.name}' {hits_text(list(branch.hits))}")
             continue
         joints = ", ".join(request.arm.joint_names[i] for i in branch.outside)
         said.setdefault(branch.name, f"'{branch.name}' is outside limits" + (f": {joints}" if joints else ""))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 DEGREE = math.pi / 180
+
+JointUnits = Annotated[list[str], "unit of each joint value: deg or mm"]
 
 
 def names(arm: Arm) -> list[str]:

@@ -16,8 +16,7 @@ from armkin.inverse.solve import ik
 from armkin.inverse.solvers import recognise
 from armkin.inverse.tasks.fitting import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.keep_out.clearance import hits
-from armkin.keep_out.clearance import hits_text as hits_said
+from armkin.keep_out.clearance import hits, hits_text
 from armkin.model import units
 from armkin.model.limits import outside, outside_text
 from armkin.model.rotation import rpy
@@ -152,7 +151,7 @@ def _row(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
         "joints": branch.joints,
         "within_limits": branch.within_limits,
         "outside": [outside_text(arm, i, float(branch.q[i])) for i in branch.outside],
-        "hits": hits_said(list(branch.hits)),
+        "hits": hits_text(list(branch.hits)),
         "motion": branch.motion,
     }
 
@@ -179,5 +178,5 @@ def _words(arm: Arm, q: Array) -> list[str]:
     """Each joint outside its limits, and what the pose hits, in words."""
     found = [outside_text(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
     if arm.keep_out and (hit := hits(arm, q[None])[0][1]):
-        found.append(f"it {hits_said(hit)}")
+        found.append(f"it {hits_text(hit)}")
     return found

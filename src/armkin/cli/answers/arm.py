@@ -3,6 +3,8 @@
 # No annotations as text here: a key that may be absent is known by NotRequired at run time.
 from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
+from armkin.model.units import JointUnits
+
 
 class Head(TypedDict):
     """What every answer about a robot begins with, so that one command's output can be piped into the next."""
@@ -65,7 +67,7 @@ class Fk(Head, Tooled, Near):
     """Where the tool is."""
 
     joints: Annotated[list[float], "joint values as given [deg or mm]"]
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     position_mm: Annotated[list[float], "the tool's x, y, z in the base frame [mm]"]
     rotation: Annotated[list[list[float]], "the tool's rotation matrix in the base frame, 3 x 3, row by row"]
     rpy_deg: Annotated[list[float], "the same as roll, pitch, yaw [deg]: R = Rz(yaw) Ry(pitch) Rx(roll)"]
@@ -98,7 +100,7 @@ class Pulses(Head, _From, Near):
 
     motors: Annotated[list[str], "names of the motors"]
     pulse_units: Annotated[list[str], "unit of each motor's pulses: step, us (RC servos) or count (bus servos)"]
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     resolution: Annotated[list[float], "what one pulse is worth at each joint [deg or mm]"]
     joints: Annotated[list[float], "joint values as given [deg or mm]"]
     pulses: Annotated[list[int], "position of every motor, counted from home [pulses]"]
@@ -259,7 +261,7 @@ class Info(Head, Solving, KeepOuts):
         Literal["standard", "modified", "screws"],
         "convention of the file's table: standard or modified DH, or screw axes",
     ]
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     joints: Annotated[list[dict[str, Any]], "the joints as in the robot file, with all defaults"]
     poses: Annotated[dict[str, list[float]], "the named poses, home first: joint values [deg or mm]"]
     base: Annotated[dict[str, list[float]], "where the chain begins: xyz [mm], rpy [deg]"]

@@ -3,6 +3,7 @@
 from typing import Annotated, NotRequired, TypedDict
 
 from armkin.cli.answers.arm import Head, Near, Tooled, Violation
+from armkin.model.units import JointUnits
 
 
 class Family(TypedDict):
@@ -61,7 +62,7 @@ class Ik(Head, Tooled):
     method: Annotated[str, "the class of solution used"]
     why: Annotated[str, "why that class applies"]
     complete: Annotated[bool, "whether every isolated real branch is guaranteed to be found"]
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     branch_count: Annotated[int, "how many branches were found, listed or not"]
     branches_within_limits: Annotated[int, "how many of these are within limits"]
     branches: Annotated[

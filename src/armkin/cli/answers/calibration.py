@@ -4,6 +4,7 @@
 from typing import Annotated, TypedDict
 
 from armkin.cli.answers.arm import Head
+from armkin.model.units import JointUnits
 
 
 class Errors(TypedDict):
@@ -49,5 +50,5 @@ class Calibrate(Head):
 class Suggested(Head):
     """`calibrate --suggest`: the next poses to measure."""
 
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     poses: Annotated[list[list[float]], "joint values of the poses to measure [deg or mm]"]

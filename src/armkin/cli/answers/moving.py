@@ -5,6 +5,9 @@ from typing import Annotated, Literal, NotRequired, TypedDict
 
 from armkin.board.summaries import Summary, Where
 from armkin.cli.answers.arm import Head, Tooled
+from armkin.model.units import JointUnits
+
+Port = Annotated[str, "the port that was used; sim: a simulated board"]
 
 
 class DryRun(Head, Tooled, Summary):
@@ -16,14 +19,14 @@ class DryRun(Head, Tooled, Summary):
 class Send(Head, Tooled):
     """`send`: the plan, and where the arm stands after it."""
 
-    port: Annotated[str, "the port that was used; sim: a simulated board"]
+    port: Port
     waypoints: Annotated[int, "how many waypoints it went through"]
     start_joints: Annotated[list[float], "joint values where it began [deg or mm]"]
     joints: Annotated[
         list[float] | None,
         "joint values where the board says that the arm stands [deg or mm]; null while lost",
     ]
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     motors: Annotated[list[str], "names of the motors"]
     pulse_units: Annotated[list[str], "unit of each motor's pulses: step, us or count"]
     start_pulses: Annotated[list[int], "position of every motor where it began [pulses]"]
@@ -127,7 +130,7 @@ class Path(Head, Tooled):
         "bound of the distance between plan and path [mm]; of points passed by the tolerance their greatest",
     ]
     blends_reduced: Annotated[int, "how many blends were made smaller, to half of a side"]
-    joint_units: Annotated[list[str], "unit of each joint value: deg or mm"]
+    joint_units: JointUnits
     start_joints: Annotated[list[float] | None, "joint values at the start [deg or mm]; null: no plan"]
     joints: Annotated[list[float] | None, "joint values at the end [deg or mm]; null: no plan"]
     runs: Annotated[list[PathRun], "parts of the path on one branch each, in order"]
@@ -162,7 +165,7 @@ class Path(Head, Tooled):
 class PathMoved(Path):
     """`path --port`: the plan, and where the arm stands after it."""
 
-    port: Annotated[str, "the port that was used; sim: a simulated board"]
+    port: Port
     position: Annotated[str, "whether the board knows where the arm stands: known, retained (over a reset) or lost"]
     pulses: Annotated[list[int] | None, "position of every motor now, as the board counts [pulses]; null while lost"]
     position_mm: Annotated[list[float] | None, "the tool's x, y, z now [mm]; null while lost"]
@@ -171,7 +174,7 @@ class PathMoved(Path):
 class Stands(Head, Where):
     """`home` and `jog`: where the arm stands after it."""
 
-    port: Annotated[str, "the port that was used; sim: a simulated board"]
+    port: Port
 
 
 class LostSteps(TypedDict):
@@ -255,7 +258,7 @@ class Difference(TypedDict):
 class Setup(Head):
     """`setup`: a board's settings against the robot file."""
 
-    port: Annotated[str, "the port that was used; sim: a simulated board"]
+    port: Port
     firmware: Annotated[str, "the board's firmware, as it names itself"]
     differences: Annotated[list[Difference], "settings that differ, as found, before anything was written"]
     written: Annotated[bool, "whether they were written to the board"]
@@ -296,7 +299,7 @@ class Zero(Head):
 class GripOfServo(Head):
     """`grip` on a board without armkin's firmware."""
 
-    port: Annotated[str, "the port that was used; sim: a simulated board"]
+    port: Port
     gripper: Annotated[float, "where it came to rest, in its drive's degrees; of a spindle the S word that was sent"]
     target: Annotated[float, "where it was sent, in the same unit"]
     measured: Annotated[bool, "whether the servo measured it; false on GRBL, which measures nothing"]
@@ -305,6 +308,6 @@ class GripOfServo(Head):
 class Grip(Head):
     """Where the gripper stands."""
 
-    port: Annotated[str, "the port that was used; sim: a simulated board"]
+    port: Port
     gripper: Annotated[float, "where it stands, in its drive's degrees (mm with a lead)"]
     counts: Annotated[int, "the same, as the board counts [pulses]"]

@@ -391,8 +391,8 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)
     if (lost.nullity[:, 1:] > 1).any():
         q, label, size, rests = meetings.ways_out(goals, q, label, size, lost, OWN)
-        if wider := q.shape[1] - sure.shape[1]:
-            sure, simple = np.pad(sure, ((0, 0), (0, wider), (0, 0))), np.pad(simple, ((0, 0), (0, wider)))
+        if q.shape[1] > sure.shape[1]:
+            sure, simple = (widened(array, q.shape[1]) for array in (sure, simple))
             lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)
     at = _Candidates(q, label, size, sure, simple)
     return _Groups(goals, at, lost, rests).settled(np.asarray(missed), np.asarray(out))
