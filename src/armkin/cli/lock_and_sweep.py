@@ -33,6 +33,12 @@ def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
     return found
 
 
+def locked(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
+    """`--lock J=V`: joint name -> value [rad | mm], as `armkin.lock` takes them."""
+    slides = dict(zip(arm.joint_names, arm.prismatic, strict=True))
+    return {name: value * (1.0 if slides[name] else units.DEGREE) for name, value in locks(arm, words).items()}
+
+
 def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> dict[str, list[float]]:
     """`--sweep J=LOW:HIGH:COUNT`: joint name -> values [deg | mm], both ends included."""
     from armkin.inverse.choose_branch import MOST_SWEEPS

@@ -99,6 +99,23 @@ BatchOut = Annotated[
         help="Write to a file, whole or not at all: .txt, .json; a batch .csv, .npz, .parquet, .jsonl.",
     ),
 ]
+
+
+def _drawable(path: str | None) -> str | None:
+    """Say what a picture lacks before the work, not after it."""
+    if path is not None:
+        from armkin.plot import canvas
+
+        canvas.check(path)
+        canvas.require()
+    return path
+
+
+Picture = Annotated[
+    str | None,
+    typer.Option("--plot", metavar="FILE", callback=_drawable, help="A picture as .png or .svg."),
+]
+Speed = Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")]
 Resume = Annotated[bool, typer.Option("--resume", help="With --batch and --out: go on where an interrupted run ended.")]
 Cluster = Annotated[
     str | None,

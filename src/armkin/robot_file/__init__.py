@@ -4,7 +4,6 @@ strict_yaml.py   YAML without its traps
 model.py         keys, types, bounds, as pydantic has them; checks.py: rules between values
 robot.py         `RobotFile`: the two together; messages.py: errors in the file's own words
 keys.py          what all keys are made of; keep_out.py: floors, boxes, capsules; scene.py: such in a file of their own
-keys.py          what all keys are made of; keep_out.py: floors, boxes, capsules; scene.py: such in a file of their own
 schema.py        JSON Schema, for editors
 catalogue.py     the shipped robots by name
 new.py           a robot file from a DH table

@@ -20,30 +20,33 @@ if TYPE_CHECKING:
 
 _UNITS = {"mm": ("mm", 1.0), "rad": ("deg", 1 / units.DEGREE), "1": ("%", 100.0)}
 
+MeasuredRows = Annotated[
+    str | None,
+    typer.Argument(metavar="CSV", help="One row a pose: joints as commanded, x y z of the tip as measured."),
+]
+WithRotations = Annotated[
+    bool, typer.Option("--poses", help="The rows also have roll, pitch and yaw of the tool, in degrees.")
+]
+FixedKinds = Annotated[
+    str | None,
+    typer.Option("--fix", metavar="KIND,...", help="Leave as they are: base, tool, zeros, ratios, lengths, twists."),
+]
+Suggest = Annotated[
+    int | None,
+    typer.Option(
+        "--suggest",
+        metavar="N",
+        help="List the next N poses to measure instead: those that would reduce the uncertainty most.",
+    ),
+]
+
 
 def calibrate(
     robot: Robot,
-    measured: Annotated[
-        str | None,
-        typer.Argument(metavar="CSV", help="One row a pose: joints as commanded, x y z of the tip as measured."),
-    ] = None,
-    poses: Annotated[
-        bool, typer.Option("--poses", help="The rows also have roll, pitch and yaw of the tool, in degrees.")
-    ] = False,
-    fix: Annotated[
-        str | None,
-        typer.Option(
-            "--fix", metavar="KIND,...", help="Leave as they are: base, tool, zeros, ratios, lengths, twists."
-        ),
-    ] = None,
-    suggest: Annotated[
-        int | None,
-        typer.Option(
-            "--suggest",
-            metavar="N",
-            help="List the next N poses to measure instead: those that would reduce the uncertainty most.",
-        ),
-    ] = None,
+    measured: MeasuredRows = None,
+    poses: WithRotations = False,
+    fix: FixedKinds = None,
+    suggest: Suggest = None,
     json: Json = False,
     out: Out = None,
 ) -> None:

@@ -45,6 +45,15 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
+Turns = Annotated[
+    bool,
+    typer.Option("--turns", help="Also the other copies of each branch, whole turns away, within limits."),
+]
+Continuous = Annotated[
+    bool,
+    typer.Option("--continuous", help="With --batch: stay close to the row before, instead of one --near for all."),
+]
+
 
 def ik(
     robot: RobotOrPipe = None,
@@ -52,18 +61,12 @@ def ik(
     all_branches: AllBranches = False,
     near: Near = None,
     branch: BranchName = None,
-    turns: Annotated[
-        bool,
-        typer.Option("--turns", help="Also the other copies of each branch, whole turns away, within limits."),
-    ] = False,
+    turns: Turns = False,
     task: TaskName = None,
     position_first: PositionFirst = False,
     lock: Lock = None,
     sweep: Sweep = None,
-    continuous: Annotated[
-        bool,
-        typer.Option("--continuous", help="With --batch: stay close to the row before, instead of one --near for all."),
-    ] = False,
+    continuous: Continuous = False,
     scene: Scene = None,
     tool: Tool = None,
     compiled: Compiled = False,
@@ -84,6 +87,7 @@ def ik(
     from armkin.inverse.redundant.position_first import check as position_first_is_for
     from armkin.inverse.tasks.fitting import task_for
 
+    _check_together(batch, sweep, position_first=position_first, compiled=compiled, continuous=continuous)
     given = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
     arm = inputs.load(inputs.named(robot), scene, tool) if given is None else given[0]
     what = task_for(arm, task)
@@ -101,50 +105,53 @@ def ik(
     )
     if position_first:
         position_first_is_for(choose_branch.locked(request), what.name)
-    if position_first and compiled:
-        raise UsageError("--position-first has no compiled solver; leave --compiled away")
-    if compiled and sweep:
-        raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
     if compiled:
         request = replace(request, ik=compiled_ik.ik, fk=partial(compiled_ik.fk, task=what.name))
         compiled_ik.prepare(arm, what.name)
-    if continuous and batch is None:
-        raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
+    questions = Questions(request, what, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
         inputs.no_numbers(target)
         from armkin.cli.batch import Batch as Run
         from armkin.cli.pieces import Rows
 
-        questions = Questions(request, what, all_branches, turns, continuous)
-        asked = {
-            "command": "ik",
-            "robot file": arm.sha256,
-            "scene": arm.scene_sha256,
-            "tool": arm.tool,
-            "task": what.name,
-            "near": request.near_out,
-            "branch": branch,
-            "lock": dict(request.held),
-            "sweep": dict(request.swept),
-            "all_branches": all_branches,
-            "turns": turns,
-            "continuous": continuous,
-            "position_first": position_first,
-            "compiled": compiled,
-        }
         rows = Rows(batch, what.labels, f"task {what.name}", None, reached or [])
         if continuous:  # each row waits for the one before
             workers, cluster = 1, None
-        Run(questions, out, json, workers, cluster, resume, asked).run(rows).conclude(questions.unsolvable)
+        Run(questions, out, json, workers, cluster, resume, questions.asked).run(rows).conclude(questions.unsolvable)
         return
     inputs.one_alone(workers, cluster, resume)
     values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
-    goal = targets_in(what.labels, values)
     words = None if reached is not None else [[decimals(word) for word in target or ()]]
-    [found] = choose_branch.solve(request, goal, _rounding(arm, what, values, words))
-    answer = _answer(request, what, values[0].tolist(), goal[0], found, all_branches, turns, with_closest=True)
+    _one(questions, values, words, out, json=json)
+
+
+def _check_together(
+    batch: str | None, sweep: list[str] | None, *, position_first: bool, compiled: bool, continuous: bool
+) -> None:
+    """Raise UsageError for options that make no sense together."""
+    if position_first and compiled:
+        raise UsageError("--position-first has no compiled solver; leave --compiled away")
+    if compiled and sweep:
+        raise UsageError("--sweep and --compiled: every value would be another arm to compile; leave one away")
+    if continuous and batch is None:
+        raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
+
+
+def _one(questions: Questions, values: Array, words: list[list[int]] | None, out: str | None, *, json: bool) -> None:
+    """Print the answer of one target (1, m) [mm, deg], then raise why it has no branch, if it has none.
+
+    words: the decimals that each of its numbers was written with.
+    """
+    from armkin.inverse import choose_branch
+
+    request, task = questions.request, questions.task
+    goal = targets_in(task.labels, values)
+    [found] = choose_branch.solve(request, goal, _rounding(request.arm, task, values, words))
+    answer = _answer(
+        request, task, values[0].tolist(), goal[0], found, questions.all_branches, questions.turns, with_closest=True
+    )
     with output.destination(out, "one answer is", output.TEXT) as write:
-        write(f"{render.to_json(answer)}\n" if json else ik_text.text(arm, answer))
+        write(f"{render.to_json(answer)}\n" if json else ik_text.text(request.arm, answer))
     if answer["best"] is None and answer["closest"] is None:
         raise choose_branch.blocked(request, found)
     if answer["best"] is None and answer["closest"] is not None:
@@ -177,6 +184,27 @@ class Questions:
     turns: bool
     continuous: bool
     unsolvable = True
+
+    @property
+    def asked(self) -> dict[str, Any]:
+        """What a run that goes on must ask, too."""
+        request = self.request
+        return {
+            "command": "ik",
+            "robot file": request.arm.sha256,
+            "scene": request.arm.scene_sha256,
+            "tool": request.arm.tool,
+            "task": self.task.name,
+            "near": request.near_out,
+            "branch": request.branch,
+            "lock": dict(request.held),
+            "sweep": dict(request.swept),
+            "all_branches": self.all_branches,
+            "turns": self.turns,
+            "continuous": self.continuous,
+            "position_first": request.position_first,
+            "compiled": request.ik is compiled_ik.ik,
+        }
 
     @property
     def near(self) -> list[float] | None:

@@ -24,36 +24,41 @@ _COLUMNS = ("alpha", "a", "d", "theta", "type", "lower", "upper", "home", "name"
 _VARIABLE = re.compile(r"([+-]?)(?:q|theta|th|d|s|\u03b8)_?[0-9]{0,2}\*? *(?:([+-]) *([0-9.pi/*\u03c0]{1,20}))?", re.I)
 _LARGEST_FILE = 1_000_000
 
+ArmName = Annotated[str, typer.Argument(metavar="NAME", help="The arm's name; the file is NAME.yaml.")]
+DhRow = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--dh",
+        metavar="ALPHA,A,D[,THETA]",
+        help="A row of the DH table, in degrees and mm. Repeatable; d3 for d makes a prismatic joint.",
+    ),
+]
+DhTable = Annotated[
+    str | None,
+    typer.Option(
+        "--batch",
+        metavar="FILE|-",
+        help="The table as CSV: alpha,a,d[,theta], or a heading with these, type, lower, upper, home, name.",
+    ),
+]
+Convention = Annotated[
+    str | None,
+    typer.Option("--convention", metavar="NAME", help="standard, or modified (Craig). Needed with --dh and --batch."),
+]
+NumbersFrom = Annotated[str, typer.Option("--source", metavar="TEXT", help="Where the numbers come from.")]
+Floor = Annotated[
+    float | None,
+    typer.Option("--floor", metavar="Z", help="A keep-out: nothing of the arm goes below this z, in mm."),
+]
+
 
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="The arm's name; the file is NAME.yaml.")],
-    dh: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--dh",
-            metavar="ALPHA,A,D[,THETA]",
-            help="A row of the DH table, in degrees and mm. Repeatable; d3 for d makes a prismatic joint.",
-        ),
-    ] = None,
-    batch: Annotated[
-        str | None,
-        typer.Option(
-            "--batch",
-            metavar="FILE|-",
-            help="The table as CSV: alpha,a,d[,theta], or a heading with these, type, lower, upper, home, name.",
-        ),
-    ] = None,
-    convention: Annotated[
-        str | None,
-        typer.Option(
-            "--convention", metavar="NAME", help="standard, or modified (Craig). Needed with --dh and --batch."
-        ),
-    ] = None,
-    source: Annotated[str, typer.Option("--source", metavar="TEXT", help="Where the numbers come from.")] = "",
-    floor: Annotated[
-        float | None,
-        typer.Option("--floor", metavar="Z", help="A keep-out: nothing of the arm goes below this z, in mm."),
-    ] = None,
+    name: ArmName,
+    dh: DhRow = None,
+    batch: DhTable = None,
+    convention: Convention = None,
+    source: NumbersFrom = "",
+    floor: Floor = None,
     out: RobotOut = None,
 ) -> None:
     """A robot file from a DH table, commented.

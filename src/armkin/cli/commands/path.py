@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin import files
-from armkin.cli import board_link, foreign_path, inputs, keep_outs, lock_and_sweep, output, render
+from armkin.cli import board_link, foreign_path, inputs, keep_outs, lock_and_sweep, output, path_text, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.foreign_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import comma_separated, number, whole
-from armkin.cli.options import BranchName, Json, Lock, Near, Robot, Scene, TaskName, Tool
+from armkin.cli.options import BranchName, Json, Lock, Near, Picture, Robot, Scene, Speed, TaskName, Tool
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -25,70 +25,79 @@ if TYPE_CHECKING:
 
 _STEP = 0.01  # [s] between the rows of --out
 
+PathSource = Annotated[
+    str | None, typer.Argument(metavar="[FILE|-]", help="A path file (YAML), waypoints as CSV, G-code or SVG.")
+]
+Corner = Annotated[
+    list[str] | None,
+    typer.Option("--via", metavar="X,Y,Z", help="Instead of a file: a waypoint on straight lines. Repeatable."),
+]
+MovePort = Annotated[
+    str | None,
+    typer.Option("--port", "-p", metavar="PORT", help="Move: to the start by a joint move, then along the path."),
+]
+OnlyPlan = Annotated[bool, typer.Option("--dry-run", help="Plan and report; nothing moves, whatever --port says.")]
+Tolerance = Annotated[
+    str | None,
+    typer.Option("--tolerance", metavar="MM", help="Greatest distance between plan and path. [default: 0.05]"),
+]
+BlendRadius = Annotated[
+    str | None, typer.Option("--blend", metavar="MM", help="Radius that rounds corners; 0 stops in them.")
+]
+CornersBy = Annotated[
+    str | None,
+    typer.Option(
+        "--corners",
+        metavar="stop|blend|tolerance",
+        help="How corners are passed; tolerance: dense points as one curve.",
+    ),
+]
+AccelShare = Annotated[str, typer.Option("--accel", metavar="PERCENT", help="Of every joint's max_accel.")]
+ToolSpeed = Annotated[str | None, typer.Option("--tool-speed", metavar="MM/S", help="Greatest speed of the tool.")]
+GreatestJerk = Annotated[
+    str | None,
+    typer.Option("--jerk", metavar="DEG/S3", help="Greatest jerk of every joint. [default: its max_jerk]"),
+]
+StandsAt = Annotated[
+    str | None,
+    typer.Option("--start", metavar="Q,...", help="Where the arm stands, for a plan. [default: the home pose]"),
+]
+MaySplit = Annotated[bool, typer.Option("--split", help="Where no branch carries on, change it there by a joint move.")]
+FirstTargets = Annotated[
+    str | None, typer.Option("--samples", metavar="N", help="Targets solved at first. [default: one a mm]")
+]
+PlanOut = Annotated[
+    str | None,
+    typer.Option("--out", "-o", metavar="FILE|-", help="The plan as CSV: joints over time; whole or not at all."),
+]
+
 
 def path(
     robot: Robot,
-    file: Annotated[
-        str | None, typer.Argument(metavar="[FILE|-]", help="A path file (YAML), waypoints as CSV, G-code or SVG.")
-    ] = None,
-    via: Annotated[
-        list[str] | None,
-        typer.Option("--via", metavar="X,Y,Z", help="Instead of a file: a waypoint on straight lines. Repeatable."),
-    ] = None,
-    port: Annotated[
-        str | None,
-        typer.Option("--port", "-p", metavar="PORT", help="Move: to the start by a joint move, then along the path."),
-    ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Plan and report; nothing moves, whatever --port says.")
-    ] = False,
-    tolerance: Annotated[
-        str | None,
-        typer.Option("--tolerance", metavar="MM", help="Greatest distance between plan and path. [default: 0.05]"),
-    ] = None,
-    blend: Annotated[
-        str | None, typer.Option("--blend", metavar="MM", help="Radius that rounds corners; 0 stops in them.")
-    ] = None,
-    corners: Annotated[
-        str | None,
-        typer.Option(
-            "--corners",
-            metavar="stop|blend|tolerance",
-            help="How corners are passed; tolerance: dense points as one curve.",
-        ),
-    ] = None,
-    speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
-    accel: Annotated[str, typer.Option("--accel", metavar="PERCENT", help="Of every joint's max_accel.")] = "100",
-    tool_speed: Annotated[
-        str | None, typer.Option("--tool-speed", metavar="MM/S", help="Greatest speed of the tool.")
-    ] = None,
-    jerk: Annotated[
-        str | None,
-        typer.Option("--jerk", metavar="DEG/S3", help="Greatest jerk of every joint. [default: its max_jerk]"),
-    ] = None,
+    file: PathSource = None,
+    via: Corner = None,
+    port: MovePort = None,
+    dry_run: OnlyPlan = False,
+    tolerance: Tolerance = None,
+    blend: BlendRadius = None,
+    corners: CornersBy = None,
+    speed: Speed = "100",
+    accel: AccelShare = "100",
+    tool_speed: ToolSpeed = None,
+    jerk: GreatestJerk = None,
     near: Near = None,
     scene: Scene = None,
     tool: Tool = None,
     no_scene: NoScene = False,
     ignore_keep_out: Ignore = False,
-    start: Annotated[
-        str | None,
-        typer.Option("--start", metavar="Q,...", help="Where the arm stands, for a plan. [default: the home pose]"),
-    ] = None,
+    start: StandsAt = None,
     branch: BranchName = None,
     task: TaskName = None,
     lock: Lock = None,
-    split: Annotated[
-        bool, typer.Option("--split", help="Where no branch carries on, change it there by a joint move.")
-    ] = False,
-    samples: Annotated[
-        str | None, typer.Option("--samples", metavar="N", help="Targets solved at first. [default: one a mm]")
-    ] = None,
-    out: Annotated[
-        str | None,
-        typer.Option("--out", "-o", metavar="FILE|-", help="The plan as CSV: joints over time; whole or not at all."),
-    ] = None,
-    plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture, .png or .svg.")] = None,
+    split: MaySplit = False,
+    samples: FirstTargets = None,
+    out: PlanOut = None,
+    plot: Picture = None,
     assume: Assume = None,
     resume: Resume = False,
     baud: Baud = None,
@@ -107,20 +116,10 @@ def path(
     """
     if start is not None and port is not None and not dry_run:
         raise UsageError("--start belongs to a plan: with --port the arm starts where it stands")
-    if plot is not None:
-        from armkin.plot import canvas
-
-        canvas.check(plot)
-        canvas.require()
-    import numpy as np
-
     import armkin
 
     arm = keep_outs.moving(robot, scene, ignore_keep_out, tool)
-    locked = {
-        name: value * (1.0 if arm.prismatic[arm.joint_names.index(name)] else units.DEGREE)
-        for name, value in lock_and_sweep.locks(arm, lock).items()
-    }
+    locked = lock_and_sweep.locked(arm, lock)
     free = armkin.lock(arm, locked) if locked else arm
     drawn = foreign_path.moves(free, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
     moves = _moves(free, file, via, task) if drawn is None else drawn
@@ -128,13 +127,13 @@ def path(
     options: dict[str, Any] = {
         "branch": branch,
         "task": task,
-        "tolerance": _positive(tolerance, "--tolerance", 1e-6),
+        "tolerance": None if tolerance is None else _positive(tolerance, "--tolerance", 1e-6),
         "corners": corners,
         "blend": None if blend is None else _positive(blend, "--blend", 0),
         "speed": inputs.percent(speed, "--speed"),
         "accel": inputs.percent(accel, "--accel"),
-        "tool_speed": _positive(tool_speed, "--tool-speed", 1e-3),
-        "jerk": None if jerk is None else units.joints_in(arm, np.full(arm.n, _positive(jerk, "--jerk", 1e-3))),
+        "tool_speed": None if tool_speed is None else _positive(tool_speed, "--tool-speed", 1e-3),
+        "jerk": None if jerk is None else units.joints_in(arm, [_positive(jerk, "--jerk", 1e-3)] * arm.n),
         "near": None if near is None else units.joints_in(arm, inputs.joint_list(arm, near, "--near")),
         "split": split,
         "samples": None if samples is None else whole(samples, "--samples", 10, 1_000_000),
@@ -144,15 +143,12 @@ def path(
             {"a plan": port is None, "--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM}
         )
     if port is None or dry_run:
-        arm = board_link.planned(arm)
-        if start is not None:
-            options["start"] = board_link.standing(arm, start, "--start")
-        plan = _planned(arm, moves, locked, options, json=json)
+        plan = _from(start, "--start", arm, moves, locked, options, json=json)
         found = _found(plan, _rehearsed(plan, rehearsal=dry_run))
         _files(plan, out, plot)
         _print(plan, found, json=json, out=out)
         return
-    link = board_link.Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
+    link = Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
     _carried_out(arm, moves, locked, options, link, out, plot, json=json)
 
 
@@ -174,13 +170,27 @@ def sent(
     if not dry_run:
         _carried_out(arm, moves, {}, options, link, trace, None, json=json)
         return
-    arm = board_link.planned(arm)
-    if start is not None:
-        options["start"] = board_link.standing(arm, start, "--from")
-    plan = _planned(arm, moves, {}, options, json=json)
+    plan = _from(start, "--from", arm, moves, {}, options, json=json)
     found = {**_found(plan, _rehearsed(plan)), "dry_run": True}
     _files(plan, trace, None)
     _print(plan, found, json=json, out=trace)
+
+
+def _from(
+    start: str | None,
+    option: str,
+    arm: Arm,
+    moves: Any,
+    locked: dict[str, float],
+    options: dict[str, Any],
+    *,
+    json: bool,
+) -> PathPlan:
+    """The plan from where an option says that the arm stands: nothing moves."""
+    arm = board_link.planned(arm)
+    if start is not None:
+        options["start"] = board_link.standing(arm, start, option)
+    return _planned(arm, moves, locked, options, json=json)
 
 
 def _carried_out(
@@ -257,9 +267,7 @@ def _corner(text: str, labels: tuple[str, ...]) -> list[float]:
     return comma_separated(text, short if text.count(",") + 1 == len(short) else labels, "--via")
 
 
-def _positive(text: str | None, option: str, least: float) -> float | None:
-    if text is None:
-        return None
+def _positive(text: str, option: str, least: float) -> float:
     value = number(text, option)
     if value < least:
         raise UsageError(f"{option}: '{text}' must be at least {least:g}")
@@ -343,57 +351,4 @@ def _write(plan: PathPlan, name: str) -> None:
 def _print(plan: PathPlan, found: dict[str, Any], *, json: bool, out: str | None = None) -> None:
     """The answer, on stderr while the samples of `--out -` have stdout."""
     with output.beside(out) as write:
-        write(render.to_json(found) + "\n" if json else _text(plan, found))
-
-
-def _text(plan: PathPlan, found: dict[str, Any]) -> str:
-    """The plan for people."""
-    from armkin.motion.branch_report import closeness, passes, words
-
-    arm = plan.arm
-    lines = [f"{arm.name}: {found['length_mm']:.3f} mm of path"]
-    if found["duration_s"] is not None:
-        lines[0] += f", {found['duration_s']:.3f} s"
-        if found["segments"] is not None:
-            lines[0] += f", {found['segments']} segments"
-        if "approach" in found:
-            lines.append(f"  before it {found['approach']['duration_s']:.3f} s from where the arm stands to its start")
-    if plan.held:
-        lines.append(f"  held: {', '.join(f'{name} at {value:.4g}' for name, value in found['held'].items())}")
-    for run in found["runs"]:
-        names = ", then ".join(
-            f"{one['name'] or 'unnamed'}" + (f" from {one['s_mm']:.3f}" if k else "")
-            for k, one in enumerate(run["branches"])
-        )
-        lines.append(f"  {run['s_mm'][0]:.3f} to {run['s_mm'][1]:.3f} mm: {names}")
-    for one in plan.reconfigurations:
-        line = f"  at {one.s:.3f} mm: {words(arm, one)}"
-        if line not in lines:  # several branches end there for one reason
-            lines.append(line)
-    if found["branches"]:
-        rows = [["branch at the start", "carries/mm", ""]]
-        rows += [[b["name"] or "unnamed", f"{b['carries_mm']:.3f}", b["ends_because"]] for b in found["branches"]]
-        lines += ["", render.table(rows, left=(0, 2))]
-    if "clearance" in found:
-        near = found["clearance"]
-        how = "inside" if (near["mm"] or 0.0) < 0 else "nearest to"
-        size = "nothing counts" if near["mm"] is None else f"at least {near['mm']:.1f} mm"
-        size = f"{-near['mm']:.1f} mm deep" if (near["mm"] or 0.0) < 0 else size
-        lines.append(f"  at {near['s_mm']:.3f} mm: {near['body']} {how} {near['with']}, {size}")
-    if found["limits"] is not None:
-        rows = [["share of", *arm.joint_names]]
-        rows += [[key, *(f"{100 * share:.1f} %" for share in each.values())] for key, each in found["limits"].items()]
-        lines += ["", render.table(rows), ""]
-        worst = found["nearest_singularity"]
-        if worst is not None:
-            size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
-            lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
-        lines.append(closeness(plan))
-        lines += passes(plan)
-        if plan.reduced.count:
-            wished, became = plan.reduced.wished, plan.reduced.became
-            lines.append(
-                f"{plan.reduced.count} blend{'s' * (plan.reduced.count > 1)} made smaller, to half of a side: "
-                f"the smallest from {wished:g} to {became:.4g} mm"
-            )
-    return "\n".join(lines) + "\n"
+        write(render.to_json(found) + "\n" if json else path_text.text(plan, found))

@@ -9,7 +9,7 @@ import typer
 
 from armkin.cli import compiled_ik, inputs, output, render
 from armkin.cli.numbers import comma_separated, number
-from armkin.cli.options import Cluster, Compiled, Json, Scene, Workers
+from armkin.cli.options import Cluster, Compiled, Json, Picture, Scene, Workers
 from armkin.errors import NoSolutionError, UsageError
 
 if TYPE_CHECKING:
@@ -20,31 +20,34 @@ if TYPE_CHECKING:
     from armkin.reachability.place import Place
     from armkin.reachability.planning import Planned
 
+RobotsAndFile = Annotated[
+    list[str], typer.Argument(metavar="ROBOT... FILE", help="Robots, then a CSV of targets or a path (YAML).")
+]
+Area = Annotated[
+    str | None,
+    typer.Option("--area", metavar="XMIN,XMAX,YMIN,YMAX", help="Where places may be. [default: all that may reach]"),
+]
+Step = Annotated[str, typer.Option("--step", metavar="MM", help="Distance between places.")]
+YawStep = Annotated[str, typer.Option("--yaw", metavar="DEG", help="Step of the yaws that are tried at each place.")]
+Height = Annotated[str, typer.Option("--z", metavar="MM", help="Height of the places.")]
+PlacesOut = Annotated[
+    str | None,
+    typer.Option("--out", "-o", metavar="FILE", help="All places: .npz, .parquet, .csv; after a kill it goes on."),
+]
+
 
 def place(
-    words: Annotated[
-        list[str], typer.Argument(metavar="ROBOT... FILE", help="Robots, then a CSV of targets or a path (YAML).")
-    ],
-    area: Annotated[
-        str | None,
-        typer.Option(
-            "--area", metavar="XMIN,XMAX,YMIN,YMAX", help="Where places may be. [default: all that may reach]"
-        ),
-    ] = None,
-    step: Annotated[str, typer.Option("--step", metavar="MM", help="Distance between places.")] = "50",
-    yaw: Annotated[
-        str, typer.Option("--yaw", metavar="DEG", help="Step of the yaws that are tried at each place.")
-    ] = "15",
-    z: Annotated[str, typer.Option("--z", metavar="MM", help="Height of the places.")] = "0",
+    words: RobotsAndFile,
+    area: Area = None,
+    step: Step = "50",
+    yaw: YawStep = "15",
+    z: Height = "0",
     scene: Scene = None,
     compiled: Compiled = False,
     workers: Workers = 1,
     cluster: Cluster = None,
-    out: Annotated[
-        str | None,
-        typer.Option("--out", "-o", metavar="FILE", help="All places: .npz, .parquet, .csv; after a kill it goes on."),
-    ] = None,
-    plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture as .png or .svg.")] = None,
+    out: PlacesOut = None,
+    plot: Picture = None,
     json: Json = False,
 ) -> None:
     """Where to put an arm, for all targets or a whole path.
@@ -55,11 +58,6 @@ def place(
     """
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")
-    if plot is not None:
-        from armkin.plot import canvas
-
-        canvas.check(plot)
-        canvas.require()
     arms = [inputs.load(word) for word in words[:-1]]
     settings: dict[str, Any] = {"step": number(step, "--step"), "z": number(z, "--z")}
     turn = number(yaw, "--yaw")
@@ -93,11 +91,15 @@ def place(
         if one.unplanned and one.reach_all:
             output.warn(f"the path is not planned from there: {one.unplanned}")
     if not any(one.reach_all for one in found):
-        most = max(found, key=lambda one: int(one.reached.max()))
-        what = "points of the path on one branch" if _is_path(words[-1]) else "targets"
-        raise NoSolutionError(
-            f"no place reaches all {most.of} {what}; {most.arm.name} reaches {int(most.reached.max())} at best"
-        )
+        raise _no_place(found, "points of the path on one branch" if _is_path(words[-1]) else "targets")
+
+
+def _no_place(found: Sequence[Place], what: str) -> NoSolutionError:
+    """How many of the targets are reached where no place reaches all."""
+    most = max(found, key=lambda one: int(one.reached.max()))
+    return NoSolutionError(
+        f"no place reaches all {most.of} {what}; {most.arm.name} reaches {int(most.reached.max())} at best"
+    )
 
 
 def _is_path(source: str) -> bool:

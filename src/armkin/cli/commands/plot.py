@@ -19,36 +19,42 @@ if TYPE_CHECKING:
 
 _VIEWS = {"front": (0.0, -90.0), "side": (0.0, 0.0), "top": (90.0, -90.0), "iso": (22.0, -60.0)}
 
+PictureOut = Annotated[
+    str | None, typer.Option("--out", "-o", metavar="FILE", help="The picture, .png or .svg. [default: a window]")
+]
+DrawnTarget = Annotated[
+    str | None,
+    typer.Option("--target", metavar="X,Y,Z", help="Instead of joint values: all branches that reach it."),
+]
+DrawnPoses = Annotated[
+    str | None,
+    typer.Option("--batch", "--path", metavar="FILE|-", help="Instead: all poses of a CSV file, one row a pose."),
+]
+Frames = Annotated[
+    bool | None,
+    typer.Option("--frames/--no-frames", help="The joint frames. [default: for a single pose]"),
+]
+View = Annotated[
+    str | None,
+    typer.Option(
+        "--view",
+        metavar="VIEW",
+        help="front, side, top, iso, or ELEVATION,AZIMUTH of the eye in degrees.",
+    ),
+]
+
 
 def plot(
     robot: RobotOrPipe = None,
     q: Joints = None,
-    out: Annotated[
-        str | None, typer.Option("--out", "-o", metavar="FILE", help="The picture, .png or .svg. [default: a window]")
-    ] = None,
-    target: Annotated[
-        str | None,
-        typer.Option("--target", metavar="X,Y,Z", help="Instead of joint values: all branches that reach it."),
-    ] = None,
-    batch: Annotated[
-        str | None,
-        typer.Option("--batch", "--path", metavar="FILE|-", help="Instead: all poses of a CSV file, one row a pose."),
-    ] = None,
+    out: PictureOut = None,
+    target: DrawnTarget = None,
+    batch: DrawnPoses = None,
     task: TaskName = None,
     lock: Lock = None,
     scene: Scene = None,
-    frames: Annotated[
-        bool | None,
-        typer.Option("--frames/--no-frames", help="The joint frames. [default: for a single pose]"),
-    ] = None,
-    view: Annotated[
-        str | None,
-        typer.Option(
-            "--view",
-            metavar="VIEW",
-            help="front, side, top, iso, or ELEVATION,AZIMUTH of the eye in degrees.",
-        ),
-    ] = None,
+    frames: Frames = None,
+    view: View = None,
 ) -> None:
     """A picture of the arm.
 

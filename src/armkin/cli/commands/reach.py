@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.numbers import number, whole
-from armkin.cli.options import Cluster, Json, Robot, Scene, Workers
+from armkin.cli.options import Cluster, Json, Picture, Robot, Scene, Workers
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Reach as Answer
@@ -31,7 +31,7 @@ def reach(
         str | None,
         typer.Option("--out", "-o", metavar="FILE", help="All cells: .npz, .parquet, .csv; after a kill it goes on."),
     ] = None,
-    plot: Annotated[str | None, typer.Option("--plot", metavar="FILE", help="A picture as .png or .svg.")] = None,
+    plot: Picture = None,
     json: Json = False,
 ) -> None:
     """Where the arm reaches, with which orientations.
@@ -43,11 +43,6 @@ def reach(
     from armkin.reachability.cells import MOST, Grid
 
     arm = inputs.load(robot, scene)
-    if plot is not None:  # say what is missing before the work, not after it
-        from armkin.plot import canvas
-
-        canvas.check(plot)
-        canvas.require()
     step, ring = number(grid, "--grid"), whole(azimuths, "--azimuths", 1, MOST)
     many, turns = whole(directions, "--directions", 1, MOST), whole(rolls, "--rolls", 1, MOST)
     cells = len(Grid(arm, step, ring, many, turns, tool_down).rings) * ring

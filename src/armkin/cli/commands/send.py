@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import board_link, inputs, keep_outs, output, render
-from armkin.cli.board_link import SIM, Assume, Baud, NoReset, Resume
+from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import number
-from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, TaskName, Tool
+from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
 from armkin.cli.send_goals import goals as read_goals
 from armkin.columns.cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -20,69 +20,81 @@ from armkin.model import units
 
 if TYPE_CHECKING:
     from armkin.board.backend import Planned
+    from armkin.board.backend.board import Board
     from armkin.board.planner import Planner, Stream
     from armkin.cli.send_goals import Goals
     from armkin.errors import ArmkinError
+    from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
+
+GoalTarget = Annotated[
+    str | None,
+    typer.Option("--target", metavar="X,Y,Z", help="Solve for a target, and take the branch nearest to the arm."),
+]
+NearPose = Annotated[
+    str | None,
+    typer.Option("--near", metavar="Q,...", help="Take the branch nearest to this pose. [default: to the arm]"),
+]
+Waypoints = Annotated[
+    str | None,
+    typer.Option(
+        "--batch",
+        metavar="FILE|-",
+        help="Joint values of many waypoints, one row each; the arm stops in each, but for --blend.",
+    ),
+]
+BlendRadius = Annotated[
+    str | None,
+    typer.Option(
+        "--blend",
+        metavar="DEG|MM",
+        help="With --batch FILE: round the corners, so far from each waypoint, without a stop.",
+    ),
+]
+PathSource = Annotated[
+    str | None, typer.Option("--path", metavar="FILE|-", help="Along a path file, as armkin path does.")
+]
+OnlyPlan = Annotated[bool, typer.Option("--dry-run", help="Plan from --from, move nothing.")]
+DryRunStart = Annotated[
+    str | None,
+    typer.Option("--from", metavar="Q,...", help="Where a dry run starts. [default: the home pose]"),
+]
+Trace = Annotated[
+    str | None,
+    typer.Option("--trace", metavar="FILE|-", help="CSV of the plan: time, joints, every joint's position."),
+]
+MissingAccel = Annotated[
+    str | None,
+    typer.Option(
+        "--accel",
+        metavar="DEG/S2|MM/S2",
+        help="In a rehearsal (--dry-run, --port sim): for joints without a max_accel in the robot file.",
+    ),
+]
 
 
 def send(
     robot: RobotOrPipe = None,
     q: Joints = None,
     port: PortName = None,
-    target: Annotated[
-        str | None,
-        typer.Option("--target", metavar="X,Y,Z", help="Solve for a target, and take the branch nearest to the arm."),
-    ] = None,
-    near: Annotated[
-        str | None,
-        typer.Option("--near", metavar="Q,...", help="Take the branch nearest to this pose. [default: to the arm]"),
-    ] = None,
+    target: GoalTarget = None,
+    near: NearPose = None,
     branch: BranchName = None,
     task: TaskName = None,
     lock: Lock = None,
-    batch: Annotated[
-        str | None,
-        typer.Option(
-            "--batch",
-            metavar="FILE|-",
-            help="Joint values of many waypoints, one row each; the arm stops in each, but for --blend.",
-        ),
-    ] = None,
-    blend: Annotated[
-        str | None,
-        typer.Option(
-            "--blend",
-            metavar="DEG|MM",
-            help="With --batch FILE: round the corners, so far from each waypoint, without a stop.",
-        ),
-    ] = None,
-    path: Annotated[
-        str | None, typer.Option("--path", metavar="FILE|-", help="Along a path file, as armkin path does.")
-    ] = None,
+    batch: Waypoints = None,
+    blend: BlendRadius = None,
+    path: PathSource = None,
     scene: Scene = None,
     tool: Tool = None,
     no_scene: NoScene = False,
     ignore_keep_out: Ignore = False,
-    speed: Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")] = "100",
+    speed: Speed = "100",
     assume: Assume = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Plan from --from, move nothing.")] = False,
-    start: Annotated[
-        str | None,
-        typer.Option("--from", metavar="Q,...", help="Where a dry run starts. [default: the home pose]"),
-    ] = None,
-    trace: Annotated[
-        str | None,
-        typer.Option("--trace", metavar="FILE|-", help="CSV of the plan: time, joints, every joint's position."),
-    ] = None,
-    accel: Annotated[
-        str | None,
-        typer.Option(
-            "--accel",
-            metavar="DEG/S2|MM/S2",
-            help="In a rehearsal (--dry-run, --port sim): for joints without a max_accel in the robot file.",
-        ),
-    ] = None,
+    dry_run: OnlyPlan = False,
+    start: DryRunStart = None,
+    trace: Trace = None,
+    accel: MissingAccel = None,
     resume: Resume = False,
     baud: Baud = None,
     no_reset: NoReset = False,
@@ -93,8 +105,7 @@ def send(
     All joints start and stop together, within each joint's max_speed and max_accel. Ctrl-C stops the arm on
     its path; its position stays known.
     """
-    from armkin.board.planner import Planner, Stream, where_arm_stands
-    from armkin.board.stopping import planning
+    from armkin.board.planner import Planner
 
     fraction = inputs.percent(speed, "--speed")
     rehearsal = dry_run or port == SIM
@@ -102,20 +113,12 @@ def send(
     if resume:
         _check_rows_are_kept(batch)
         board_link.can_resume({"--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM})
+    link = Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
     if path is not None:
         from armkin.cli.commands.path import sent
 
-        others: dict[str, object] = {
-            "joint values": q,
-            "--target": target,
-            "--batch": batch,
-            "--blend": blend,
-            "--near": near,
-            "--accel": accel,
-        }
-        robot = _of_a_path(robot, others)
-        link = board_link.Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
-        arm = keep_outs.moving(robot, scene, ignore_keep_out, tool)
+        others = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend, "--near": near}
+        arm = keep_outs.moving(_of_a_path(robot, {**others, "--accel": accel}), scene, ignore_keep_out, tool)
         sent(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
         return
     radius = _blend(blend, batch)
@@ -126,33 +129,12 @@ def send(
         arm = _accelerated(arm, number(accel, "--accel"))
     if not dry_run:
         arm = board_link.rehearsed(arm, port)
-    try:
-        board = board_link.board_of(arm, rehearsal=rehearsal)
-    except UsageError as error:
-        if rehearsal and all(line.startswith("max_accel") for line in error.fields.get("lines_to_add", ["no"])):
-            error.fields["option"] = "--accel"
-        raise
-    planner, stands = Planner(board, fraction, radius), board_link.assumed(arm, assume)
+    planner = Planner(_board(arm, rehearsal=rehearsal), fraction, radius)
+    stands = board_link.assumed(arm, assume)
     if dry_run:
         _dry_run(planner, goals, start, trace, json)
-        return
-    with board_link.backend(board, port, baud, simulated=board_link.simulated(assume), reset=not no_reset) as machine:
-        board_link.prepare(arm, machine, assume, stands)
-        keep_outs.check_start(machine, arm, no_scene)
-        held = board_link.held(board, resume)
-        began = machine.counts() if held is None else held.start
-        if isinstance(goals, Stream):
-            with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
-                machine.run(planner.noted(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
-        else:
-            with planning():
-                plans = _all(planner, goals, began)  # every refusal before anything moves
-                _write_trace(arm, plans, trace)
-            began = machine.counts()
-            _carry_out(planner, plans, held)
-        planned = planner.done.summary(began)
-        found: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
-    _tell(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
+    else:
+        _move(planner, goals, link, stands, trace, json=json)
 
 
 def _check_together(
@@ -184,6 +166,43 @@ def _of_a_path(robot: str | None, others: Mapping[str, object]) -> str:
     if robot is None:
         raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
     return robot
+
+
+def _board(arm: Arm, *, rehearsal: bool) -> Board:
+    """The arm's board; where a rehearsal lacks accelerations alone, --accel is what gives them."""
+    try:
+        return board_link.board_of(arm, rehearsal=rehearsal)
+    except UsageError as error:
+        if rehearsal and all(line.startswith("max_accel") for line in error.fields.get("lines_to_add", ["no"])):
+            error.fields["option"] = "--accel"
+        raise
+
+
+def _move(
+    planner: Planner, goals: Goals | Stream, link: Link, stands: Array | None, trace: str | None, *, json: bool
+) -> None:
+    """Plan from where the arm stands, or from where the motion that is resumed began; move; tell where it stands."""
+    from armkin.board.planner import Stream, where_arm_stands
+    from armkin.board.stopping import planning
+
+    arm, board, simulated = planner.arm, planner.board, board_link.simulated(link.assume)
+    with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
+        board_link.prepare(arm, machine, link.assume, stands)
+        keep_outs.check_start(machine, arm, link.no_scene)
+        held = board_link.held(board, link.resume)
+        began = machine.counts() if held is None else held.start
+        if isinstance(goals, Stream):
+            with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
+                machine.run(planner.noted(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
+        else:
+            with planning():
+                plans = _all(planner, goals, began)  # every refusal before anything moves
+                _write_trace(arm, plans, trace)
+            began = machine.counts()
+            _carry_out(planner, plans, held)
+        planned = planner.done.summary(began)
+        found: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
+    _tell(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
 
 
 def _tell(

@@ -11,7 +11,7 @@ import typer
 
 from armkin.cli import inputs, output, render
 from armkin.cli.numbers import is_number, whole
-from armkin.cli.options import Cluster, Compiled, Json, Robot, Scene, Tool, Workers
+from armkin.cli.options import Cluster, Compiled, Json, Picture, Robot, Scene, Tool, Workers
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -20,42 +20,46 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.reachability import Workspace
 
+Samples = Annotated[
+    str | None,
+    typer.Option("--samples", metavar="N", help="Random poses within the limits. [default: 100000]"),
+]
+Grid = Annotated[
+    str | None,
+    typer.Option(
+        "--grid",
+        metavar="N[,N...]",
+        help="Evenly spaced poses instead: so many on every joint, or on each.",
+    ),
+]
+Seed = Annotated[str, typer.Option("--seed", metavar="N", help="Seed of the random poses.")]
+Measures = Annotated[
+    list[str] | None,
+    typer.Option("--measure", metavar="NAME", help="For each sample: manipulability, step_error. Repeatable."),
+]
+CloudOut = Annotated[
+    str | None,
+    typer.Option("--out", "-o", metavar="FILE", help="All samples as .csv, .npz or .ply; whole or not at all."),
+]
+Color = Annotated[
+    str | None,
+    typer.Option(
+        "--color",
+        metavar="NAME",
+        help="What colours the picture: manipulability (default), step_error, reach, z.",
+    ),
+]
+
 
 def workspace(
     robot: Robot,
-    samples: Annotated[
-        str | None,
-        typer.Option("--samples", metavar="N", help="Random poses within the limits. [default: 100000]"),
-    ] = None,
-    grid: Annotated[
-        str | None,
-        typer.Option(
-            "--grid",
-            metavar="N[,N...]",
-            help="Evenly spaced poses instead: so many on every joint, or on each.",
-        ),
-    ] = None,
-    seed: Annotated[str, typer.Option("--seed", metavar="N", help="Seed of the random poses.")] = "0",
-    measure: Annotated[
-        list[str] | None,
-        typer.Option("--measure", metavar="NAME", help="For each sample: manipulability, step_error. Repeatable."),
-    ] = None,
-    out: Annotated[
-        str | None,
-        typer.Option("--out", "-o", metavar="FILE", help="All samples as .csv, .npz or .ply; whole or not at all."),
-    ] = None,
-    plot: Annotated[
-        str | None,
-        typer.Option("--plot", metavar="FILE", help="A picture of the cloud as .png or .svg."),
-    ] = None,
-    color: Annotated[
-        str | None,
-        typer.Option(
-            "--color",
-            metavar="NAME",
-            help="What colours the picture: manipulability (default), step_error, reach, z.",
-        ),
-    ] = None,
+    samples: Samples = None,
+    grid: Grid = None,
+    seed: Seed = "0",
+    measure: Measures = None,
+    out: CloudOut = None,
+    plot: Picture = None,
+    color: Color = None,
     scene: Scene = None,
     tool: Tool = None,
     compiled: Compiled = False,
@@ -73,25 +77,15 @@ def workspace(
     from armkin.reachability.sampling import MOST
 
     arm = inputs.load(robot, scene, tool)
-    measures = list(dict.fromkeys(measure or ()))
     if out is not None:
         cloud.check(out)
     if plot is None and color is not None:
         raise UsageError("--color is for the picture; add --plot FILE")
-    shade, keep = color or "manipulability", 0
-    if plot is not None:  # say what is missing before the work, not after it
-        from armkin.plot import canvas
-        from armkin.plot.cloud import KEEP
-        from armkin.reachability.measures import MEASURES
-
-        canvas.check(plot)
-        canvas.require()
-        measures += [shade] if shade in MEASURES and shade not in measures else []
-        keep = KEEP
+    shade = color or "manipulability"
+    measures, keep = _measures(measure, None if plot is None else shade)
     count = None if samples is None else whole(samples, "--samples", 1, MOST)
     points = None if grid is None else _points(grid)
-    each = points * arm.n if points and len(points) == 1 else points
-    total = math.prod(each) if each else count or 100_000
+    total = count or 100_000 if points is None else math.prod(points * arm.n if len(points) == 1 else points)
     with output.progress("samples", total) as tick:
         found = armkin.workspace(
             arm,
@@ -113,6 +107,17 @@ def workspace(
     answer = _answer(found)
     with output.destination(None) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(answer))
+
+
+def _measures(asked: list[str] | None, shade: str | None) -> tuple[list[str], int]:
+    """What is measured of each sample, and how many samples a picture by the colour `shade` keeps."""
+    measures = list(dict.fromkeys(asked or ()))
+    if shade is None:
+        return measures, 0
+    from armkin.plot.cloud import KEEP
+    from armkin.reachability.measures import MEASURES
+
+    return measures + [shade] * (shade in MEASURES and shade not in measures), KEEP
 
 
 def _compiled(arm: Arm, q: Array) -> Array:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,30 +14,39 @@ from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Json, Robot, RobotOut
 from armkin.errors import UsageError
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.board.backend.board import Board
+    from armkin.model.arm import Arm
 
 _ENDS = ("open", "closed")
+
+StandsIn = Annotated[
+    str | None,
+    typer.Option("--pose", metavar="NAME|Q,...", help="The pose that the arm stands in. [default: home]"),
+]
+GripperAt = Annotated[
+    str | None,
+    typer.Option("--gripper", metavar="open|closed|VALUE", help="Where the gripper stands: its zero, too."),
+]
+LeRobotFile = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="FILE",
+        help="A LeRobot calibration file instead: zeros, limits, directions, the gripper's ends. --pose is then "
+        "where the middles of all ranges are (default: all joints at 0); --port compares it with the servos.",
+    ),
+]
 
 
 def zero(
     robot: Robot,
     port: PortName = None,
-    pose: Annotated[
-        str | None,
-        typer.Option("--pose", metavar="NAME|Q,...", help="The pose that the arm stands in. [default: home]"),
-    ] = None,
-    gripper: Annotated[
-        str | None,
-        typer.Option("--gripper", metavar="open|closed|VALUE", help="Where the gripper stands: its zero, too."),
-    ] = None,
-    source: Annotated[
-        str | None,
-        typer.Option(
-            "--from",
-            metavar="FILE",
-            help="A LeRobot calibration file instead: zeros, limits, directions, the gripper's ends. --pose is then "
-            "where the middles of all ranges are (default: all joints at 0); --port compares it with the servos.",
-        ),
-    ] = None,
+    pose: StandsIn = None,
+    gripper: GripperAt = None,
+    source: LeRobotFile = None,
     out: RobotOut = None,
     baud: Baud = None,
     no_reset: NoReset = False,
@@ -49,12 +59,6 @@ def zero(
     own memory is not touched.
     """
     import numpy as np
-
-    from armkin.model import units
-    from armkin.motors import motor_names
-    from armkin.robot_file import parse
-    from armkin.robot_file.catalogue import locate
-    from armkin.robot_file.edit import replaced
 
     arm = inputs.load(robot)
     board = board_link.board_of(arm, rehearsal=True)
@@ -79,24 +83,41 @@ def zero(
         name = machine.port.name
         counts, grips = board.zero(jaw)
     found = np.rint(np.array(counts) - arm.motor_gain @ q).astype(int).tolist()
-    names = motor_names(arm)
     if out is not None:
-        where: dict[tuple[str | int, ...], int] = {
-            ("joints", arm.joint_names.index(n), "drive", "zero"): z for n, z in zip(names, found, strict=True)
-        }
-        if grips is not None:
-            where["gripper", "zero"] = grips[1]
-        text = replaced(Path(locate(robot)).read_text(encoding="utf-8"), where)
-        parse(text, out)  # nothing is written that no command would take
-        with output.destination(out) as write:
-            write(text)
+        _write(arm, robot, found, grips, out)
     if out != "-":
         answer: dict[str, Any] = {**render.head(arm), "port": name, "counts": counts, "zero": found}
         answer["gripper_zero"] = None if grips is None else grips[1]
-        rows = [["joint", "count", "zero", "was"]]
-        for joint, count, new, motor in zip(names, counts, found, arm.motors, strict=True):
-            rows.append([joint, str(count), str(new), f"{motor.zero:g}"])
-        if grips is not None:
-            rows.append(["gripper", *map(str, grips), f"{board.gripper().zero:g}"])
         with output.destination(None) as write:
-            write(render.to_json(answer) + "\n" if json else render.table(rows) + "\n")
+            write(f"{render.to_json(answer)}\n" if json else _text(board, counts, found, grips))
+
+
+def _write(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[int, int] | None, out: str) -> None:
+    """The robot file with these zeros, all else as it stands."""
+    from armkin.motors import motor_names
+    from armkin.robot_file import parse
+    from armkin.robot_file.catalogue import locate
+    from armkin.robot_file.edit import replaced
+
+    where: dict[tuple[str | int, ...], int] = {
+        ("joints", arm.joint_names.index(name), "drive", "zero"): count
+        for name, count in zip(motor_names(arm), zeros, strict=True)
+    }
+    if grips is not None:
+        where["gripper", "zero"] = grips[1]
+    text = replaced(Path(locate(robot)).read_text(encoding="utf-8"), where)
+    parse(text, out)  # nothing is written that no command would take
+    with output.destination(out) as write:
+        write(text)
+
+
+def _text(board: Board, counts: Sequence[int], zeros: Sequence[int], grips: tuple[int, int] | None) -> str:
+    """What was counted, for people."""
+    from armkin.motors import motor_names
+
+    rows = [["joint", "count", "zero", "was"]]
+    for joint, count, new, motor in zip(motor_names(board.arm), counts, zeros, board.arm.motors, strict=True):
+        rows.append([joint, str(count), str(new), f"{motor.zero:g}"])
+    if grips is not None:
+        rows.append(["gripper", *map(str, grips), f"{board.gripper().zero:g}"])
+    return f"{render.table(rows)}\n"

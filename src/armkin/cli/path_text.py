@@ -1,0 +1,77 @@
+"""`armkin path` for people: the branches, what is touched, how much of the limits it takes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from armkin.cli import render
+
+if TYPE_CHECKING:
+    from armkin.motion.plan.path_plan import PathPlan
+
+
+def text(plan: PathPlan, found: dict[str, Any]) -> str:
+    """The plan for people."""
+    parts = [_heads(plan, found)]
+    if found["branches"]:
+        rows = [["branch at the start", "carries/mm", ""]]
+        rows += [[b["name"] or "unnamed", f"{b['carries_mm']:.3f}", b["ends_because"]] for b in found["branches"]]
+        parts.append(["", render.table(rows, left=(0, 2))])
+    if "clearance" in found:
+        parts.append([_clearance_text(found["clearance"])])
+    if found["limits"] is not None:
+        parts.append(_close_to_limits(plan, found))
+    return "\n".join(line for part in parts for line in part) + "\n"
+
+
+def _heads(plan: PathPlan, found: dict[str, Any]) -> list[str]:
+    """How long it is and takes, what is held, and which branch carries which part of it."""
+    from armkin.motion.branch_report import words
+
+    lines = [f"{plan.arm.name}: {found['length_mm']:.3f} mm of path"]
+    if found["duration_s"] is not None:
+        lines[0] += f", {found['duration_s']:.3f} s"
+        if found["segments"] is not None:
+            lines[0] += f", {found['segments']} segments"
+        if "approach" in found:
+            lines.append(f"  before it {found['approach']['duration_s']:.3f} s from where the arm stands to its start")
+    if plan.held:
+        lines.append(f"  held: {', '.join(f'{name} at {value:.4g}' for name, value in found['held'].items())}")
+    for run in found["runs"]:
+        names = ", then ".join(
+            f"{one['name'] or 'unnamed'}" + (f" from {one['s_mm']:.3f}" if k else "")
+            for k, one in enumerate(run["branches"])
+        )
+        lines.append(f"  {run['s_mm'][0]:.3f} to {run['s_mm'][1]:.3f} mm: {names}")
+    ends = [f"  at {one.s:.3f} mm: {words(plan.arm, one)}" for one in plan.reconfigurations]
+    return lines + list(dict.fromkeys(ends))  # several branches end there for one reason
+
+
+def _clearance_text(near: dict[str, Any]) -> str:
+    """Where the arm comes nearest to a keep-out."""
+    free = near["mm"]
+    if free is not None and free < 0:
+        return f"  at {near['s_mm']:.3f} mm: {near['body']} inside {near['with']}, {-free:.1f} mm deep"
+    size = "nothing counts" if free is None else f"at least {free:.1f} mm"
+    return f"  at {near['s_mm']:.3f} mm: {near['body']} nearest to {near['with']}, {size}"
+
+
+def _close_to_limits(plan: PathPlan, found: dict[str, Any]) -> list[str]:
+    """What it takes of the joints' limits, how near it comes to a singularity and to the path, what was changed."""
+    from armkin.motion.branch_report import closeness, passes
+
+    rows = [["share of", *plan.arm.joint_names]]
+    rows += [[key, *(f"{100 * share:.1f} %" for share in each.values())] for key, each in found["limits"].items()]
+    lines = ["", render.table(rows), ""]
+    worst = found["nearest_singularity"]
+    if worst is not None:
+        size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
+        lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
+    lines += [closeness(plan), *passes(plan)]
+    reduced = plan.reduced
+    if reduced.count:
+        lines.append(
+            f"{reduced.count} blend{'s' * (reduced.count > 1)} made smaller, to half of a side: "
+            f"the smallest from {reduced.wished:g} to {reduced.became:.4g} mm"
+        )
+    return lines
