@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -36,23 +36,7 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
     if tool is not None:
         file = file.with_tool(tool)
     base = transform(file.base.xyz, file.base.rpy)
-    end = transform(file.tool.xyz, file.tool.rpy)
-    before, after, frame = [], [], []
-    for joint in file.joints:
-        if file.convention == "screws":
-            pre, post, at = _screw(joint)
-        else:
-            pre, post, at = _dh(joint, modified=file.convention == "modified")
-        flip = FLIP if joint.sign < 0 else np.eye(4)
-        before.append(pre @ flip)
-        after.append(flip @ post)
-        frame.append(flip @ at)
-    if file.zero_pose is not None:
-        end = transform(file.zero_pose.xyz, file.zero_pose.rpy) @ end
-    link = [base @ before[0]]
-    link += [after[i] @ before[i + 1] for i in range(len(before) - 1)]
-    link.append(after[-1] @ end)
-
+    link, frame = _chain(file, base)
     unit = np.array([1.0 if j.type == "prismatic" else math.pi / 180 for j in file.joints])
     gain, bias = _motors(file, unit)
     return from_links(
@@ -64,9 +48,9 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
         base=base,
         limits=[(-math.inf, math.inf) if j.limits is None else j.limits for j in file.joints] * unit[:, None],
         home=np.array([j.home for j in file.joints]) * unit,
-        max_speed=np.array([math.nan if j.max_speed is None else j.max_speed for j in file.joints]) * unit,
-        max_accel=np.array([math.nan if j.max_accel is None else j.max_accel for j in file.joints]) * unit,
-        max_jerk=np.array([math.nan if j.max_jerk is None else j.max_jerk for j in file.joints]) * unit,
+        max_speed=_numbers(j.max_speed for j in file.joints) * unit,
+        max_accel=_numbers(j.max_accel for j in file.joints) * unit,
+        max_jerk=_numbers(j.max_jerk for j in file.joints) * unit,
         dh_sign=[float(j.sign) for j in file.joints],
         dh_theta=[0.0 if j.dh is None else math.radians(j.dh.theta) for j in file.joints],
         ratio=[j.ratio for j in file.joints],
@@ -90,12 +74,36 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
     )
 
 
+def _chain(file: RobotFile, base: Array) -> tuple[list[Array], list[Array]]:
+    """The constant links before, between and after the joints, and each joint's frame after its motion."""
+    end = transform(file.tool.xyz, file.tool.rpy)
+    if file.zero_pose is not None:
+        end = transform(file.zero_pose.xyz, file.zero_pose.rpy) @ end
+    before, after, frame = [], [], []
+    for joint in file.joints:
+        if file.convention == "screws":
+            pre, post, at = _screw(joint)
+        else:
+            pre, post, at = _dh(joint, modified=file.convention == "modified")
+        flip = FLIP if joint.sign < 0 else np.eye(4)
+        before.append(pre @ flip)
+        after.append(flip @ post)
+        frame.append(flip @ at)
+    between = [post @ pre for post, pre in zip(after[:-1], before[1:], strict=True)]
+    return [base @ before[0], *between, after[-1] @ end], frame
+
+
+def _numbers(values: Iterable[float | None]) -> Array:
+    """Numbers of which the file may leave some out, nan there."""
+    return np.array([math.nan if value is None else value for value in values])
+
+
 def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
     """The arm's fields about keep-outs; none where there are none, so that such an arm is built as ever."""
     if not file.keep_out and scene is None:
         return {}
-    radii = [math.nan if body is None else body.radius for body in (file.base.body, *(j.body for j in file.joints))]
-    fields: dict[str, Any] = {"body_radius": np.array(radii), "keep_out": file.keep_out, "clearance": file.clearance}
+    radii = _numbers(body and body.radius for body in (file.base.body, *(j.body for j in file.joints)))
+    fields: dict[str, Any] = {"body_radius": radii, "keep_out": file.keep_out, "clearance": file.clearance}
     if scene is not None:
         fields["keep_out"] = (*file.keep_out, *scene.keep_out)
         fields["clearance"] = max(file.clearance, scene.clearance)

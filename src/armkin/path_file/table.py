@@ -38,43 +38,33 @@ def parse(raw: bytes, name: str) -> PathFile:
     if any(_value(cell) is None for cell in rows[0][1]):
         kept = [i for i, cell in enumerate(rows[0][1]) if cell.strip() not in _OF_ANSWERS]
         rows = [(number, [row[i] for i in kept if i < len(row)]) for number, row in rows]
-        header = [_bare(cell) for cell in rows.pop(0)[1]]
-        doubled = sorted({key for key in header if header.count(key) > 1})
-        if doubled:
-            raise PathFileError(f"{name}:1: column {doubled[0]} stands twice in the header", file=name)
-        strange = [key for key in header if key not in _TARGETS + _OPTIONS]
-        if strange and len(strange) < len(header) - sum(key in _OPTIONS for key in header):
-            raise PathFileError(
-                f"{name}:1: column {strange[0] or 'without a name'} is unknown beside those of a target: "
-                f"{', '.join(_TARGETS + _OPTIONS)}", file=name, line=1,
-            )  # fmt: skip
+        header = _header(rows.pop(0)[1], name)
     if len(rows) > MOST_POINTS:
         raise PathFileError(
             f"{name}: has more than {MOST_POINTS} rows, and a path no more: give it in parts", file=name
         )
-    moves: list[Move] = []
-    spared = {i for i, key in enumerate(header or ()) if key in _OPTIONS}
-    for number, row in rows:
-        values = [_value(cell) for cell in row]
-        empty = {i for i in spared if i < len(row) and not row[i].strip()}
-        bad = [i for i, v in enumerate(values) if (v is None or abs(v) > LARGEST) and i not in empty]
-        if bad or len(values) != len(header or values):
-            wrong = row[bad[0]] if bad else None
-            what = (
-                f"'{wrong[:40]}' is {'no number' if values[bad[0]] is None else f'beyond {LARGEST:g}'}"
-                if wrong is not None
-                else f"{len(values)} cells, {len(header or [])} columns"
-            )
-            raise PathFileError(f"{name}:{number}: {what}", file=name, line=number)
-        keys = None if header is None else [key for i, key in enumerate(header) if i not in empty]
-        moves.append(_move(keys, [v for v in values if v is not None], first=not moves, where=(name, number)))
-    if not moves:
+    if not rows:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
+    moves = [_move(header, row, first=not k, where=(name, number)) for k, (number, row) in enumerate(rows)]
     places: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}
     smooth = moves[0].point is not None and "blend" not in (header or ())
     return PathFile.model_construct(moves=moves, corners="tolerance" if smooth else None).read_from(
         Source(name, places, rows=True)
     )
+
+
+def _header(cells: list[str], name: str) -> list[str]:
+    """The columns' names: of targets or of joints, each once."""
+    header = [_bare(cell) for cell in cells]
+    if doubled := sorted({key for key in header if header.count(key) > 1}):
+        raise PathFileError(f"{name}:1: column {doubled[0]} stands twice in the header", file=name)
+    strange = [key for key in header if key not in _TARGETS + _OPTIONS]
+    if strange and len(strange) < len(header) - sum(key in _OPTIONS for key in header):
+        raise PathFileError(
+            f"{name}:1: column {strange[0] or 'without a name'} is unknown beside those of a target: "
+            f"{', '.join(_TARGETS + _OPTIONS)}", file=name, line=1,
+        )  # fmt: skip
+    return header
 
 
 def _filled(text: str, name: str) -> list[tuple[int, list[str]]]:
@@ -92,8 +82,25 @@ def _filled(text: str, name: str) -> list[tuple[int, list[str]]]:
         raise PathFileError(f"{name}:{line}: no row of numbers: {error}", file=name, line=line) from None
 
 
-def _move(header: list[str] | None, values: list[float], *, first: bool, where: tuple[str, int]) -> Move:
-    named = dict(zip(header, values, strict=True)) if header else {}
+def _named(header: list[str] | None, row: list[str], where: tuple[str, int]) -> dict[str, float]:
+    """A row's numbers by their columns, by their places without a header; an empty cell of an option is none."""
+    values: dict[str, float] = {}
+    for i, cell in enumerate(row):
+        value, key = _value(cell), f"{i}" if header is None else header[i] if i < len(header) else ""
+        if value is None and key in _OPTIONS and not cell.strip():
+            continue
+        if value is None or abs(value) > LARGEST:
+            what = "is no number" if value is None else f"is beyond {LARGEST:g}"
+            raise PathFileError(f"{where[0]}:{where[1]}: '{cell[:40]}' {what}", file=where[0], line=where[1])
+        values[key] = value
+    if len(row) != len(header or row):
+        what = f"{len(row)} cells, {len(header or [])} columns"
+        raise PathFileError(f"{where[0]}:{where[1]}: {what}", file=where[0], line=where[1])
+    return values
+
+
+def _move(header: list[str] | None, row: list[str], *, first: bool, where: tuple[str, int]) -> Move:
+    named = _named(header, row, where)
     extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
     if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < LEAST_TOOL_SPEED:
         raise PathFileError(
@@ -102,7 +109,7 @@ def _move(header: list[str] | None, values: list[float], *, first: bool, where: 
     if header and not set(named) & set(_TARGETS):
         return Move.model_construct(None, joint=named, **extra)
     # The header's order is kept; the planner puts a target's labels in place.
-    target = [named[key] for key in sorted(named, key=_order)] if header else values
+    target = [named[key] for key in sorted(named, key=_order)] if header else list(named.values())
     return Move.model_construct(None, **{"point" if first else "line": target}, **extra)
 
 

@@ -173,35 +173,48 @@ def _drive(drive: Drive) -> Iterator[Problem]:
         message = f"a {what} has no {key}; it takes {', '.join(own) or 'open and closed alone'}"
         kind, named = ("bus", "bus servo") if key in ("id", "counts") else ("servo", "servo")
         yield (key,), message + (f"; for a {named} write kind: {kind}" if drive.kind == "stepper" else "")
-    if drive.kind == "spindle":
-        if not isinstance(drive, Gripper):
-            yield ("kind",), "a spindle is GRBL's M3 output, which turns no joint; it can be the gripper's"
-        if drive.axis is not None or drive.invert:
-            yield ("axis" if drive.axis is not None else "invert",), "a spindle has none: M3 is GRBL's one such output"
-        return
-    if drive.kind == "bus":
-        if missing := [key for key in ("id", "counts") if getattr(drive, key) is None]:
-            yield (), f"a bus servo needs {' and '.join(missing)}, for example id: 1, counts: 4096, zero: 2048"
-        if drive.axis is not None:
-            yield ("axis",), "a bus servo has no axis; its place on the bus is id"
-        return
-    if drive.kind == "stepper":
-        missing = [key for key in ("full_steps", "microsteps") if getattr(drive, key) is None]
-        if missing and not any(key in given for key in _SERVO_KEYS):
-            example = "for example full_steps: 200, microsteps: 16 (an RC servo: kind: servo)"
-            yield (), f"a stepper needs {' and '.join(missing)}, {example}"
-        elif not missing and not 1e-3 <= drive.pulses_per_turn() <= 1e9:
-            yield (), f"{drive.pulses_per_turn():g} pulses per turn; 0.001 to 1e9 can be right"
-        return
-    missing = [key for key in ("travel", "pulse_us") if getattr(drive, key) is None]
-    if missing:
-        example = "travel: [0, 180], pulse_us: [500, 2500]"
-        yield (), f"a servo needs {' and '.join(missing)}, for example {example}"
+    yield from _OF_DRIVES[drive.kind](drive)
+
+
+def _spindle(drive: Drive) -> Iterator[Problem]:
+    if not isinstance(drive, Gripper):
+        yield ("kind",), "a spindle is GRBL's M3 output, which turns no joint; it can be the gripper's"
+    if drive.axis is not None or drive.invert:
+        yield ("axis" if drive.axis is not None else "invert",), "a spindle has none: M3 is GRBL's one such output"
+
+
+def _bus_servo(drive: Drive) -> Iterator[Problem]:
+    if missing := _missing(drive, "id", "counts"):
+        yield (), f"a bus servo needs {missing}, for example id: 1, counts: 4096, zero: 2048"
+    if drive.axis is not None:
+        yield ("axis",), "a bus servo has no axis; its place on the bus is id"
+
+
+def _stepper(drive: Drive) -> Iterator[Problem]:
+    missing = _missing(drive, "full_steps", "microsteps")
+    if missing and not any(key in drive.model_fields_set for key in _SERVO_KEYS):
+        example = "for example full_steps: 200, microsteps: 16 (an RC servo: kind: servo)"
+        yield (), f"a stepper needs {missing}, {example}"
+    elif not missing and not 1e-3 <= drive.pulses_per_turn() <= 1e9:
+        yield (), f"{drive.pulses_per_turn():g} pulses per turn; 0.001 to 1e9 can be right"
+
+
+def _servo(drive: Drive) -> Iterator[Problem]:
+    if missing := _missing(drive, "travel", "pulse_us"):
+        yield (), f"a servo needs {missing}, for example travel: [0, 180], pulse_us: [500, 2500]"
     for key in ("travel", "pulse_us"):
         pair = getattr(drive, key)
         if pair is not None and pair[0] >= pair[1]:
             hint = "for a servo that turns the other way write invert: true"
             yield (key,), f"must go up, [{pair[1]:g}, {pair[0]:g}]; {hint}"
+
+
+_OF_DRIVES = {"spindle": _spindle, "bus": _bus_servo, "stepper": _stepper, "servo": _servo}
+
+
+def _missing(drive: Drive, *keys: str) -> str:
+    """Those of the keys that are not given: a and b."""
+    return " and ".join(key for key in keys if getattr(drive, key) is None)
 
 
 def _bus_reach(drive: Drive, joint: Joint) -> Iterator[Problem]:

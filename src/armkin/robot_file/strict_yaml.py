@@ -177,6 +177,14 @@ class _Node:
     def value_path(self) -> Path:
         return (*self.path, self.key if self.mapping and self.key is not None else len(self.items))
 
+    def add(self, value: Any) -> None:
+        """The value of the key that stands before it, or the next item."""
+        if self.mapping:
+            self.items[self.key] = value
+            self.key = None
+        else:
+            self.items.append(value)
+
 
 def _build(events: Iterator[Any], kind: Kind) -> Document:
     lines: dict[Path, int] = {}
@@ -190,14 +198,7 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
             if documents > 1:
                 raise StrictYamlError(line, f"a second document begins here; a {kind.name} is one document")
             continue
-        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
-            mark = "*" if isinstance(event, yaml.AliasEvent) else "&"
-            what = f"{mark}{shown(event.anchor)}: anchors and aliases are refused, as they can unfold"
-            hint = f"write the value out, or quote text that begins with {mark}"
-            raise StrictYamlError(line, f"{what} without bound; {hint}")
-        if getattr(event, "tag", None) is not None:
-            what = f"tag {shown(event.tag)} is refused: values are plain numbers, text, lists and mappings"
-            raise StrictYamlError(line, f"{what}; remove the tag")
+        _refuse_what_unfolds(event, line)
         parent = stack[-1] if stack else None
         awaits_key = parent is not None and parent.mapping and parent.key is None
 
@@ -224,20 +225,34 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
 
         if len(lines) > kind.values:
             raise StrictYamlError(line, f"more than {kind.values} values; no {kind.name} has so many")
-        if not stack:
-            root = value
-            if not isinstance(root, dict):
-                found = "a list" if isinstance(root, tuple) else f"only the text {shown(str(root))}"
-                what = f"{found}; a {kind.name} is a mapping: {kind.mapping}"
-                raise StrictYamlError(lines[()], f"{what} (a space follows each colon)")
-        elif stack[-1].mapping:
-            stack[-1].items[stack[-1].key] = value
-            stack[-1].key = None
+        if stack:
+            stack[-1].add(value)
         else:
-            stack[-1].items.append(value)
+            root = _mapping(value, lines, kind)
     if root is None:
         raise StrictYamlError(0, kind.empty)
     return Document(root, lines)
+
+
+def _refuse_what_unfolds(event: Any, line: int) -> None:
+    """Raise StrictYamlError for an anchor, an alias or a tag."""
+    if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
+        mark = "*" if isinstance(event, yaml.AliasEvent) else "&"
+        what = f"{mark}{shown(event.anchor)}: anchors and aliases are refused, as they can unfold"
+        hint = f"write the value out, or quote text that begins with {mark}"
+        raise StrictYamlError(line, f"{what} without bound; {hint}")
+    if getattr(event, "tag", None) is not None:
+        what = f"tag {shown(event.tag)} is refused: values are plain numbers, text, lists and mappings"
+        raise StrictYamlError(line, f"{what}; remove the tag")
+
+
+def _mapping(value: Any, lines: dict[Path, int], kind: Kind) -> dict[str, Any]:
+    """The document's value, which is a mapping."""
+    if isinstance(value, dict):
+        return value
+    found = "a list" if isinstance(value, tuple) else f"only the text {shown(str(value))}"
+    what = f"{found}; a {kind.name} is a mapping: {kind.mapping}"
+    raise StrictYamlError(lines[()], f"{what} (a space follows each colon)")
 
 
 def _key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
