@@ -32,8 +32,6 @@ def goals(
     tool: str | None = None,
 ) -> tuple[Arm, Goals | Stream]:
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
-    import numpy as np
-
     given = [name for name, what in (("Q...", q), ("--target", target), ("--batch", batch)) if what]
     if target is not None and q and robot is not None and batch is None:
         inputs.check_commas(inputs.load(robot), task, target, q)
@@ -47,26 +45,41 @@ def goals(
         raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
     arm = inputs.load(robot, scene, tool)
     if target is not None:
-        from armkin.inverse.answers.rounding import printed
-        from armkin.inverse.tasks.fitting import task_for
-
-        what = task_for(arm, task)
-        values = inputs.target_list(arm, what, target)
-        goal = targets_in(what.labels, np.array([values]))
-        close = None if near is None else inputs.joint_list(arm, near, "--near")
-        shown = [[decimals(word) for word in target.split(",")]]
-        rounding = printed(label_units(what.labels), np.array([values]), arm.reach, shown)
-        return arm, Goals(None, [1], goal, what.name, branch, lock_and_sweep.locks(arm, lock), close, rounding)
-    if batch == "-":
-        from armkin.board.planner import Stream
-
-        return arm, Stream(arm, streamed_rows(batch, arm.joint_names, arm.name, units.poses_out(arm)))
+        return arm, _of_target(arm, target, task, branch, lock, near)
     if batch is not None:
-        rows = list(streamed_rows(batch, arm.joint_names, arm.name, units.poses_out(arm)))
-        if not rows:
-            raise UsageError(f"{batch} has no rows: it needs one of {','.join(arm.joint_names)} per waypoint")
-        return arm, _checked(arm, [number for number, _ in rows], [values for _, values in rows])
+        return arm, _of_rows(arm, batch)
     return arm, _checked(arm, [], [inputs.joints(arm, q)])
+
+
+def _of_target(
+    arm: Arm, target: str, task: str | None, branch: str | None, lock: Sequence[str] | None, near: str | None
+) -> Goals:
+    """`--target`, which is solved when it is known where the arm stands."""
+    import numpy as np
+
+    from armkin.inverse.answers.rounding import printed
+    from armkin.inverse.tasks.fitting import task_for
+
+    what = task_for(arm, task)
+    values = np.array([inputs.target_list(arm, what, target)])
+    close = None if near is None else inputs.joint_list(arm, near, "--near")
+    shown = [[decimals(word) for word in target.split(",")]]
+    rounding = printed(label_units(what.labels), values, arm.reach, shown)
+    held = lock_and_sweep.locks(arm, lock)
+    return Goals(None, [1], targets_in(what.labels, values), what.name, branch, held, close, rounding)
+
+
+def _of_rows(arm: Arm, batch: str) -> Goals | Stream:
+    """`--batch`: all rows of a file, or those of standard input as they come."""
+    from armkin.board.planner import Stream
+
+    rows = streamed_rows(batch, arm.joint_names, arm.name, units.poses_out(arm))
+    if batch == "-":
+        return Stream(arm, rows)
+    numbered = list(rows)
+    if not numbered:
+        raise UsageError(f"{batch} has no rows: it needs one of {','.join(arm.joint_names)} per waypoint")
+    return _checked(arm, [number for number, _ in numbered], [values for _, values in numbered])
 
 
 _NEIGHBOURS = 2.5  # pulses beside the exact value that `pulses --best` may choose

@@ -42,41 +42,14 @@ _FUNCTIONS = {name: getattr(math, name) for name in ("sqrt", "cbrt", "tan", "ata
 DEEPEST = 20  # brackets within brackets that a line may have: Python's parser takes 200
 
 Value = tuple[int, tuple[int, ...]]  # a node, by its id, on one of its branches
+Step = tuple[Value, str, list[Value | str]]  # a value: the operation that it is the result of, and on what
 
 
 def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
     """Branch axes unrolled, one line a value that is used more than once: a function of the inputs as numbers."""
-    same: dict[Value, Value | str] = {}
-
-    def value(x: Any, index: tuple[int, ...]) -> Value | str:
-        """What an argument is on a branch: a value, or a constant's digits."""
-        axes = axes_of(x)
-        at = tuple(0 if size == 1 else i for size, i in zip(axes, index[-len(axes) :], strict=True)) if axes else ()
-        if isinstance(x, Node):
-            return same.get(one := (id(x), at), one)
-        return repr(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
-
-    todo: list[tuple[Value, str, list[Value | str]]] = []
-    minus: dict[Value | str, Value | str] = {}  # negated values
-    for node in recording.nodes:
-        for index in np.ndindex(*node.axes):
-            if node.op in FLIPS:
-                same[id(node), index] = value(node.args[0], flipped(node.op, index, node.axes))
-                continue
-            op, args = node.op, [value(x, index) for x in node.args]
-            if op == "multiply" and "1.0" in args:  # a sign of branches
-                same[id(node), index] = args[1 - args.index("1.0")]
-                continue
-            if op == "multiply" and "-1.0" in args:
-                op, args = "negative", [args[1 - args.index("-1.0")]]
-            if op == "negative":
-                minus[id(node), index] = args[0]
-            if op == "add" and (negated := next((k for k in (0, 1) if args[k] in minus), None)) is not None:
-                op, args = "subtract", [args[1 - negated], minus[args[negated]]]
-            todo.append(((id(node), index), op, args))
-    outputs = [[value(x, index) for index in np.ndindex(*axes_of(x))] for x in recording.outputs]
+    steps, outputs = _unrolled(recording)
     uses: Counter[Value | str] = Counter(x for every in outputs for x in every)
-    for result, op, args in reversed(todo):
+    for result, op, args in reversed(steps):
         if uses[result]:
             uses.update(args * 2 if op == "sign" else args)
     inputs: list[Value] = [(id(node), ()) for node in recording.inputs]
@@ -86,7 +59,7 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
     def text(x: Value | str) -> tuple[str, int]:
         return (x, 0) if isinstance(x, str) else texts[x]
 
-    for result, op, args in todo:
+    for result, op, args in steps:
         if not uses[result]:
             continue
         shown = [text(x) for x in args]
@@ -99,10 +72,43 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
             texts[result] = name, 0
     returned = []
     for x, every in zip(recording.outputs, outputs, strict=True):
-        shown = [text(v) for v in every]
-        joined = ", ".join(t for t, _ in shown)
+        joined = ", ".join(text(v)[0] for v in every)
         returned.append(f"({joined},)" if axes_of(x) else joined)
     return function_of([texts[x][0] for x in inputs], lines, returned, dict(_FUNCTIONS))
+
+
+def _unrolled(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
+    """The operations on single branches, those on signs of branches left out; and what each output is on each."""
+    same: dict[Value, Value | str] = {}
+
+    def value(x: Any, index: tuple[int, ...]) -> Value | str:
+        """What an argument is on a branch: a value, or a constant's digits."""
+        axes = axes_of(x)
+        at = tuple(0 if size == 1 else i for size, i in zip(axes, index[-len(axes) :], strict=True)) if axes else ()
+        if isinstance(x, Node):
+            return same.get(one := (id(x), at), one)
+        return repr(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
+
+    steps: list[Step] = []
+    minus: dict[Value | str, Value | str] = {}  # negated values
+    for node in recording.nodes:
+        for index in np.ndindex(*node.axes):
+            result = id(node), index
+            if node.op in FLIPS:
+                same[result] = value(node.args[0], flipped(node.op, index, node.axes))
+                continue
+            op, args = node.op, [value(x, index) for x in node.args]
+            if op == "multiply" and "1.0" in args:  # a sign of branches
+                same[result] = args[1 - args.index("1.0")]
+                continue
+            if op == "multiply" and "-1.0" in args:
+                op, args = "negative", [args[1 - args.index("-1.0")]]
+            if op == "negative":
+                minus[result] = args[0]
+            if op == "add" and (negated := next((k for k in (0, 1) if args[k] in minus), None)) is not None:
+                op, args = "subtract", [args[1 - negated], minus[args[negated]]]
+            steps.append((result, op, args))
+    return steps, [[value(x, index) for index in np.ndindex(*axes_of(x))] for x in recording.outputs]
 
 
 def function_of(

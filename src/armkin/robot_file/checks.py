@@ -15,6 +15,7 @@ from armkin.board_kinds import BOARDS
 from armkin.robot_file.model import Gripper, Triple, dot
 
 if TYPE_CHECKING:
+    from armkin.board_kinds import ForeignBoard
     from armkin.robot_file.model import Board, Drive, Joint, Motor, RobotKeys
 
 Path = tuple[str | int, ...]
@@ -333,43 +334,45 @@ def _gripper(robot: RobotKeys) -> Iterator[Problem]:
 
 def _axes(robot: RobotKeys) -> Iterator[Problem]:
     """Each axis is used once, and the board has it."""
+    board = robot.board
+    foreign = None if board is None else installed_kinds.foreign(board.kind)
     drives: list[tuple[Path, Drive]] = [
         (("joints", i, "drive"), joint.drive) for i, joint in enumerate(robot.joints) if joint.drive is not None
     ]
     drives += [(("motors", i), motor) for i, motor in enumerate(robot.motors or ())]
-    if robot.gripper is not None:
-        drives.append((("gripper",), robot.gripper))
+    if robot.gripper is not None and (foreign is None or robot.gripper.kind == foreign.motors):
+        drives.append((("gripper",), robot.gripper))  # one of another kind is not the board's: `armkin grip` refuses
     used: set[str] = set()
     numbers: set[int] = set()
     for path, drive in drives:
-        foreign = None if robot.board is None else installed_kinds.foreign(robot.board.kind)
-        if drive.kind == "bus" and robot.board is not None and robot.board.kind in BOARDS:
-            yield (*path, "kind"), f"{robot.board.kind} has no bus; leave board out, or name one that has"
-        if foreign is not None and path[0] == "gripper" and drive.kind != foreign.motors:
-            continue  # a gripper of another kind is not this board's: `armkin grip` refuses
+        if board is not None and drive.kind == "bus" and board.kind in BOARDS:
+            yield (*path, "kind"), f"{board.kind} has no bus; leave board out, or name one that has"
         if foreign is not None and drive.kind != foreign.motors:
             yield (*path, "kind"), f"{foreign.kind} takes drives of kind {foreign.motors} alone, not {drive.kind}"
         if drive.id is not None:
             if drive.id in numbers:
                 yield (*path, "id"), f"{drive.id} is used already; each servo has its own number on the bus"
             numbers.add(drive.id)
-        if drive.axis is None:
-            continue
-        if drive.axis in used:
-            yield (*path, "axis"), f"{drive.axis} is used already; each motor has its own axis"
-        used.add(drive.axis)
-        if robot.board is None:
-            continue
-        if foreign is not None:
-            allowed = foreign.axes
-        else:
-            board = BOARDS[robot.board.kind]
-            allowed = board.steppers if drive.kind == "stepper" else board.servos
-        if drive.axis not in allowed:
-            what = f"{robot.board.kind} has no {drive.kind} axis {drive.axis}"
-            yield (*path, "axis"), f"{what}; it has {', '.join(allowed) or f'no {drive.kind}s at all'}"
-    if robot.board is not None:
-        yield from _board(robot, robot.board)
+        if drive.axis is not None:
+            if drive.axis in used:
+                yield (*path, "axis"), f"{drive.axis} is used already; each motor has its own axis"
+            used.add(drive.axis)
+            yield from _lacks_axis(board, foreign, drive, path)
+    if board is not None:
+        yield from _board(robot, board)
+
+
+def _lacks_axis(board: Board | None, foreign: ForeignBoard | None, drive: Drive, path: Path) -> Iterator[Problem]:
+    """The board has no such axis."""
+    if board is None:
+        return
+    if foreign is not None:
+        allowed = foreign.axes
+    else:
+        allowed = BOARDS[board.kind].steppers if drive.kind == "stepper" else BOARDS[board.kind].servos
+    if drive.axis not in allowed:
+        what = f"{board.kind} has no {drive.kind} axis {drive.axis}"
+        yield (*path, "axis"), f"{what}; it has {', '.join(allowed) or f'no {drive.kind}s at all'}"
 
 
 def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:

@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass
 
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.protocol import Error, Image, Segment
+from armkin.board.firmware.wire.protocol import AxisImage, Error, Image, Segment
 from armkin.board_kinds import Board
 
 
@@ -55,30 +55,33 @@ def axes_of(mask: int) -> list[int]:
     return [i for i in range(16) if mask >> i & 1]
 
 
+_FAR = 2**30
+
+
 def image_valid(image: Image, board: Board) -> bool:
     """Whether a board may take a configuration: every field in its range."""
-    far = 2**30
     if len(image.axes) != len(board.axes) or len(image.rows) > board.rows:
         return False
     if image.step_high > 80 or image.step_low > 50 or image.dir_setup > 100:
         return False
-    for i, axis in enumerate(image.axes):
-        servo = board.servo_mask >> i & 1
-        if axis.used and not (
-            -far <= axis.lower <= axis.home <= axis.upper <= far
-            and axis.max_rate > 0
-            and 0 < axis.max_accel < 2**24
-            and (not servo or 400 <= axis.lower <= axis.upper <= 2600)
-        ):
-            return False
-    for guard in image.guards:
-        if any(w and not axis.used for w, axis in zip(guard.weight, image.axes, strict=True)):
+    if not all(_axis_valid(axis, servo=board.servo_mask >> i & 1) for i, axis in enumerate(image.axes)):
+        return False
+    for weighted in (*image.guards, *image.rows):
+        if any(w and not axis.used for w, axis in zip(weighted.weight, image.axes, strict=True)):
             return False
     for row in image.rows:
-        if any(w and not axis.used for w, axis in zip(row.weight, image.axes, strict=True)):
-            return False
         reach = zip(row.weight, image.axes, strict=True)
         most = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
-        if row.lower > row.upper or most >= far:
+        if row.lower > row.upper or most >= _FAR:
             return False
     return True
+
+
+def _axis_valid(axis: AxisImage, *, servo: int) -> bool:
+    """Whether an axis that is used has limits around its home, rates that it can keep, and a servo's pulses."""
+    return not axis.used or (
+        -_FAR <= axis.lower <= axis.home <= axis.upper <= _FAR
+        and axis.max_rate > 0
+        and 0 < axis.max_accel < 2**24
+        and (not servo or 400 <= axis.lower <= axis.upper <= 2600)
+    )
