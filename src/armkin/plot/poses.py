@@ -64,17 +64,10 @@ def plot_poses(
         track = None if alone or names is not None else fk(arm, _way(poses))[:, :3, 3]
         drawing = _Drawing(arm, figure, bones, view, track)
         drawing.keep_outs()
-        # Branches may lie on each other: the first one, which is the best, comes last and is the thinnest.
-        widths = 2.4 + np.minimum(0.5, 3.0 / len(shown)) * np.arange(len(shown)) + _twins(bones)
-        several = list(enumerate(bones)) if names is None else sorted(enumerate(bones), key=lambda k: -widths[k[0]])
-        for k, bone in several:
-            if alone:
-                drawing.single(bone, _HIT if hit[k] else PALETTE[0])
-            elif names is None:
-                label = legend[k] if k < 1 else legend[1] if k == len(shown) - 1 else None
-                drawing.arm(bone, _HIT if hit[k] else _along(k / (len(shown) - 1)), label, 2.6, dashed=not legal[k])
-            else:
-                drawing.arm(bone, _HIT if hit[k] else _apart(k, len(shown)), legend[k], widths[k], dashed=not legal[k])
+        if alone:
+            drawing.single(bones[0], _HIT if hit[0] else PALETTE[0])
+        else:
+            _several(drawing, bones, legend, legal, hit, in_turn=names is None)
         if track is not None:
             drawing.track(track)
         if with_frames:
@@ -82,16 +75,40 @@ def plot_poses(
                 drawing.frames(pose)
         if target is not None:
             drawing.mark(np.asarray(target, dtype=float))
-        notes = []
-        if alone:
-            notes.append("tip ({:.1f}, {:.1f}, {:.1f}) mm".format(*np.round(bones[0].tip, 1) + 0.0))
-            notes += [] if legal[0] else ["outside the joint limits"]
-            notes += [hit[0]] if hit[0] else []
+        notes = _of_one(bones[0], legal[0], hit[0]) if alone else []
         if with_frames:
             notes.append("frames: x red, y green" + ("" if drawing.dimensions == 2 else ", z blue"))
         if alone:
             drawing.name_joints(bones[0])
         drawing.finish(arm.name if title is None else title, ";  ".join(notes), None if alone else legend)
+
+
+def _several(
+    drawing: _Drawing,
+    bones: list[Skeleton],
+    legend: Sequence[str],
+    legal: Sequence[bool],
+    hit: Sequence[str],
+    *,
+    in_turn: bool,
+) -> None:
+    """Poses one after another, of which start and end are named, or branches: all are."""
+    last = len(bones) - 1
+    if in_turn:
+        for k, bone in enumerate(bones):
+            label = legend[0] if k == 0 else legend[1] if k == last else None
+            drawing.arm(bone, _HIT if hit[k] else _along(k / last), label, 2.6, dashed=not legal[k])
+        return
+    # Branches may lie on each other: the first one, which is the best, comes last and is the thinnest.
+    widths = 2.4 + np.minimum(0.5, 3.0 / len(bones)) * np.arange(len(bones)) + _twins(bones)
+    for k in sorted(range(len(bones)), key=lambda k: -widths[k]):
+        drawing.arm(bones[k], _HIT if hit[k] else _apart(k, len(bones)), legend[k], widths[k], dashed=not legal[k])
+
+
+def _of_one(bone: Skeleton, legal: bool, hit: str) -> list[str]:
+    """What is noted of a single pose."""
+    tip = "tip ({:.1f}, {:.1f}, {:.1f}) mm".format(*np.round(bone.tip, 1) + 0.0)
+    return [tip, *(["outside the joint limits"] if not legal else []), *([hit] if hit else [])]
 
 
 def _checked(arm: Arm, q: ArrayLike, names: Sequence[str] | None) -> Array:
