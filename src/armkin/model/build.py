@@ -102,7 +102,7 @@ def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
     """The arm's fields about keep-outs; none where there are none, so that such an arm is built as ever."""
     if not file.keep_out and scene is None:
         return {}
-    radii = _numbers(body and body.radius for body in (file.base.body, *(j.body for j in file.joints)))
+    radii = _numbers(body.radius if body else None for body in (file.base.body, *(j.body for j in file.joints)))
     fields: dict[str, Any] = {"body_radius": radii, "keep_out": file.keep_out, "clearance": file.clearance}
     if scene is not None:
         fields["keep_out"] = (*file.keep_out, *scene.keep_out)

@@ -66,8 +66,8 @@ def image_valid(image: Image, board: Board) -> bool:
         return False
     if not all(_axis_valid(axis, servo=board.servo_mask >> i & 1) for i, axis in enumerate(image.axes)):
         return False
-    for weighted in (*image.guards, *image.rows):
-        if any(w and not axis.used for w, axis in zip(weighted.weight, image.axes, strict=True)):
+    for weights in (*(guard.weight for guard in image.guards), *(row.weight for row in image.rows)):
+        if any(w and not axis.used for w, axis in zip(weights, image.axes, strict=True)):
             return False
     for row in image.rows:
         reach = zip(row.weight, image.axes, strict=True)
