@@ -69,11 +69,11 @@ if TYPE_CHECKING:
     from armkin.motors import joints as joints
     from armkin.motors import pulses as pulses
     from armkin.motors import rounding as rounding
-    from armkin.reachability.map import Reach as Reach
-    from armkin.reachability.map import reach as reach
     from armkin.reachability.place import Place as Place
     from armkin.reachability.place import place as place
-    from armkin.reachability.survey import workspace as workspace
+    from armkin.reachability.reach_map import Reach as Reach
+    from armkin.reachability.reach_map import reach as reach
+    from armkin.reachability.workspace_survey import workspace as workspace
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
 _HOME = {
@@ -114,11 +114,11 @@ _HOME = {
     "joints": "motors",
     "pulses": "motors",
     "rounding": "motors",
-    "Reach": "reachability.map",
-    "reach": "reachability.map",
+    "Reach": "reachability.reach_map",
+    "reach": "reachability.reach_map",
     "Place": "reachability.place",
     "place": "reachability.place",
-    "workspace": "reachability.survey",
+    "workspace": "reachability.workspace_survey",
 }
 
 __all__ = [*_HOME, "__version__"]

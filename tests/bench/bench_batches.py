@@ -46,7 +46,7 @@ def targets(arm: armkin.Arm, kind: str, count: int) -> np.ndarray | None:
         yaw = q[:, 0]
         T[:, :3, :3] = np.diag([1.0, -1.0, -1.0])
         T[:, 0, 0], T[:, 0, 1], T[:, 1, 0], T[:, 1, 1] = np.cos(yaw), np.sin(yaw), np.sin(yaw), -np.cos(yaw)
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
     from armkin.inverse.tasks.task import targets_of
 
     return np.asarray(targets_of(task_for(arm), T, q))

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.targets import targets_out
 

@@ -283,7 +283,7 @@ def targets(count: int, rng: np.random.Generator) -> None:
 def goals(arm: Arm, q: Array) -> Array:
     """Targets of the arm's own task."""
     from armkin.forward import fk
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
     from armkin.inverse.tasks.task import targets_of
 
     return targets_of(task_for(arm), fk(arm, q), q)

@@ -26,7 +26,7 @@ import brute
 from lines import random_line
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.motion.branches.branch_chains import Chain, chains, fewest
 from armkin.motion.branches.linked_branches import linked
 from armkin.motion.plan.path_plan import PathPlan

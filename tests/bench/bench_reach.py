@@ -64,7 +64,7 @@ def place(solve: Any = armkin.ik) -> bool:
     """400 poses from 37 x 37 places and 72 yaws, every shipped arm with a closed form; 1,000 places asked directly."""
     from armkin.inverse.solvers.recognise import solver
     from armkin.inverse.tasks.task import targets_of
-    from armkin.reachability import from_place
+    from armkin.reachability import place_targets
     from armkin.robot_file import catalogue
 
     total, different, arms = 0.0, 0, 0
@@ -86,9 +86,9 @@ def place(solve: Any = armkin.ik) -> bool:
         took = time.process_time() - began
         total, arms = total + took, arms + 1
         print(f"{name:16}{took:.2f} s", flush=True)
-        asked = from_place.Question(arm, task, targets, 72, np.pi / 36, 0.0)
+        asked = place_targets.Question(arm, task, targets, 72, np.pi / 36, 0.0)
         for i, j, k in rng.integers(0, found.reached.shape, (1000 // 20, 3)).tolist():
-            there = from_place.legal_from(asked, np.array([found.x[i], found.y[j]]), float(found.yaw[k]))
+            there = place_targets.legal_from(asked, np.array([found.x[i], found.y[j]]), float(found.yaw[k]))
             different += int(there.sum()) != found.reached[i, j, k]
     print(f"place     {arms} arms in {total:.1f} s (bar {PLACE:g}), {different} of {50 * arms:,} places differ")
     return total <= PLACE and not different
@@ -103,7 +103,7 @@ def compiled() -> bool:
 
 def unseen(seed: int = 1, poses: int = 10**6) -> bool:
     """Cells of random grids by arcs, against `ik` of each of their poses."""
-    from armkin.reachability.answers import TURN, Question, answered
+    from armkin.reachability.cell_answers import TURN, Question, answered
     from armkin.reachability.cells import Grid
 
     rng, total, different = np.random.default_rng(seed), 0, 0

@@ -54,7 +54,7 @@ MUTANTS = [
     Mutant("flash/stk500v1.py", " or answer[-1] != _OK", "", "flash firmware/test_flash.py"),
     Mutant("export/urdf.py", "_real(x / METRE)", "_real(x * METRE)", "export robot_file"),
     Mutant("reachability/cells.py", "(3.0 - math.sqrt(5.0))", "(2.0 - math.sqrt(5.0))", "reachability"),
-    Mutant("columns/cells.py", "'\"' + text.replace('\"', '\"\"') + '\"'", "'\"' + text + '\"'",
+    Mutant("columns/csv_cells.py", "'\"' + text.replace('\"', '\"\"') + '\"'", "'\"' + text + '\"'",
            "columns test_doctests.py cli"),
     Mutant("calibration/dropped_rows.py", "/ K**2) ** -2)", "/ K**2) ** 0)", "calibration"),
     Mutant("compiled/toolchain.py", "return owner and not", "return not", "compiled"),
@@ -72,7 +72,8 @@ MUTANTS = [
     Mutant("forward.py", "arrays.cross(z, lever)", "arrays.cross(lever, z)", "inverse/test_kinematics.py"),
     Mutant("inverse/choose_branch.py", "not branch.within_limits, hit, turned", "not branch.within_limits, turned, hit",
            "keep_out inverse/test_position_first.py"),
-    Mutant("columns/parts.py", "if before.get(name) != self.job.get(name)", "if name not in before", "columns"),
+    Mutant("columns/finished_chunks.py", "if before.get(name) != self.job.get(name)", "if name not in before",
+           "columns"),
 ]  # fmt: skip
 QUICK = ["-m", "not slow and not emulator"]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.backend.job import braking
+from armkin.board.backend.sent_positions import braking
 from armkin.board.firmware.segments import curves
 from armkin.board.firmware.segments.counts_to_segments import cycles_of
 from armkin.board.firmware.segments.trajectory_to_counts import cut

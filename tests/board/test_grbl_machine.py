@@ -13,7 +13,7 @@ import pytest
 import armkin
 from armkin.board import path_run
 from armkin.board.backend import StoppedError
-from armkin.board.backend.job import Job
+from armkin.board.backend.sent_positions import Job
 from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.machine import GrblMachine
 from armkin.board.grbl.settings import wanted

@@ -231,7 +231,7 @@ def test_what_shall_be_seen_is_what_the_joint_does(robot: str, j: int, words: st
 
 def test_a_key_that_comes_while_another_was_held_counts() -> None:
     """Enter straight after a tap of + was taken for the end of the tap, and lost."""
-    from armkin.cli.keys import Keys
+    from armkin.cli.terminal_keys import Keys
 
     coming = list("+\n" + "+++\ny")
     keys = Keys(lambda seconds: coming.pop(0) if coming else "")

@@ -15,7 +15,7 @@ import pytest
 
 import armkin
 from armkin.cli.csv_rows import batch_rows
-from armkin.cli.rows import ROWS, Chunk
+from armkin.cli.row_chunks import ROWS, Chunk
 from armkin.errors import UsageError
 from command_line import ROOT, THREE_DOF, run
 

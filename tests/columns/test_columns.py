@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from armkin.cli import batch, csv_rows
 from armkin.cli.csv_rows import Columns
-from armkin.columns import branches, parts, text
-from armkin.columns.cells import csv_line
+from armkin.columns import finished_chunks, ik_columns, text
+from armkin.columns.csv_cells import csv_line
 from armkin.columns.table import Table, Words, part
 from armkin.compiled import nearest as compiled_nearest
 from armkin.compiled import text as compiled_text
@@ -238,7 +238,7 @@ def test_two_runs_do_not_share_a_folder(rows: Path, tmp_path: Path, monkeypatch:
         stop_after(4, patch, KeyboardInterrupt())
         ik(rows, out)
     job = json.loads((tmp_path / "out.csv.parts" / "job.json").read_text())
-    other = parts.Parts(str(out), job)
+    other = finished_chunks.Parts(str(out), job)
     other.begin()
     assert "another run works on it" in ik(rows, out, "--resume").err
     other.leave()
@@ -300,7 +300,7 @@ def test_bad_archives_are_told(tmp_path: Path) -> None:
 def test_the_error_of_unfinished_parts_has_its_fields(tmp_path: Path) -> None:
     (tmp_path / "out.csv.parts").mkdir()
     with pytest.raises(UnfinishedError) as caught:
-        parts.Parts(str(tmp_path / "out.csv"), {}).refuse_begun()
+        finished_chunks.Parts(str(tmp_path / "out.csv"), {}).refuse_begun()
     assert caught.value.fields["parts"] == str(tmp_path / "out.csv.parts")
 
 
@@ -312,7 +312,7 @@ def test_machine_code_takes_the_same_branch() -> None:
         if B > 2:  # as far as another one, but for rounding
             q[::3, 1] = 2.0 * near - q[::3, 0] + 1e-12
         q[~wanted] = np.nan
-        there, fast = branches.nearest(q, wanted, near, scale), compiled_nearest.nearest(q, wanted, near, scale)
+        there, fast = ik_columns.nearest(q, wanted, near, scale), compiled_nearest.nearest(q, wanted, near, scale)
         assert fast is not None
         assert (fast[0] == there[0]).all()
         assert (fast[1] == there[1])[there[0] >= 0].all()

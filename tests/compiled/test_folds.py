@@ -7,7 +7,7 @@ import pytest
 from left_to_python import left_to_python
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 
 # whether the forearm's end is its wrist; of the last two a target prescribes sums of joints

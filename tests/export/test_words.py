@@ -16,7 +16,7 @@ from armkin import robot_file
 from armkin.errors import UsageError
 from armkin.export import tables
 from armkin.export.urdf import urdf as write_urdf
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.arm import actual, from_links
 from armkin.model.build import build
 from armkin.robot_file import urdf

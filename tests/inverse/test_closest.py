@@ -9,7 +9,7 @@ import pytest
 from oracle import forward, screws
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import read_targets
 

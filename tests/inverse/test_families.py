@@ -6,7 +6,7 @@ import pytest
 import armkin
 from armkin import Status
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.redundant.follower import Follower
+from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.model.arm import from_links

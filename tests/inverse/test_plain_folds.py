@@ -10,7 +10,7 @@ import pytest
 import armkin
 from armkin.inverse.run import chunks, edges, folds
 from armkin.inverse.singular import components, local_structure
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 
 ARMS = ("three_dof", "puma560", "ur5e")

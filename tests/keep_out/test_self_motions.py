@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.inverse.singular.free_postures import followed
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.keep_out.clearance import clear
 
 JOINTS = np.deg2rad([20.0, -70.0, 60.0, 30.0, 0.0, 50.0])  # four parallel axes: the elbow can move

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.motion.tool_path.geometry import Piece, Spot, line, spot
 

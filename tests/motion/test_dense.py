@@ -15,7 +15,7 @@ from armkin.model.arm import Arm
 from armkin.motion.branches import branch_path
 from armkin.motion.plan import playback
 from armkin.motion.timing.curve import Curve
-from armkin.motion.tool_path import fitting
+from armkin.motion.tool_path import fit_points
 from armkin.motion.tool_path.b_spline import banded
 from armkin.plot import path as picture
 
@@ -231,7 +231,7 @@ def ragged(seed: int) -> np.ndarray:
 def test_long_chords_beside_short_ones_are_kept_to(seed: int) -> None:
     """A spline with a knot at each place that it is held to swung 9 mm out between them."""
     points = ragged(seed)
-    curve = fitting.fitted(points, 0.05)
+    curve = fit_points.fitted(points, 0.05)
     u = np.unique(np.concatenate([curve.at, np.linspace(curve.begin[0], curve.begin[-1], 20_000)]))
     far, excess = worst_miss(points, curve.values(u)[0], 0.05)
     assert far <= 0.051

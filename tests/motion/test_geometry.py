@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.motion.tool_path.geometry import arc, blend, line, spot, turn
 
 TASK = task_for(armkin.load("three_dof"))

@@ -11,7 +11,7 @@ import pytest
 
 import armkin
 from armkin.errors import PathFileError, UsageError
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.targets import targets_in
 from armkin.motion.tool_path.placing import placing
 from armkin.path_file import gcode, gcode_arcs

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from oracle import Goal, branches, screws
 
 import armkin
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.reachability.cells import Grid
 
 Array = NDArray[np.float64]

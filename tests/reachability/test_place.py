@@ -12,12 +12,12 @@ import pytest
 import armkin
 from armkin.cli import compiled_ik
 from armkin.errors import NoSolutionError, UsageError
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.motion import redundant
-from armkin.reachability import beside, from_place, planning
+from armkin.motion import path_redundant
 from armkin.reachability import place as places
-from armkin.reachability.standing import Around, standing
+from armkin.reachability import place_path, place_targets, place_upright
+from armkin.reachability.place_arm import Around, standing
 from command_line import ROOT, run
 from interrupted import interrupted
 
@@ -30,13 +30,13 @@ def test_places_are_what_each_says_when_asked_directly(name: str) -> None:
     targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
     yaw = np.radians(60.0)
     [found] = armkin.place(arm, targets, step=arm.reach / 3, yaw=float(yaw))
-    question = from_place.Question(arm, task_for(arm), targets, len(found.yaw), float(yaw), 0.0)
+    question = place_targets.Question(arm, task_for(arm), targets, len(found.yaw), float(yaw), 0.0)
     assert found.of == 4
     assert found.reached.max() > 0
     for _ in range(60):
         i, j, k = (int(rng.integers(size)) for size in found.reached.shape)
         at = np.array([found.x[i], found.y[j]])
-        assert from_place.legal_from(question, at, float(found.yaw[k])).sum() == found.reached[i, j, k]
+        assert place_targets.legal_from(question, at, float(found.yaw[k])).sum() == found.reached[i, j, k]
 
 
 @pytest.mark.parametrize("name", ["so100", "so101", "three_dof", "ra02", "labvolt_5150", "planar_2dof"])
@@ -52,7 +52,7 @@ def test_joint_1_beside_the_base_s_axis_is_read_off_by_radius(name: str, monkeyp
     targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
     ask: dict[str, Any] = {"step": arm.reach / 7, "yaw": 0.11, "z": -0.03 * arm.reach}
     read: list[int] = []
-    off = beside.by_radius
+    off = place_upright.by_radius
 
     def counted(*given: Any) -> Any:
         found = off(*given)
@@ -60,10 +60,10 @@ def test_joint_1_beside_the_base_s_axis_is_read_off_by_radius(name: str, monkeyp
         read.append(int(found[0].sum()) - int(found[1].sum()))
         return found
 
-    monkeypatch.setattr(from_place, "by_radius", counted)
+    monkeypatch.setattr(place_targets, "by_radius", counted)
     [found] = armkin.place(arm, targets, **ask)
     assert sum(read) > 0.5 * found.reached.sum() > 0
-    monkeypatch.setattr(from_place, "RADII", 10**9)  # not worth it: each place is asked
+    monkeypatch.setattr(place_targets, "RADII", 10**9)  # not worth it: each place is asked
     [asked] = armkin.place(arm, targets, **ask)
     assert np.array_equal(found.reached, asked.reached)
 
@@ -186,14 +186,14 @@ def test_a_path_is_carried_from_the_places_that_plan_it(name: str, tmp_path: Pat
     assert found.planned
     assert {one.refused for one in found.planned} == {""}
     assert found.reached[found.best] == found.of
-    rng, file = np.random.default_rng(4), planning.path_of(path)
+    rng, file = np.random.default_rng(4), place_path.path_of(path)
     assert file is not None
     whole = found.reached == found.of
     for some in (np.argwhere(whole), np.argwhere(~whole & (found.reached > 0.6 * found.of))):
         assert len(some)
         for i, j, k in rng.permutation(some)[:3].tolist():
             at = (float(found.x[i]), float(found.y[j]), 0.0)
-            asked = planning.plan(arm, Around(), (i, j, k), at, float(found.yaw[k]), file)
+            asked = place_path.plan(arm, Around(), (i, j, k), at, float(found.yaw[k]), file)
             assert (asked.plan is not None) == whole[i, j, k], asked.refused
 
 
@@ -233,8 +233,10 @@ def test_a_path_of_seven_joints_is_carried_where_path_plans_it(said: str, step: 
 
 
 def test_the_command_tells_where_the_redundant_joint_is_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    all_values = redundant.values_to_hold
-    monkeypatch.setattr(redundant, "values_to_hold", lambda *asked: all_values(*asked)[:6])  # each is an arm to prepare
+    all_values = path_redundant.values_to_hold
+    monkeypatch.setattr(
+        path_redundant, "values_to_hold", lambda *asked: all_values(*asked)[:6]
+    )  # each is an arm to prepare
     path, scene = tmp_path / "path.yaml", tmp_path / "scene.yaml"
     path.write_text(LINE)
     scene.write_text("keep_out:\n  - box: {min: [-600, 200, 0], max: [-500, 300, 900]}\n    name: post\n")

@@ -18,8 +18,8 @@ from armkin.robot_file import urdf
 from armkin.robot_file.urdf_document import document
 from armkin.robot_file.writing import text
 from armkin.teach.mesh_files import triangles
-from armkin.teach.meshes import MOST, meshes
 from armkin.teach.one_file import html
+from armkin.teach.urdf_meshes import MOST, meshes
 from command_line import run
 
 CORNERS = np.array([[[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0]], [[0, 0, 0], [0, 0.2, 0], [0, 0, 0.3]]])

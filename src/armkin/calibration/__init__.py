@@ -1,6 +1,6 @@
 """Measured tips in, a corrected robot file out.
 
-chain.py            an arm with small corrections at every link, its poses and their exact Jacobian
+corrected_chain.py  an arm with small corrections at every link, its poses and their exact Jacobian
 robust_fit.py       damped Gauss-Newton with a workshop prior
 dropped_rows.py     rows that are far out lose their weight
 procedure.py        `calibrate`: checks, levels by cross-validation, what was seen, the corrected arm

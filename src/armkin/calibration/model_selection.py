@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.calibration.chain import KINDS, Model
+from armkin.calibration.corrected_chain import KINDS, Model
 from armkin.calibration.observability import left_open
 from armkin.calibration.robust_fit import Fit, Measured, fit, residuals
 from armkin.formula.arrays import Array

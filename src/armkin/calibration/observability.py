@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.calibration.chain import Model
+from armkin.calibration.corrected_chain import Model
 from armkin.calibration.dropped_rows import FINEST
 from armkin.calibration.robust_fit import Fit
 from armkin.errors import UsageError

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.calibration import observability
-from armkin.calibration.chain import KINDS, model
+from armkin.calibration.corrected_chain import KINDS, model
 from armkin.calibration.dropped_rows import dropped
 from armkin.calibration.impossible_rows import check
 from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
@@ -138,7 +138,7 @@ def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterabl
 
 def holding(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
     """What is not corrected, kinds and single corrections, and the kinds that the arm's task holds, in words."""
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
 
     try:
         task = task_for(arm).name

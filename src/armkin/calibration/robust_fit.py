@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.calibration.chain import Model
+from armkin.calibration.corrected_chain import Model
 from armkin.calibration.dropped_rows import loss, scales, weights
 from armkin.formula.arrays import Array
 

@@ -1,30 +1,30 @@
 """The command line: one file a command; each parses, calls, renders and exits.
 
-app.py             the group of commands, and what runs a command line; exit_codes.py: errors -> exit codes
-advice.py          the next step after an error
-commands/          one file a command, and the table of them
-answers/           the JSON of every command, as types
+app.py               the group of commands, and what runs a command line; exit_codes.py: errors -> exit codes
+advice.py            the next step after an error
+commands/            one file a command, and the table of them
+answers/             the JSON of every command, as types
 
 What the words come to:
 
-arguments.py       negative numbers are no options
-options.py         options that several commands share; completion.py: what Tab offers
-numbers.py         numbers as people write them; unit_notes.py: those that look like metres or radians
-inputs.py          the arm, a pose, a target; lock_and_sweep.py: joints held or swept
-foreign_path.py    drawings as paths: G-code and SVG
-rows.py            many of them in chunks; csv_rows.py: from CSV; pieces.py: shared out; batch.py: their answers
-piped_answers.py   answers on standard input; send_goals.py: all that `send` can be told
-default_port.py    the port; board_link.py: an open machine, signals; trace.py: what is said on it
-lerobot_zero.py    `zero --from`
-compiled_ik.py     ik and fk by machine code
-keys.py            keys of a terminal, and whether one is held
-keep_outs.py       radii that are assumed, the scene of a port, hits that are ignored
+negative_numbers.py  negative numbers are no options
+options.py           options that several commands share; completion.py: what Tab offers
+numbers.py           numbers as people write them; unit_notes.py: those that look like metres or radians
+inputs.py            the arm, a pose, a target; lock_and_sweep.py: joints held or swept
+drawing_path.py      drawings as paths: G-code and SVG
+row_chunks.py        many of them in chunks; csv_rows.py: from CSV; batch_pieces.py: shared out; batch.py: their answers
+piped_answers.py     answers on standard input; send_goals.py: all that `send` can be told
+default_port.py      the port; board_link.py: an open machine, signals; link_trace.py: what is said on it
+lerobot_zero.py      `zero --from`
+compiled_ik.py       ik and fk by machine code
+terminal_keys.py     keys of a terminal, and whether one is held
+keep_outs.py         radii that are assumed, the scene of a port, hits that are ignored
 
 What is printed:
 
-output.py          where it goes
-progress_bar.py    how far a long command has come, with rate and time left
-render.py          JSON and aligned columns; info_text.py, ik_text.py, path_text.py: for people
+output.py            where it goes
+progress_bar.py      how far a long command has come, with rate and time left
+render.py            JSON and aligned columns; info_text.py, ik_text.py, path_text.py: for people
 
 A command is a function of the same name in a module of the same name, written for Typer:
 `armkin.cli.commands.fk.fk`. A module is imported when its command runs, and imports nothing but typer and its

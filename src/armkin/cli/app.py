@@ -14,9 +14,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from armkin.cli import output, trace
-from armkin.cli.arguments import options_first
+from armkin.cli import link_trace, output
 from armkin.cli.commands import COMMANDS
+from armkin.cli.negative_numbers import options_first
 from armkin.signals import put_off
 
 _INTERRUPTED = 130
@@ -94,7 +94,7 @@ def load(name: str) -> Any:
     word = f"{name}_" if iskeyword(name) else name  # Python has `import` for itself
     function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
-    single.command(name, cls=Command, context_settings=_SETTINGS)(trace.traceable(function))
+    single.command(name, cls=Command, context_settings=_SETTINGS)(link_trace.traceable(function))
     return typer.main.get_command(single)
 
 

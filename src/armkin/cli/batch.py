@@ -12,12 +12,12 @@ from typing import IO, Any, NamedTuple, Protocol
 
 from armkin import __version__
 from armkin.cli import output
-from armkin.cli.pieces import Piece, Rows, parsed
+from armkin.cli.batch_pieces import Piece, Rows, parsed
 from armkin.cli.render import to_json
-from armkin.cli.rows import Chunk
-from armkin.columns.cells import csv_line
+from armkin.cli.row_chunks import Chunk
+from armkin.columns.csv_cells import csv_line
+from armkin.columns.finished_chunks import Parts
 from armkin.columns.formats import Format, format_of
-from armkin.columns.parts import Parts
 from armkin.columns.table import Table
 from armkin.engines.run import Engine, in_order
 from armkin.errors import ArmkinError, FileError, NoSolutionError, UnfinishedError, UsageError

@@ -37,7 +37,7 @@ def fk(arm: Arm, q: Array, task: str | None = None) -> Array:
 
 
 def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
-    """`armkin.columns.branches.nearest`, where it serves."""
+    """`armkin.columns.ik_columns.nearest`, where it serves."""
     from armkin.compiled import nearest as found
 
     return found.nearest(q, wanted, near, scale)

@@ -69,7 +69,7 @@ def assignments(ctx: typer.Context) -> Iterable[str]:
 def branches(ctx: typer.Context) -> Iterable[str]:
     """Names of the robot's branches, written without blanks: left/elbow-up."""
     import armkin
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
     from armkin.inverse.tasks.task import targets_of
 
     arm = _arm(ctx)

@@ -127,7 +127,7 @@ _MEANING = {"phi": "phi is the tool's pitch, the sum of the parallel joints' ang
 
 def _other_task(arm: Arm, task: Task, got: int) -> str:
     """What a label means that is no coordinate, and the task that takes as many numbers as were given."""
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
     from armkin.inverse.tasks.task import LABELS
 
     told = [words for label, words in _MEANING.items() if label in task.labels]
@@ -151,7 +151,7 @@ def target_list(arm: Arm, task: Task, text: str, rest: Sequence[str] | None = No
 
 def check_commas(arm: Arm, task: str | None, text: str, rest: Sequence[str]) -> None:
     """Raise UsageError for `--target 390 80 300`, where a target's numbers stand behind it as words of their own."""
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
 
     target_list(arm, task_for(arm, task), text, rest)
 

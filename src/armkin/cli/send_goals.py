@@ -58,7 +58,7 @@ def _of_target(
     import numpy as np
 
     from armkin.inverse.answers.rounding import printed
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
 
     what = task_for(arm, task)
     values = np.array([inputs.target_list(arm, what, target)])

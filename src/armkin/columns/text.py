@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.columns.cells import cell
+from armkin.columns.csv_cells import cell
 from armkin.columns.table import Column, Table, Words, part, rows
 
 WORTH = 2_000  # rows for which pyarrow is worth its import

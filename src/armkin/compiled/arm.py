@@ -30,7 +30,7 @@ from armkin.inverse.run.workers import check, shared
 from armkin.inverse.singular import near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
-from armkin.inverse.tasks.fitting import default_task
+from armkin.inverse.tasks.choose_task import default_task
 from armkin.inverse.tasks.task import distance, read_targets
 from armkin.keep_out.clearance import Clearance, clearance, least, named
 from armkin.model.arm import actual

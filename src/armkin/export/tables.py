@@ -220,7 +220,7 @@ def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any
 
 def _same_pitch(arm: Arm, data: dict[str, Any]) -> dict[str, Any]:
     """The pitch of targets counts from where it did: another table's constant angles go to `pitch_offset`."""
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
 
     for name in ("xyz_pitch", "xyz_pitch_roll"):
         try:
@@ -242,7 +242,7 @@ def _same_pitch(arm: Arm, data: dict[str, Any]) -> dict[str, Any]:
 
 def differences(arm: Arm, data: dict[str, Any]) -> list[str]:
     """What the other table's targets count from elsewhere, in words; [] for most arms."""
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
 
     try:
         before, after = task_for(arm), task_for(_built(data))

@@ -26,7 +26,7 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.branches.whole_turns import turns as copies_of
 from armkin.inverse.numeric.tolerances import EQUAL, HELD, SOLUTION
 from armkin.inverse.redundant.families import intervals_out
-from armkin.inverse.redundant.held import arm_without, others, redundant_alone
+from armkin.inverse.redundant.held_joints import arm_without, others, redundant_alone
 from armkin.inverse.redundant.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits, hits_text

@@ -36,7 +36,7 @@ from armkin.inverse.run.workers import check, shared
 from armkin.inverse.singular import free_postures, legal_postures, near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task, around, distance, read_near, read_targets, shaped
 from armkin.model.arm import actual
 

@@ -10,7 +10,7 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
 from armkin.inverse.numeric.newton import scaled
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import clearance
 from armkin.model.targets import targets_out

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.motion.joint_moves import check_rates
 from armkin.motion.path_planner import HOLD, planned
+from armkin.motion.path_redundant import path_redundant
 from armkin.motion.plan.path_plan import PathPlan
-from armkin.motion.redundant import path_redundant
 from armkin.motion.tool_path import path_numbers
 
 if TYPE_CHECKING:

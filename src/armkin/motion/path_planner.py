@@ -11,10 +11,10 @@ from armkin.errors import UsageError
 from armkin.motion.branches import wrist_turn
 from armkin.motion.branches.branch_path import Pace
 from armkin.motion.joint_moves import check_jerk, check_share
-from armkin.motion.moves import MOVES
+from armkin.motion.move_kinds import MOVES
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.proved_free import checked
-from armkin.motion.walk import PathOptions, Walk
+from armkin.motion.plan_moves import PathOptions, Walk
 from armkin.motors import legal_with_same_pulses, undriven
 
 if TYPE_CHECKING:

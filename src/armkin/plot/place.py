@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.plot.canvas import INK, SOFT, flat, picture
-from armkin.reachability.standing import Around, standing
+from armkin.reachability.place_arm import Around, standing
 from armkin.view.skeleton import skeleton
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from armkin.plot.canvas import INK, SOFT, flat, picture
 from armkin.reachability import voxels
 
 if TYPE_CHECKING:
-    from armkin.reachability.map import Reach
+    from armkin.reachability.reach_map import Reach
 
 _SHOWN = (("share", "share of orientations"), ("branches", "legal branches"), ("single", "share by one branch alone"))
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.rotation import rotation_about
 
 if TYPE_CHECKING:

@@ -4,9 +4,9 @@ A place is a position of the arm's frame (the one in which its targets are given
 plane of the targets' frame, and a yaw about its z axis. Where joint 1's axis is the frame's z axis, a yaw adds to joint
 1 alone: one solve a target and position answers all yaws as an arc. Other arms are asked yaw by yaw.
 
-A path is reached where one branch carries each of its ways between joint moves (`carrying`); the best places are then
-planned (`planning`). An arm with a redundant joint is asked with that held at each of the values that `armkin.path`
-asks, and reaches what it reaches at the best of them.
+A path is reached where one branch carries each of its ways between joint moves (`place_branches`); the best places are
+then planned (`place_path`). An arm with a redundant joint is asked with that held at each of the values that
+`armkin.path` asks, and reaches what it reaches at the best of them.
 
 The robot's own keep-outs move with it; those of a scene stand with the targets.
 """
@@ -24,20 +24,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin import __version__, files
+from armkin.columns.finished_chunks import Parts, digest
 from armkin.columns.formats import ENDINGS
-from armkin.columns.parts import Parts, digest
 from armkin.columns.table import Table
 from armkin.engines.run import Engine
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import read_targets
 from armkin.model.lock import unlock
-from armkin.reachability import keeping, planning
-from armkin.reachability.answers import TURN, limit_margin
+from armkin.reachability import kept_chunks, place_path
+from armkin.reachability.cell_answers import TURN, limit_margin
 from armkin.reachability.cells import STRAIGHT
-from armkin.reachability.from_place import (
+from armkin.reachability.place_arm import split_keep_outs
+from armkin.reachability.place_path import Planned
+from armkin.reachability.place_targets import (
     Question,
     Solve,
     at_value,
@@ -46,8 +48,6 @@ from armkin.reachability.from_place import (
     positions_of,
     reached_counts,
 )
-from armkin.reachability.planning import Planned
-from armkin.reachability.standing import split_keep_outs
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -155,7 +155,7 @@ def each(
     for name in ("step", "yaw"):
         if not (math.isfinite(settings[name]) and settings[name] > 0):
             raise UsageError(f"{name}: {settings[name]:g}; it must be above 0")
-    paths = [planning.path_of(some) for some in targets]
+    paths = [place_path.path_of(some) for some in targets]
     asked = [_question(arm, some, file, settings, scene) for arm, some, file in zip(arms, targets, paths, strict=True)]
     asked = [one._replace(solve=solve) for one in asked]
     grids = [_axes(one, settings["area"], settings["step"]) for one in asked]
@@ -165,8 +165,8 @@ def each(
         work_list += [Chunk(len(work_list) + k, i, part) for k, part in enumerate(_blocks(one, at))]
     counts: dict[int, NDArray[np.int64]] = {}
     parts, done, total = _parts(asked, settings, out), 0, sum(len(chunk.at) for chunk in work_list)
-    with keeping.holding(parts, len(work_list)):
-        for number, columns in keeping.tables(engine, work, asked, work_list, parts):
+    with kept_chunks.holding(parts, len(work_list)):
+        for number, columns in kept_chunks.tables(engine, work, asked, work_list, parts):
             counts[number] = np.asarray(columns["reached"])
             done += len(work_list[number].at)
             if progress is not None:
@@ -205,14 +205,14 @@ def _with_postures(question: Question, place: Place) -> Place:
 
 def _planned(question: Question, place: Place, file: PathFile, room: Room) -> Place:
     """The same with the best places planned; one that cannot be planned does not reach all."""
-    if why := planning.unplanned(question.arm):
+    if why := place_path.unplanned(question.arm):
         return replace(place, unplanned=why)
     tried: list[Planned] = []
     left = place.reached.copy()
     while left.max() == place.of and len(tried) < TRIES and sum(one.plan is not None for one in tried) < FEW:
         i, j, k = _best(room, left, place.margin)
         at = (float(place.x[i]), float(place.y[j]), place.z)
-        tried.append(planning.plan(question.arm, question.around, (i, j, k), at, float(place.yaw[k]), file))
+        tried.append(place_path.plan(question.arm, question.around, (i, j, k), at, float(place.yaw[k]), file))
         left[i, j, k] = -1
         if tried[-1].plan is None:
             place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
@@ -231,9 +231,9 @@ def _question(
     if file is None:
         task = task_for(arm, None)
     else:
-        task, each_way = planning.ways(arm, file)
+        task, each_way = place_path.ways(arm, file)
         targets, ways = np.concatenate(each_way), tuple(map(len, each_way))
-        spare, held = planning.held(arm, file)
+        spare, held = place_path.held(arm, file)
     arm, around = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
     values = read_targets(task, targets).values

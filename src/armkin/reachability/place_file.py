@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin import files
-from armkin.columns.cells import csv_line
+from armkin.columns.csv_cells import csv_line
+from armkin.columns.finished_chunks import Parts
 from armkin.columns.formats import format_of
-from armkin.columns.parts import Parts
 from armkin.columns.table import Table, Words
 
 if TYPE_CHECKING:

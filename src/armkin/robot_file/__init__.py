@@ -1,14 +1,14 @@
 """Robot files: YAML in, one validated, immutable model out, or an error with its line.
 
-strict_yaml.py   YAML without its traps
-model.py         keys, types, bounds, as pydantic has them; checks.py: rules between values
-robot.py         `RobotFile`: the two together; messages.py: errors in the file's own words
-keys.py          what all keys are made of; keep_out.py: floors, boxes, capsules; scene.py: such in a file of their own
-schema.py        JSON Schema, for editors
-catalogue.py     the shipped robots by name
-new.py           a robot file from a DH table
-edit.py          other values in a robot file's text; writing.py: a whole file's text
-urdf.py          a URDF as a robot file; urdf_document.py: its XML
+strict_yaml.py  YAML without its traps
+model.py        keys, types, bounds, as pydantic has them; checks.py: rules between values
+robot.py        `RobotFile`: the two together; messages.py: errors in the file's own words
+key_types.py    what all keys are made of; keep_out.py: floors, boxes, capsules; scene.py: such in a file of their own
+schema.py       JSON Schema, for editors
+catalogue.py    the shipped robots by name
+new_file.py     a robot file from a DH table
+edit.py         other values in a robot file's text; writing.py: a whole file's text
+urdf.py         a URDF as a robot file; urdf_document.py: its XML
 
 This package imports pydantic and yaml, and is itself imported only when a robot file is read.
 """

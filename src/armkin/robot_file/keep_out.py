@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
-from armkin.robot_file.keys import Angle, Length, Model
+from armkin.robot_file.key_types import Angle, Length, Model
 
 MOST = 256  # entries of a file: each is held against every body
 SELF = "self"

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from armkin import installed_kinds
-from armkin.robot_file.keys import Angle, Length, Model
+from armkin.robot_file.key_types import Angle, Length, Model
 
 MAX_JOINTS = 12
 MAX_MOTORS = 24  # two on each joint

@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr, ValidationError
 from armkin.errors import FileError, RobotFileError
 from armkin.robot_file import keep_out as entries
 from armkin.robot_file import messages, strict_yaml
-from armkin.robot_file.keys import Model
+from armkin.robot_file.key_types import Model
 from armkin.robot_file.model import KeepOut, Size
 
 _KIND = strict_yaml.Kind("scene", "keep_out", "keep_out: [self, floor: 0]", 1024 * 1024, 50_000)

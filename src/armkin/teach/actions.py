@@ -25,7 +25,7 @@ class Actions:
     def __init__(
         self, arm: Arm, port: str | None = None, baud: int | None = None, meshes: dict[str, Any] | None = None
     ) -> None:
-        """port: of a board, as `armkin send` takes it; meshes: see `armkin.teach.meshes.meshes`.
+        """port: of a board, as `armkin send` takes it; meshes: see `armkin.teach.urdf_meshes.meshes`.
 
         Raises UsageError if the robot file says too little for the board.
         """
@@ -55,7 +55,7 @@ class Actions:
         if name == "open":
             return self._open()
         if name == "solver":
-            from armkin.teach.own_solver import own_solver
+            from armkin.teach.browser_solver import own_solver
 
             return own_solver(self.arm)
         if name == "reach":

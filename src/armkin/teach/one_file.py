@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armkin.export.js.program import module
-from armkin.teach.own_solver import about
+from armkin.teach.browser_solver import about
 from armkin.teach.playing import played
 from armkin.teach.reach_slice import reach_slice
 from armkin.teach.scene import scene
@@ -29,7 +29,7 @@ def html(
 ) -> str:
     """The arm in one HTML file: every branch as the pose is dragged; plan: of a path, which the page plays.
 
-    meshes: what the bodies look like, see `armkin.teach.meshes.meshes`.
+    meshes: what the bodies look like, see `armkin.teach.urdf_meshes.meshes`.
 
     Raises UsageError if the task does not fit the arm, or if its class has no form in JavaScript.
     """

@@ -14,7 +14,7 @@ from armkin.forward import fk
 from armkin.inverse import choose_branch
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers import recognise
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import hits, hits_text
 from armkin.model import units

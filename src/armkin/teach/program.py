@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.errors import UsageError
 from armkin.forward import fk
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
 from armkin.model.targets import targets_out

@@ -15,7 +15,7 @@ from armkin.keep_out.clearance import clear
 from armkin.model.arm import actual
 from armkin.reachability import voxels
 from armkin.reachability.cells import Grid
-from armkin.reachability.map import reach
+from armkin.reachability.reach_map import reach
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.inverse.solvers.redundant import redundant_joint
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
 from armkin.model.arm import actual
 from armkin.motors import joints_per_pulse, motor_names, pulse_units

@@ -22,7 +22,7 @@ from armkin.motion.timing.trajectory import Straight
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
-    from armkin.board.backend.job import Job
+    from armkin.board.backend.sent_positions import Job
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
 

@@ -11,7 +11,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armkin.board.firmware.segments.onwards import left_of
+from armkin.board.firmware.segments.rest_of_plan import left_of
 from armkin.board.firmware.segments.straight_lines import UNHEARD, Pieces
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.go_back_n import QUESTION

@@ -6,6 +6,6 @@ replies.py   what GRBL says; session.py: lines and their answers
 settings.py  its $ settings against the robot file
 watch.py     whether it is where the plan is, while it moves
 spindle.py   the M3 output as a gripper
-place.py     where the arm stands, and whether that is known
+position.py  where the arm stands, and whether that is known
 machine.py   an arm on it
 """

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.job import Job
+from armkin.board.backend.sent_positions import Job
 from armkin.board.grbl.settings import Axis
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import pulses

@@ -1,4 +1,4 @@
-"""An arm on a GRBL board: its settings, its motions, its homing. Where it stands is told by place.py."""
+"""An arm on a GRBL board: its settings, its motions, its homing. Where it stands is told by position.py."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.job import Job
+from armkin.board.backend.sent_positions import Job
 from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.grbl import gcode, replies, settings
 from armkin.board.grbl.axes import axes_of
-from armkin.board.grbl.place import Place
+from armkin.board.grbl.position import Place
 from armkin.board.grbl.session import GrblError, Session
 from armkin.board.grbl.spindle import Spindle
 from armkin.board.grbl.watch import Watch

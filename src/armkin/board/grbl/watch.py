@@ -18,7 +18,7 @@ from armkin.motion.timing.trajectory import Straight
 from armkin.motors import places, pulses
 
 if TYPE_CHECKING:
-    from armkin.board.backend.job import Job
+    from armkin.board.backend.sent_positions import Job
     from armkin.board.grbl.replies import Report
     from armkin.board.grbl.settings import Axis
     from armkin.formula.arrays import Array

@@ -18,7 +18,7 @@ from armkin.board.klipper.axes import PIECE, RATE, Axis
 from armkin.motors import places, pulses
 
 if TYPE_CHECKING:
-    from armkin.board.backend.job import Job
+    from armkin.board.backend.sent_positions import Job
     from armkin.formula.arrays import Array
     from armkin.motion.timing.trajectory import Trajectory
 

@@ -6,9 +6,9 @@ which nothing comes; once a byte has come, only 5 s of silence or its own comman
 
 from __future__ import annotations
 
+from armkin.board.ports.logged_port import Traced
 from armkin.board.ports.port import Port
 from armkin.board.ports.serial_port import SerialPort
-from armkin.board.ports.traced import Traced
 
 _BAUD = 115200
 # STK500 version 2 (Atmel AVR068): start, number, size, token, CMD_LEAVE_PROGMODE_ISP, checksum

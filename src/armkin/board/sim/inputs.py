@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from armkin.board.sim.rows import toward
+from armkin.board.sim.coupled_limits import toward
 from armkin.board.sim.setup import Setup
 
 

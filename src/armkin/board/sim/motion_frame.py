@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from armkin.board.firmware.wire.protocol import STEP, Error, Segment
 from armkin.board.sim.axes import within
+from armkin.board.sim.coupled_limits import Rows
 from armkin.board.sim.frames import Batch, RefusedError
 from armkin.board.sim.queue import Queue
-from armkin.board.sim.rows import Rows
 from armkin.board.sim.setup import Setup
 from armkin.board.sim.velocity import Velocity, times_valid
 

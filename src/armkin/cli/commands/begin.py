@@ -10,8 +10,8 @@ from armkin.cli import board_link, inputs, keep_outs, output
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import NoScene
-from armkin.cli.keys import Keys, keys
 from armkin.cli.options import Robot, RobotOut, Scene
+from armkin.cli.terminal_keys import Keys, keys
 from armkin.errors import ArmkinError, FileError, UsageError
 
 if TYPE_CHECKING:

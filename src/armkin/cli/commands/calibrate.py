@@ -111,7 +111,7 @@ def _file(found: Calibration, arm: Arm) -> str:
 
 def _suggest(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: bool, out: str | None) -> None:
     from armkin.calibration.procedure import next_poses
-    from armkin.columns.cells import csv_line
+    from armkin.columns.csv_cells import csv_line
 
     before = None if rows is None else units.joints_in(arm, rows[:, : arm.n])
     found = units.joints_out(arm, next_poses(arm, count, before, fix=kinds)).round(9).tolist()

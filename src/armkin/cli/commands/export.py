@@ -129,8 +129,8 @@ def _js(arm: Arm, task: str | None, out: str | None) -> None:
 
 
 def _html(arm: Arm, task: str | None, path: str | None, meshes: str | None, out: str | None) -> None:
-    from armkin.teach.meshes import meshes as read_meshes
     from armkin.teach.one_file import html
+    from armkin.teach.urdf_meshes import meshes as read_meshes
 
     plan = None
     if path is not None:

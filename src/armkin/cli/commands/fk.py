@@ -23,7 +23,7 @@ from armkin.cli.options import (
     Workers,
 )
 from armkin.cli.render import fixed
-from armkin.cli.rows import Chunk, one_row
+from armkin.cli.row_chunks import Chunk, one_row
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def fk(
             render.warn_of_limits(arm, answer["violations"], answer)
             return
     from armkin.cli.batch import Batch as Run
-    from armkin.cli.pieces import Rows
+    from armkin.cli.batch_pieces import Rows
 
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
     asked = {
@@ -87,10 +87,10 @@ class Questions:
     def table(self, chunk: Chunk) -> tuple[Table, Any]:
         """The columns, and which rows are within limits."""
         import armkin
-        from armkin.columns import postures
+        from armkin.columns import fk_columns
 
         T = armkin.compile(self.arm).fk(units.joints_in(self.arm, chunk.values)) if self.compiled else None
-        found = postures.poses(self.arm, chunk.values, T)
+        found = fk_columns.poses(self.arm, chunk.values, T)
         return found, found["within_limits"]
 
     def objects(self, chunk: Chunk) -> Iterator[Fk]:

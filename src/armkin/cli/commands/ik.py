@@ -31,7 +31,7 @@ from armkin.cli.options import (
     Tool,
     Workers,
 )
-from armkin.cli.rows import Chunk, one_row
+from armkin.cli.row_chunks import Chunk, one_row
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.model.targets import label_units, targets_in, targets_out
@@ -85,7 +85,7 @@ def ik(
     """
     from armkin.inverse import choose_branch
     from armkin.inverse.redundant.position_first import check as position_first_is_for
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
 
     _check_together(batch, sweep, position_first=position_first, compiled=compiled, continuous=continuous)
     given = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
@@ -112,7 +112,7 @@ def ik(
     if batch is not None or (reached is not None and len(reached) > 1):
         inputs.no_numbers(target)
         from armkin.cli.batch import Batch as Run
-        from armkin.cli.pieces import Rows
+        from armkin.cli.batch_pieces import Rows
 
         rows = Rows(batch, what.labels, f"task {what.name}", None, reached or [])
         if continuous:  # each row waits for the one before
@@ -219,13 +219,13 @@ class Questions:
         """The columns, and which rows have a best branch."""
         if self.continuous or self.request.swept or self.request.position_first:
             return self._table_of_objects(chunk)
-        from armkin.columns import branches
+        from armkin.columns import ik_columns
 
         targets = targets_in(self.task.labels, chunk.values)
         rounding = _rounding(self.request.arm, self.task, chunk.values)
         quick = compiled_ik.nearest if self.request.ik is compiled_ik.ik else None
         numbers = chunk.numbered()
-        found = branches.columns(self.request, targets, numbers, self.all_branches, quick, rounding=rounding)
+        found = ik_columns.columns(self.request, targets, numbers, self.all_branches, quick, rounding=rounding)
         return found.table, ~found.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:

@@ -102,7 +102,7 @@ def _task(arm: Arm, name: str | None) -> Solving:
     import armkin
     from armkin.inverse.redundant.families import described
     from armkin.inverse.solvers.redundant import redundancy
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
     from armkin.model.arm import actual
 
     try:

@@ -18,7 +18,7 @@ from armkin.cli.options import RobotOut
 from armkin.errors import FileError, RobotFileError, UsageError
 
 if TYPE_CHECKING:
-    from armkin.robot_file.new import Row
+    from armkin.robot_file.new_file import Row
 
 _COLUMNS = ("alpha", "a", "d", "theta", "type", "lower", "upper", "home", "name")
 _VARIABLE = re.compile(r"([+-]?)(?:q|theta|th|d|s|\u03b8)_?[0-9]{0,2}\*? *(?:([+-]) *([0-9.pi/*\u03c0]{1,20}))?", re.I)
@@ -67,7 +67,7 @@ def new(
     q2 + 90 or d3 for the variable. Keys that the table does not give stand in the file as
     comments, to be filled in.
     """
-    from armkin.robot_file.new import text
+    from armkin.robot_file.new_file import text
 
     path = _path(name, out)
     if dh and batch is not None:
@@ -211,7 +211,7 @@ def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
 
 
 def _row(cells: Mapping[str, str], i: int) -> Row:
-    from armkin.robot_file.new import Row
+    from armkin.robot_file.new_file import Row
 
     where = f"row {i}: "
     values = {key: _entry(cells.get(key) or "0", f"{where}{key}") for key in ("alpha", "a", "d", "theta")}

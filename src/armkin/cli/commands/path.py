@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin import files
-from armkin.cli import board_link, foreign_path, inputs, keep_outs, lock_and_sweep, output, path_text, render
+from armkin.cli import board_link, drawing_path, inputs, keep_outs, lock_and_sweep, output, path_text, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
-from armkin.cli.foreign_path import At, Feed, GripBy, Lift, Scale
+from armkin.cli.drawing_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import comma_separated, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Picture, Robot, Scene, Speed, TaskName, Tool
-from armkin.columns.cells import csv_line
+from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -121,7 +121,7 @@ def path(
     arm = keep_outs.moving(robot, scene, ignore_keep_out, tool)
     locked = lock_and_sweep.locked(arm, lock)
     free = armkin.lock(arm, locked) if locked else arm
-    drawn = foreign_path.moves(free, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
+    drawn = drawing_path.moves(free, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
     moves = _moves(free, file, via, task) if drawn is None else drawn
     output.check(out, "a plan is", ".csv")
     options: dict[str, Any] = {
@@ -249,7 +249,7 @@ def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) 
     if (file is None) == (not via):
         raise UsageError("give a path file, or corners with --via X,Y,Z --via X,Y,Z: one of the two")
     if via:
-        from armkin.inverse.tasks.fitting import task_for
+        from armkin.inverse.tasks.choose_task import task_for
 
         labels = task_for(arm, task).labels
         first, *rest = [_corner(text, labels) for text in via]
@@ -280,7 +280,7 @@ def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, 
 
     try:
         if locked:
-            from armkin.motion.held import path_held
+            from armkin.motion.path_held import path_held
 
             plan = path_held(arm, moves, locked, **options)
         else:

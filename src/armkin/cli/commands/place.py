@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.reachability.place import Place
-    from armkin.reachability.planning import Planned
+    from armkin.reachability.place_path import Planned
 
 RobotsAndFile = Annotated[
     list[str], typer.Argument(metavar="ROBOT... FILE", help="Robots, then a CSV of targets or a path (YAML).")
@@ -111,7 +111,7 @@ def _targets(arm: Arm, source: str) -> Array:
     import numpy as np
 
     from armkin.cli.csv_rows import batch_rows
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
     from armkin.model.targets import targets_in
 
     task = task_for(arm)

@@ -146,7 +146,7 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
 
     from armkin.forward import position
     from armkin.inverse import choose_branch
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
     from armkin.plot import plot_poses
 
     what = task_for(arm, task)

@@ -11,7 +11,7 @@ import typer
 from armkin.cli import inputs, output, piped_answers, render
 from armkin.cli.options import Batch, BatchOut, Cluster, Joints, JsonLines, Resume, RobotOrPipe, Scene, Workers
 from armkin.cli.render import fixed
-from armkin.cli.rows import Chunk, one_row
+from armkin.cli.row_chunks import Chunk, one_row
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def pulses(
             output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
         return
     from armkin.cli.batch import Batch as Run
-    from armkin.cli.pieces import Rows
+    from armkin.cli.batch_pieces import Rows
 
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
     asked = {"command": "pulses", "robot file": arm.sha256, "scene": arm.scene_sha256, "from": origin, "best": best}
@@ -79,9 +79,9 @@ class Questions:
 
     def table(self, chunk: Chunk) -> tuple[Table, Any]:
         """The columns, and which rows are within limits."""
-        from armkin.columns import postures
+        from armkin.columns import fk_columns
 
-        found = postures.counts(self.arm, chunk.values, self.best)
+        found = fk_columns.counts(self.arm, chunk.values, self.best)
         return found, found["within_limits"]
 
     def objects(self, chunk: Chunk) -> Iterator[Pulses]:

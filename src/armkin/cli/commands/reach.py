@@ -12,7 +12,7 @@ from armkin.cli.options import Cluster, Json, Picture, Robot, Scene, Workers
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Reach as Answer
-    from armkin.reachability.map import Reach
+    from armkin.reachability.reach_map import Reach
 
 
 def reach(

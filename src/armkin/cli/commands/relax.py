@@ -11,7 +11,7 @@ from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.numbers import number
 from armkin.cli.options import Robot, RowsOut
-from armkin.columns.cells import csv_line
+from armkin.columns.csv_cells import csv_line
 from armkin.errors import UsageError
 from armkin.model import units
 

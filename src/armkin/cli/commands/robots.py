@@ -51,7 +51,7 @@ def _entry(name: str) -> ShippedRobot:
 def _task(arm: Any) -> tuple[str | None, list[str], list[str]]:
     """The task with its target's numbers, and why `armkin ik` refuses it."""
     from armkin.errors import UsageError
-    from armkin.inverse.tasks.fitting import task_for
+    from armkin.inverse.tasks.choose_task import task_for
 
     try:
         task = task_for(arm)

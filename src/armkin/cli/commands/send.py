@@ -14,7 +14,7 @@ from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.numbers import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
 from armkin.cli.send_goals import goals as read_goals
-from armkin.columns.cells import csv_line
+from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 

@@ -35,8 +35,8 @@ def teach(
     import threading
 
     from armkin.teach.actions import Actions
-    from armkin.teach.meshes import meshes as read_meshes
     from armkin.teach.server import Server
+    from armkin.teach.urdf_meshes import meshes as read_meshes
 
     arm = keep_outs.moving(robot, scene)
     if port is not None and port != SIM:

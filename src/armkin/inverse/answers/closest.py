@@ -28,7 +28,7 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     UPHILL,
 )
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_targets, targets_of
 from armkin.model.units import radian_or_reach

@@ -49,7 +49,7 @@ from armkin.inverse.numeric.tolerances import (
     SEED,
     TINY,
 )
-from armkin.inverse.tasks.fitting import rank
+from armkin.inverse.tasks.choose_task import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.chain import Chain
 from armkin.model.rotation import inverse

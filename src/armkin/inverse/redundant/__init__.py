@@ -1,18 +1,18 @@
 """More joints than the target has numbers: the answers are curves or surfaces, told by their pieces and minima.
 
-held.py            joints that are held: the arm of the others, and its targets
-follower.py        answers of the other joints at any value of the redundant one
-followed.py        its branches, followed along it
-boundaries.py      where along it these may end, all such places
-turn_roots.py      the roots of trigonometric polynomials that these places are
-samples.py         what samples of these show, and between which they change
-closer.py          between which more are taken
-ends.py            where these end
-arm_angle.py       those curves in closed form, of a shoulder, an elbow and a wrist
-arcs.py            the same traced through all joints, of other joints without a closed form
-traced.py          and their families
-pieces.py          pieces of such curves: intervals of the redundant joint
-families.py        one joint more than the target asks for: intervals of the redundant joint
-position_first.py  four or five joints asked for a pose: the position exact, the rotation as near as it goes
-minima.py          the descent to those postures
+held_joints.py        joints that are held: the arm of the others, and its targets
+other_joints.py       answers of the other joints at any value of the redundant one
+followed_branches.py  its branches, followed along it
+boundaries.py         where along it these may end, all such places
+turn_roots.py         the roots of trigonometric polynomials that these places are
+samples.py            what samples of these show, and between which they change
+refine_samples.py     between which more are taken
+branch_ends.py        where these end
+arm_angle.py          those curves in closed form, of a shoulder, an elbow and a wrist
+traced_curves.py      the same traced through all joints, of other joints without a closed form
+traced_families.py    and their families
+interval_pieces.py    pieces of such curves: intervals of the redundant joint
+families.py           one joint more than the target asks for: intervals of the redundant joint
+position_first.py     four or five joints asked for a pose: the position exact, the rotation as near as it goes
+least_rotation.py     the descent to those postures
 """

@@ -20,7 +20,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.wrist import meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
-from armkin.inverse.redundant.pieces import Int, Pieces, best_samples, holding_none, none, runs
+from armkin.inverse.redundant.interval_pieces import Int, Pieces, best_samples, holding_none, none, runs
 from armkin.model.rotation import inverse, rotation_about
 
 if TYPE_CHECKING:

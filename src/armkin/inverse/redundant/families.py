@@ -3,8 +3,8 @@
 The redundant joint is the last or the first one, whichever leaves a closed form. Its motion only moves the target of
 the other joints, T = Z(q) T' or T' Z(q), so one solver, prepared once, answers every value of it. A family is a piece
 of a curve of answers along which the joint is monotone; a row is a legal interval of one. The curves are known by the
-arm angle (`arm_angle`), or followed along the joint (`followed`). Where the joint turns about the tool's z axis, which
-alone is asked for, each branch of the others is one.
+arm angle (`arm_angle`), or followed along the joint (`followed_branches`). Where the joint turns about the tool's z
+axis, which alone is asked for, each branch of the others is one.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import PROBE, SAME, SOLUTION
-from armkin.inverse.redundant.arcs import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
-from armkin.inverse.redundant.followed import SAMPLES, Followed
-from armkin.inverse.redundant.follower import Follower, Ik
-from armkin.inverse.redundant.pieces import Pieces, golden_section, motion
-from armkin.inverse.redundant.traced import Traced
+from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
+from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion
+from armkin.inverse.redundant.other_joints import Follower, Ik
+from armkin.inverse.redundant.traced_curves import PLANES
+from armkin.inverse.redundant.traced_families import Traced
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
 from armkin.keep_out.clearance import clear

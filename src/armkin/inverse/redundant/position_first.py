@@ -1,7 +1,7 @@
 """Arms of four or five joints asked for a pose: the position exact, the rotation as near as it goes.
 
 Over the postures within limits whose tool stands at the target's position, a family of one or two dimensions, the rows
-are the local minima of the rotation angle: `minima` descends to them from many postures at once.
+are the local minima of the rotation angle: `least_rotation` descends to them from many postures at once.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     WEAK,
 )
-from armkin.inverse.redundant.minima import Box, box_of, descend, flat_minima
+from armkin.inverse.redundant.least_rotation import Box, box_of, descend, flat_minima
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_near, read_targets
 from armkin.keep_out.clearance import clear

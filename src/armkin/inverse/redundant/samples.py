@@ -13,10 +13,10 @@ from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.formula.rows import stacked
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.redundant.boundaries import on_both_sides
-from armkin.inverse.redundant.pieces import Int, best_samples, holding_none, runs, turning
+from armkin.inverse.redundant.interval_pieces import Int, best_samples, holding_none, runs, turning
 
 if TYPE_CHECKING:
-    from armkin.inverse.redundant.follower import Follower, Sampled
+    from armkin.inverse.redundant.other_joints import Follower, Sampled
 
 AT_A_TIME = 8_000  # samples: they stay in the cache
 

@@ -46,7 +46,7 @@ from armkin.inverse.numeric.tolerances import (
 )
 from armkin.inverse.solvers import general, pairs, position_pencil
 from armkin.inverse.solvers.pairs import AROUND, around
-from armkin.inverse.tasks.fitting import NEARLY_PARALLEL
+from armkin.inverse.tasks.choose_task import NEARLY_PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from armkin.inverse.closed import anywhere, elbow, planar, spherical, three_join
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import RANK
 from armkin.inverse.solvers import general, nearly_special, tool_axis
-from armkin.inverse.tasks.fitting import default_task, rank, redundant, task_for
+from armkin.inverse.tasks.choose_task import default_task, rank, redundant, task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import actual
 

@@ -15,7 +15,7 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
 from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.lock import lock
 from armkin.model.rotation import inverse, joint_motion

@@ -5,7 +5,7 @@ joint_steps.py      steps from joint values to others, and how far the tip leave
 linked_branches.py  every branch along the route, linked from sample to sample by a certificate
 branch_chains.py    how far each carries, and the fewest runs that carry all
 boundary.py         what branches that meet on a boundary make of it
-wrist_turn.py       past a wrist singularity, the tool turned a little or the tip aside; windows.py: where
+wrist_turn.py       past a wrist singularity, the tool turned a little or the tip aside; wrist_window.py: where
 branch_path.py      the branch that is taken: joint values along the route
-grid.py             exact at grid points, fine enough in between; on_route.py: Newton's method there, and slopes
+route_grid.py       exact at grid points, fine enough in between; solve_on_route.py: Newton's method there, and slopes
 """

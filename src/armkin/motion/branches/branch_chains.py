@@ -23,7 +23,7 @@ from armkin.motion.plan.proved_free import hit_samples as motion_hits
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.branches.windows import Window
+    from armkin.motion.branches.wrist_window import Window
 
 
 @dataclass(frozen=True, eq=False)

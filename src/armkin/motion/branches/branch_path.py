@@ -18,11 +18,11 @@ from armkin.inverse.branches.names import find
 from armkin.motion.branches.boundary import through_boundaries
 from armkin.motion.branches.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.branches.branch_columns import Columns
-from armkin.motion.branches.grid import fine_enough
 from armkin.motion.branches.joint_steps import change
 from armkin.motion.branches.linked_branches import ENDS, linked
-from armkin.motion.branches.windows import detoured
+from armkin.motion.branches.route_grid import fine_enough
 from armkin.motion.branches.wrist_turn import ASIDE, has_wrist, through_wrists
+from armkin.motion.branches.wrist_window import detoured
 from armkin.motion.timing.cubics import Knots
 from armkin.motion.timing.curve import Curve
 from armkin.motion.timing.hold_cap import hold_cap

@@ -21,8 +21,8 @@ from armkin.forward import fk, jacobian
 from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import LEAST_LEVER, change
-from armkin.motion.branches.on_route import corrected
-from armkin.motion.branches.windows import Window, detoured
+from armkin.motion.branches.solve_on_route import corrected
+from armkin.motion.branches.wrist_window import Window, detoured
 from armkin.motion.tool_path.route import Detour
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
 from armkin.model.targets import label_scale, targets_in
 from armkin.motion.tool_path.geometry import Spot, spot

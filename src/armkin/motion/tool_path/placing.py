@@ -10,7 +10,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
 from armkin.model.rotation import rpy, transform

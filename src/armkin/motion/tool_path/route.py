@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.motion.timing.trajectory import grouped
-from armkin.motion.tool_path.fitting import REVERSAL
+from armkin.motion.tool_path.fit_points import REVERSAL
 from armkin.motion.tool_path.geometry import SMALL, Dense, Piece, blend
 
 _SAME = 1e-6  # [mm] breaks that are nearer are one

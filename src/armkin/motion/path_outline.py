@@ -9,11 +9,11 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.motion.branches.branch_path import Pace
-from armkin.motion.moves import MOVES
+from armkin.motion.move_kinds import MOVES
 from armkin.motion.path_planner import TOLERANCE, corners_wished
+from armkin.motion.plan_moves import PathOptions, Walk
 from armkin.motion.tool_path.geometry import line
 from armkin.motion.tool_path.route import joined
-from armkin.motion.walk import PathOptions, Walk
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

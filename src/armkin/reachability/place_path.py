@@ -12,7 +12,7 @@ import numpy as np
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.reachability.standing import Around, standing
+from armkin.reachability.place_arm import Around, standing
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -50,7 +50,7 @@ def path_of(given: Any) -> PathFile | None:
 
 def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
     """The task, and the targets of each way that one branch is to carry."""
-    from armkin.motion.outline import routes
+    from armkin.motion.path_outline import routes
 
     task, found = routes(arm, file, STEP * arm.reach)
     return task, [np.asarray(each) for each in found]
@@ -59,7 +59,7 @@ def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
 def held(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
     """The joint that a path's plan holds, and where it may [rad], as `armkin.path` asks them; "": none."""
     from armkin.inverse.solvers.redundant import redundancy
-    from armkin.motion.redundant import values_to_hold
+    from armkin.motion.path_redundant import values_to_hold
 
     spare = redundancy(arm, file.task)
     return ("", ()) if spare is None else (arm.joint_names[spare.joint], values_to_hold(arm, file, spare))

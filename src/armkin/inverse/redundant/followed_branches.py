@@ -10,9 +10,9 @@ from armkin.formula.arrays import Array, Bool
 from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import SOLUTION
 from armkin.inverse.redundant.boundaries import boundaries, places
-from armkin.inverse.redundant.ends import crossed_at, hidden_stretches, number_of, places_of
-from armkin.inverse.redundant.follower import Follower, over_a_turn
-from armkin.inverse.redundant.pieces import Int, Pieces, none
+from armkin.inverse.redundant.branch_ends import crossed_at, hidden_stretches, number_of, places_of
+from armkin.inverse.redundant.interval_pieces import Int, Pieces, none
+from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.inverse.redundant.samples import Changes, Runs, Seen, place_between, seen, value_at
 from armkin.inverse.tasks.task import distance
 

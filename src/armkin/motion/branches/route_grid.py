@@ -9,14 +9,14 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.motion.branches.joint_steps import chord_bound, levers
-from armkin.motion.branches.on_route import DAMPING, corrected, exact_cubics
+from armkin.motion.branches.solve_on_route import DAMPING, corrected, exact_cubics
 from armkin.motion.timing.cubics import Knots
 from armkin.motion.timing.scan import Int
 from armkin.motion.timing.time_optimal import knots
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.branches.windows import Window
+    from armkin.motion.branches.wrist_window import Window
     from armkin.motion.tool_path.route import Route
 
 _TIMES = 16.0  # as many points, at most, where the tolerance needs them

@@ -16,11 +16,11 @@ from armkin.inverse.solve import columns, ik, isolated
 from armkin.inverse.tasks.task import Task
 from armkin.model.lock import lock, unlock
 from armkin.model.rotation import rotation_about
-from armkin.reachability import carrying
-from armkin.reachability.answers import TURN, arc, packed, within
-from armkin.reachability.beside import RADII, by_radius
+from armkin.reachability import place_branches
+from armkin.reachability.cell_answers import TURN, arc, packed, within
 from armkin.reachability.cells import STRAIGHT
-from armkin.reachability.standing import Around, free
+from armkin.reachability.place_arm import Around, free
+from armkin.reachability.place_upright import RADII, by_radius
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -301,16 +301,16 @@ def _on_one_branch(question: Question, at: Array, which: NDArray[np.bool_]) -> N
     arm, K = question.arm, question.yaws
     if question.arcs:
         s = isolated(arm, seen_from(question, at, 0.0), question.task.name)
-        whole, low, high = carrying.ranges(s, s.valid)
-        allowed = whole & carrying.within(arm, low, high, range(1, arm.n))
-        first, length = carrying.arc(arm, low[:, 0], high[:, 0], K, question.sense)
+        whole, low, high = place_branches.ranges(s, s.valid)
+        allowed = whole & place_branches.within(arm, low, high, range(1, arm.n))
+        first, length = place_branches.arc(arm, low[:, 0], high[:, 0], K, question.sense)
         places = (np.arange(K) - first[:, None]) % K < np.where(allowed, length, 0)[:, None]
         return np.asarray(which & places.any(axis=0))
     out = np.zeros(K, bool)
     for k in np.flatnonzero(which).tolist():
         s, free = free_from(question, at, k * question.step, within=False)
-        whole, low, high = carrying.ranges(s, free)
-        out[k] = (whole & carrying.within(arm, low, high, range(arm.n))).any()
+        whole, low, high = place_branches.ranges(s, free)
+        out[k] = (whole & place_branches.within(arm, low, high, range(arm.n))).any()
     return out
 
 

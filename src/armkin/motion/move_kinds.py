@@ -11,10 +11,10 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.forward import fk
 from armkin.motion.tool_path import geometry, path_numbers
-from armkin.motion.tool_path.dense import Polyline
+from armkin.motion.tool_path.dense_points import Polyline
 
 if TYPE_CHECKING:
-    from armkin.motion.walk import Walk
+    from armkin.motion.plan_moves import Walk
     from armkin.path_file import Move
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.formula.rows import rows_of
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, BESIDE_CROSSING, JOINED, NO_ROOM, SAME_END, TINY
-from armkin.inverse.redundant.pieces import Int, golden_section, margin
+from armkin.inverse.redundant.interval_pieces import Int, golden_section, margin
 from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
 
 if TYPE_CHECKING:
-    from armkin.inverse.redundant.follower import Follower
+    from armkin.inverse.redundant.other_joints import Follower
 
 HALVINGS = 60  # steps to where a branch ends, at most
 SECANTS = 24  # of which the later ones halve

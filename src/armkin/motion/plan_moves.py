@@ -17,13 +17,13 @@ from armkin.forward import fk
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.solve import isolated as ik
-from armkin.inverse.tasks.fitting import task_for
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, outside_text
 from armkin.motion import branch_report
 from armkin.motion.branches.branch_path import Pace, carry, stands, stretches
-from armkin.motion.branches.grid import Missed, deviation, missed
-from armkin.motion.branches.windows import detoured
+from armkin.motion.branches.route_grid import Missed, deviation, missed
+from armkin.motion.branches.wrist_window import detoured
 from armkin.motion.joint_moves import approach, straight
 from armkin.motion.plan.path_plan import Marker, PathPlan
 from armkin.motion.timing.curve import Curve
@@ -31,7 +31,7 @@ from armkin.motion.timing.limit_jerk import Smoothed, way_of, ways_of
 from armkin.motion.timing.profile import at_rest
 from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import geometry, path_numbers
-from armkin.motion.tool_path.dense import FIT, PLAN, Polyline
+from armkin.motion.tool_path.dense_points import FIT, PLAN, Polyline
 from armkin.motion.tool_path.geometry import Piece, Spot
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
 from armkin.motion.tool_path.route import Reduced, joined

@@ -15,7 +15,7 @@ from armkin.model.targets import targets_in
 from armkin.motion.tool_path import path_numbers
 from armkin.motion.tool_path.b_spline import Int
 from armkin.motion.tool_path.chords import distinct, turns
-from armkin.motion.tool_path.fitting import REVERSAL, Fitted, fitted
+from armkin.motion.tool_path.fit_points import REVERSAL, Fitted, fitted
 from armkin.motion.tool_path.geometry import Dense, Piece, Spot, between, line, unit_speed, vector, weights
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ import numpy as np
 
 from armkin import __version__
 from armkin.columns import npz
+from armkin.columns.finished_chunks import Parts
 from armkin.columns.formats import format_of
-from armkin.columns.parts import Parts
 from armkin.columns.table import Table
 from armkin.engines.run import Engine
 from armkin.errors import UsageError
@@ -22,8 +22,8 @@ from armkin.files import check, ending, whole
 from armkin.formula.arrays import Array
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import actual
-from armkin.reachability import keeping
-from armkin.reachability.answers import TURN, Question, answered
+from armkin.reachability import kept_chunks
+from armkin.reachability.cell_answers import TURN, Question, answered
 from armkin.reachability.cells import Grid
 
 if TYPE_CHECKING:
@@ -179,8 +179,8 @@ class _Run:
         kept: dict[int, Table] = {}
         cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
         keep = self.parts is None or cells <= KEEP
-        with keeping.holding(self.parts, len(all_chunks)):
-            for number, columns in keeping.tables(self.engine, work, self.question, all_chunks, self.parts):
+        with kept_chunks.holding(self.parts, len(all_chunks)):
+            for number, columns in kept_chunks.tables(self.engine, work, self.question, all_chunks, self.parts):
                 self._count(all_chunks[number], columns)
                 if keep:
                     kept[number] = columns

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import ACCEPTED
-from armkin.inverse.redundant.pieces import within_limits
+from armkin.inverse.redundant.interval_pieces import within_limits
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

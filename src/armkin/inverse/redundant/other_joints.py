@@ -17,8 +17,8 @@ from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric.tolerances import ACCEPTED
-from armkin.inverse.redundant.closer import values_between
-from armkin.inverse.redundant.pieces import motion_of_joint, within_limits
+from armkin.inverse.redundant.interval_pieces import motion_of_joint, within_limits
+from armkin.inverse.redundant.refine_samples import values_between
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved, moved_entries
 

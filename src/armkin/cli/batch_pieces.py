@@ -12,7 +12,7 @@ from armkin import files
 from armkin.cli import csv_rows
 from armkin.cli.csv_rows import Columns
 from armkin.cli.numbers import LARGEST
-from armkin.cli.rows import Chunk
+from armkin.cli.row_chunks import Chunk
 from armkin.errors import ArmkinError, UsageError
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.keep_out.clearance import clearance
 from armkin.model.arm import actual
-from armkin.motion.held import path_held
-from armkin.motion.outline import routes
+from armkin.motion.path_held import path_held
+from armkin.motion.path_outline import routes
 from armkin.motion.tool_path import path_numbers
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar
 
 from armkin.columns import npz
-from armkin.columns.parts import Parts
+from armkin.columns.finished_chunks import Parts
 from armkin.columns.table import Table
 from armkin.engines.run import Engine, in_order
 

@@ -1,4 +1,4 @@
-"""Families of an arm whose other joints have no closed form: pieces of the curves that `arcs` traces."""
+"""Families of an arm whose other joints have no closed form: pieces of the curves that `traced_curves` follows."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from armkin.formula.rows import stacked
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CONVERGING, REACH
-from armkin.inverse.redundant.arcs import Points, curves_of, onto
-from armkin.inverse.redundant.follower import Follower
-from armkin.inverse.redundant.pieces import Int, Pieces, best_samples, holding_none, margin, motion, none, runs
+from armkin.inverse.redundant.interval_pieces import Int, Pieces, best_samples, holding_none, margin, motion, none, runs
+from armkin.inverse.redundant.other_joints import Follower
+from armkin.inverse.redundant.traced_curves import Points, curves_of, onto
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 

@@ -17,8 +17,8 @@ from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import CONVERGING, PAIR_SETTLED, SAME_SEED, SHORTEST_ARC
-from armkin.inverse.redundant.follower import Follower, over_a_turn
-from armkin.inverse.redundant.pieces import Int
+from armkin.inverse.redundant.interval_pieces import Int
+from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.model.units import radian_or_reach
 
 PLANES = 60  # values of the redundant joint that the elimination answers
