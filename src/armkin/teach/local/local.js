@@ -38,24 +38,20 @@ const shared = { link: "", command: "", python: "" };
 const PACE = 100; // [ms] from one change of the address to the next: browsers refuse hundreds in a few seconds
 let [addressAt, waiting] = [-Infinity, false];
 
-/** The address says what is shown: at once, or when it may change again. */
+/** The address says what is shown, when it may change again: never while an answer is waited for, which it delays by as
+ * long as the browser's other processes take. */
 function address() {
-  const early = addressAt + PACE - performance.now();
   if (waiting) return;
-  if (early > 0) {
-    waiting = true;
-    setTimeout(() => {
-      waiting = false;
-      address();
-    }, early);
-    return;
-  }
-  addressAt = performance.now();
-  try {
-    history.replaceState(null, "", shared.link);
-  } catch {
-    // a page whose address cannot change, such as one in a frame, is shown all the same
-  }
+  waiting = true;
+  setTimeout(() => {
+    waiting = false;
+    addressAt = performance.now();
+    try {
+      history.replaceState(null, "", shared.link);
+    } catch {
+      // a page whose address cannot change, such as one in a frame, is shown all the same
+    }
+  }, Math.max(addressAt + PACE - performance.now(), 0));
 }
 
 /** What the address and the buttons say. @param {number[]} q [deg | mm] @param {number[]} goal */

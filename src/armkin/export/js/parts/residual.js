@@ -13,12 +13,12 @@ function residual(q, goal) {
   poseOf(q, pose16);
   const T = pose16;
   const out = residualNumbers;
-  out.length = 0;
+  let count = 0;
   const first = ARM.orientation === 'full' ? 9 : 0;
-  for (let i = 0; i < ARM.position; i++) out.push((goal[first + i] - T[4 * i + 3]) / ARM.reach);
+  for (let i = 0; i < ARM.position; i++) out[count++] = (goal[first + i] - T[4 * i + 3]) / ARM.reach;
   for (let k = 0; k < ARM.sums.length; k++) {
     const off = goal[ARM.position + k] - dot(ARM.sums[k], q) - ARM.offsets[k];
-    out.push(off - TURN * rint(off / TURN));
+    out[count++] = off - TURN * rint(off / TURN);
   }
   if (ARM.orientation === 'full') {
     let [a, b, c, trace] = [0, 0, 0, 0];
@@ -32,17 +32,21 @@ function residual(q, goal) {
     const sine = 0.5 * Math.sqrt(a * a + b * b + c * c);
     const scale = 0.5 * (trace < 3 - 1e-8 && sine > 1e-12 ? Math.atan2(sine, (trace - 1) / 2) / sine : 1);
     // half a turn off has no axis to turn about: any will do
-    out.push(trace < 0 && sine <= 1e-12 ? Math.PI : a * scale, b * scale, c * scale);
+    out[count++] = trace < 0 && sine <= 1e-12 ? Math.PI : a * scale;
+    out[count++] = b * scale;
+    out[count++] = c * scale;
   }
   if (ARM.orientation === 'axis') {
     const z = [T[2], T[6], T[10]];
     const w = cross(z, [goal[3], goal[4], goal[5]]);
     const sine = norm(w);
     const cosine = z[0] * goal[3] + z[1] * goal[4] + z[2] * goal[5];
-    if (sine > 1e-12) out.push(...w.map((x) => (x * Math.atan2(sine, cosine)) / sine));
-    else out.push(...(cosine < 0 ? [Math.PI * T[0], Math.PI * T[4], Math.PI * T[8]] : w));
+    const half = sine <= 1e-12 && cosine < 0;
+    const scale = sine > 1e-12 ? Math.atan2(sine, cosine) / sine : 1;
+    for (let k = 0; k < 3; k++) out[count++] = half ? Math.PI * T[4 * k] : w[k] * scale;
   }
-  if (pin) out.push(less(pin.at, q[pin.joint], false));
+  if (pin) out[count++] = less(pin.at, q[pin.joint], false);
+  out.length = count;
   return out;
 }
 
@@ -157,7 +161,8 @@ function weakStep(J, r, weakest) {
 }
 
 /**
- * Newton's method, the step along weak directions damped.
+ * Newton's method, the step along weak directions damped. Towards a double root a step leaves a quarter of the residual: then
+ * the next one goes twice as far.
  * @param {Numbers} start @param {Numbers} goal @param {number} steps
  * @param {number} [weakest] singular value below which a direction is not moved along
  * @returns {{q: number[], missed: number}}
@@ -166,16 +171,18 @@ function newton(start, goal, steps, weakest = 1e-10) {
   const n = ARM.joints;
   let q = Array.from(start);
   let best = { q, missed: Infinity };
-  for (let step = 0; step <= steps; step++) {
+  for (let step = 0, before = NaN; step <= steps; step++) {
     const r = residual(q, goal);
     const size = norm(r);
+    const double = Math.abs(size / before - 0.25) < 0.02;
+    before = size;
     if (size < best.missed) best = { q, missed: size };
     if (size < 1e-15 || step === steps) break;
     const J = slope(q);
     const move = (weakest < REGULAR && regularStep(J, r)) || weakStep(J, r, weakest); // on a self-motion one is weak
     let longest = 0;
     for (let j = 0; j < n; j++) longest = Math.max(longest, Math.abs(move[j]));
-    q = stepped(q, move, longest > 0.3 ? 0.3 / longest : 1);
+    q = stepped(q, move, longest > 0.3 ? 0.3 / longest : double ? 2 : 1);
   }
   return best;
 }

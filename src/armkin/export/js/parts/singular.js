@@ -181,13 +181,19 @@ function structure(q, goal, known) {
 
 /** Whether a posture lies on a self-motion. @param {number[]} q @param {number[][]} path @param {Numbers} goal */
 function onPath(q, path, goal) {
-  return path.some((p, k) => {
+  for (let k = 0; k < path.length; k++) {
+    const p = path[k];
     const away = apart(q, p);
-    if (away > STRIDE || k + 1 === path.length) return away < 1e-6;
+    if (away > STRIDE) {
+      k += Math.floor((away - STRIDE) / (1.5 * STRIDE)); // neighbours are no further from each other
+      continue;
+    }
+    if (k + 1 === path.length) return away < 1e-6;
     const way = between(path[k + 1], p);
     const share = Math.min(Math.max(dot(between(q, p), way) / Math.max(dot(way, way), 1e-300), 0), 1);
-    return apart(q, newton(stepped(p, way, share), goal, 4, SPLIT / 10).q) < 1e-4;
-  });
+    if (apart(q, newton(stepped(p, way, share), goal, 4, SPLIT / 10).q) < 1e-4) return true;
+  }
+  return false;
 }
 
 /** Whether two paths follow one self-motion: those through a crossing may leave it by either way.
