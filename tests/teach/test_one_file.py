@@ -123,8 +123,7 @@ def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(ur5e: Page) 
     assert page.locator("#canvas").get_attribute("data-solid") == "1"
     assert page.evaluate("location.hash") == posture  # pointed at, not chosen
     page.keyboard.press("Space")
-    settled(page)
-    assert page.evaluate("location.hash") != posture
+    page.wait_for_function("(before) => location.hash !== before", arg=posture)
 
 
 def test_it_is_printed_on_one_page_with_its_picture(ur5e: Page) -> None:

@@ -52,8 +52,9 @@ def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
     lines = ["const LOOP = {", *(f"  {name}: {text}," for name, text in fields.items()), "};"]
     lines += ["/** @type {Pencil[]} */", "const PENCILS = [", *map(_pencil, pencils), "];"]
     head = (
-        "/** @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss @param {number} [most] */\n"
-        "function candidates(goal, near, q, miss, most) {"
+        "/** @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss\n"
+        " * @param {number} [passes] */\n"
+        "function candidates(goal, near, q, miss, passes) {"
     )
     pose = "goal"
     if task.orientation == "axis":  # by way of a pose with that z axis and a joint more
@@ -61,7 +62,7 @@ def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
         code = c_and_js_code.write(made, [f"goal[{k}]" for k in range(6)], c_and_js_code.JAVASCRIPT)
         head = "\n".join([head, *(f"  {line}" for line in code.lines)])
         pose = f"[{', '.join(text[0] for text in code.outputs)}]"
-    return "\n".join([*lines, head, f"  return candidatesOfPose({pose}, near, q, miss, most);", "}", ""])
+    return "\n".join([*lines, head, f"  return candidatesOfPose({pose}, near, q, miss, passes);", "}", ""])
 
 
 def _pencil(pencil: Pencil) -> str:

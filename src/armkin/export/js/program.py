@@ -139,8 +139,9 @@ def candidates(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
     lines.append(f"return Boolean({' | '.join(doubts) or 0});")
     head = (
         "/** Candidate branches; squared residuals, then of lengths and of angles alone; whether it is at an edge.\n"
-        " * @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss */\n"
-        "function candidates(goal, near, q, miss)"
+        " * @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss\n"
+        " * @param {number} [passes] of an elimination */\n"
+        "function candidates(goal, near, q, miss, passes)"
     )
     return _function(head, lines), len(miss)
 
