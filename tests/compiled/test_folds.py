@@ -53,3 +53,23 @@ def test_a_posture_on_a_fold_that_near_has_stays() -> None:
     found = armkin.compile(arm).ik(armkin.fk(arm, q)[:3, 3], near=q)
     assert found.status == armkin.Status.BOUNDARY
     assert np.array_equal(found.q[found.best], q)
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5e", "irb120"])
+def test_short_self_motions_are_told_without_python(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a straight wrist, whose joints 4 and 6 may move by some tenths of a radian."""
+    arm = armkin.load(name)
+    q = np.random.default_rng(12).uniform(-np.pi, np.pi, (COUNT, arm.n))
+    q[:, 4] = np.geomspace(6e-9, 6e-8, COUNT)
+    fast, target = armkin.compile(arm), armkin.fk(arm, q)
+    expected = armkin.ik(arm, target)
+    left = left_to_python(monkeypatch)
+    found = fast.ik(target)
+    told = COUNT - sum(left)
+    assert told > (expected.status != armkin.Status.SINGULAR).sum() + COUNT / 4
+    for field in ("status", "valid", "within_limits", "branch", "free", "complete"):
+        assert np.array_equal(getattr(found, field), getattr(expected, field)), field
+    np.testing.assert_allclose(found.q, expected.q, rtol=0, atol=1e-12)
+    for one, status, free in zip(map(fast.ik, target), expected.status, expected.free, strict=True):
+        assert one.status == status
+        assert np.array_equal(one.free, free)

@@ -145,7 +145,7 @@ class _CompiledTask:
         self.goal_shape = (4, 4) if self.task.orientation == "full" else (len(self.task.labels),)
         self.names = branch_names(self.turned, self.task, self.geometry, self.branches)
         self._batch = code.arm_batch
-        self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 6], size
+        self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 7], size
         code.arm_single.argtypes, code.arm_single.restype = [pointer], size
         self._single = self._quick(code.arm_single)
         self._in_c: eliminated.InC | None = None
@@ -285,7 +285,7 @@ class _CompiledTask:
         each = near.reshape(-1, self.n)
 
         def part(rows: slice) -> int:
-            arrays_ = (out.q, out.valid, out.within, out.branch, out.status, out.state)
+            arrays_ = (out.q, out.valid, out.within, out.branch, out.status, out.free, out.state)
             pointers = (a[rows].ctypes.data for a in arrays_)
             close = each[rows] if step else each
             count = rows.stop - rows.start

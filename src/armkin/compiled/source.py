@@ -19,7 +19,9 @@ from armkin.inverse.numeric.tolerances import (
     FOLD_WAY,
     FOLDED,
     HIGH,
+    MOVED,
     REACH,
+    SAME,
     SEED,
     SMOOTH,
     SOLUTION,
@@ -42,6 +44,7 @@ PARTS = Path(__file__).parent / "parts"
 
 
 LANES = 16  # poses at once: vectors of any length, and blocks of some kilobytes
+LONGER = 2  # times that a self-motion which leaves its span is asked for one twice as long
 BLOCK = 8  # poses at once of an elimination: a multiple of its vectors' lanes
 _LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_shared", "lanes_pass")
 
@@ -143,16 +146,17 @@ def _of_folds(arm: Arm, task: Task) -> dict[str, str]:
         "reach": arm.reach, "solution": SOLUTION, "closed": CLOSED, "folded": FOLDED, "lost": WEAK, "seed": SEED,
         "close_by": CLOSE_BY, "smooth": SMOOTH, "wide": REACH, "way": FOLD_WAY,
         "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "high": HIGH,
-        "shrink": local_structure.SHRINK,
+        "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME,
     }  # fmt: skip
     named = {name: number(value) for name, value in values.items()}
+    named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it
     named |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
     named |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
     named |= {"fine": str(local_structure.FINE), "points_count": str(len(local_structure.POINTS))}
     tables = {"nodes": local_structure.NODE, "points": local_structure.POINTS}
     tables |= {"fit": local_structure.TO_POWERS, "last": local_structure.TO_LAST}
     named |= {name: ", ".join(number(float(v)) for v in table.ravel()) for name, table in tables.items()}
-    named["nodes_count"] = str(local_structure.NODES)
+    named |= {"nodes_count": str(local_structure.NODES), "longer": str(LONGER)}
     sums = [[*row, offset] for row, offset in zip(task.sums.tolist(), task.offsets.tolist(), strict=True)]
     named["weights"] = ", ".join("{" + ", ".join(map(number, row)) + "}" for row in sums)
     named["sums"] = str(len(sums))

@@ -63,9 +63,11 @@ ARM_INLINE void arm_past_caches(double *to, const double *row)
 }
 
 /* All branches of n targets, in the layout of `armkin.Solutions`; near_step: 0 if one `near` serves all, else the
-   number of joints. read: whether the targets have been read. Returns how many are not done. */
+   number of joints. read: whether the targets have been read; free: zeros, which become 1 where joints are free. Returns
+   how many are not done. */
 int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t near_step, int64_t read, double *out_q,
-    uint8_t *valid, uint8_t *within, int8_t *branch, int8_t *status, uint8_t *state)
+    uint8_t *valid, uint8_t *within, int8_t *branch, int8_t *status, uint8_t *free,
+    uint8_t *state)
 {
     double goal[ARM_GOAL * ARM_LANES], close[ARM_JOINTS * ARM_LANES];
     double q[ARM_BRANCHES * ARM_JOINTS * ARM_LANES], miss[ARM_BRANCHES * ARM_LANES];
@@ -105,7 +107,7 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
             doubt[i] |= 2 * (wild[i] | (close_by && !at_near[i] && arm_hides(goal + i)));
             meets[i] = 0;
             if (doubt[i] == 1 && !at_near[i] && (read || !unread[i])) {
-                meets[i] = arm_folds(goal + i, q + i, miss + i);
+                meets[i] = arm_folds(goal + i, q + i, close + i, inside + i, miss + i, free + (start + i) * ARM_JOINTS);
                 doubt[i] = meets[i] < 0;
             }
         }
@@ -157,8 +159,7 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
     return left;
 }
 
-/* One target. block: target, near; then the results: q, and as bytes valid, within, branch, free (left alone), status,
-   state. Returns its status, or ARM_LEFT if it is left to Python. */
+/* One target. block: target, near; then the results: q, and as bytes valid, within, branch, free, status, state. Returns its status, or ARM_LEFT if it is left to Python. */
 enum { ARM_LEFT = 4 };
 int64_t arm_single(double *block)
 {
@@ -170,7 +171,8 @@ int64_t arm_single(double *block)
     for (j = 0; j < ARM_JOINTS; j++)
         if (!(fabs(near[j]) <= ARM_LARGEST))
             return ARM_LEFT;
+    memset(bytes + 3 * ARM_BRANCHES, 0, ARM_JOINTS);
     arm_batch(1, block, near, 0, 0, q, bytes, bytes + ARM_BRANCHES, (int8_t *)bytes + 2 * ARM_BRANCHES, (int8_t *)rest,
-        rest + 1);
+        bytes + 3 * ARM_BRANCHES, rest + 1);
     return rest[1] != ARM_DONE ? ARM_LEFT : rest[0];
 }

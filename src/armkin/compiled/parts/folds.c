@@ -1,11 +1,13 @@
-/* Targets on an edge whose branches stand alone, or meet in pairs: armkin.inverse.singular.local_structure, for one target,
-   where one direction is lost and no joint is free. All others are left to Python. */
+/* Targets on an edge whose branches stand alone, meet in pairs, or lie on self-motions with two ends close by:
+   armkin.inverse.singular.local_structure, for one target, where one direction is lost and no joint is free. All others
+   are left to Python. */
 enum { ARM_NODES = @nodes_count@ };
 
-/* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. */
+/* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. motion: whether it is a self-motion,
+   moves: of which joints, alone: no other curve crosses it. */
 typedef struct {
     double v[ARM_JOINTS], w[ARM_JOINTS], x[ARM_NODES][ARM_JOINTS], low, high, span, second, miss;
-    int weak, turns;
+    int weak, turns, motion, moves[ARM_JOINTS], alone;
 } arm_branch;
 
 #if @sums@
@@ -198,7 +200,7 @@ ARM_SELDOM static int arm_told(const double *q, const double *goal, const double
             swap = V[a][k], V[a][k] = V[place][k], V[place][k] = swap;
         }
     }
-    out->weak = S[last] < @folded@, out->turns = 0, out->second = S[last - 1];
+    out->weak = S[last] < @folded@, out->turns = out->motion = 0, out->second = S[last - 1];
     if (!out->weak)
         return 1;
     if (!(S[last] > @solution@) || !(S[last - 1] > @lost@)) /* rounding has turned the lost direction, or there are two */
@@ -230,15 +232,66 @@ static int arm_member(const arm_branch *one, const double *way)
     return 1;
 }
 
-/* A target on an edge: 0 if all of its branches are isolated, 1 if some meet, -1 if that is left open. miss: infinite of
-   what is one with a branch that is kept. */
-ARM_SELDOM static int arm_folds(const double *goal, const double *q, double *miss)
+/* How far joint values are from `near`, modulo whole turns [rad, reaches]. */
+ARM_SELDOM static double arm_motion(const double *q, const double *near)
 {
     static const double unit[ARM_JOINTS] = {@unit@};
     static const int slides[ARM_JOINTS] = {@slides@};
-    double at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS], way[ARM_JOINTS];
+    double sum = 0.0;
+    int j;
+    for (j = 0; j < ARM_JOINTS; j++) {
+        const double d = q[j * ARM_POINTS] - near[j * ARM_LANES];
+        sum += fabs(slides[j] ? d / unit[j] : d - ARM_TURN * rint(d / ARM_TURN));
+    }
+    return sum;
+}
+
+/* Which branch is on the component of each of some: twin, -1 where there is none. 0 if that is left open. */
+ARM_SELDOM static int arm_twins(const arm_branch *one, const double *at, int count, int *twin)
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+    static const int slides[ARM_JOINTS] = {@slides@};
+    double way[ARM_JOINTS];
+    int a, b, j;
+    for (a = 0; a < count; a++)
+        for (twin[a] = -1, b = 0; b < count; b++) {
+            double away = 0.0;
+            for (j = 0; j < ARM_JOINTS; j++) {
+                way[j] = at[j * ARM_POINTS + b] - at[j * ARM_POINTS + a];
+                way[j] = slides[j] ? way[j] / unit[j] : way[j] - ARM_TURN * rint(way[j] / ARM_TURN);
+                away = fmax(away, fabs(way[j]));
+            }
+            if (a == b || (!one[a].weak && !(away < @close_by@)))
+                continue;
+            if (away < @close_by@ && (!one[a].weak || !one[b].weak))
+                return 0;
+            if (arm_member(one + a, way)) {
+                if (twin[a] >= 0)
+                    return 0;
+                twin[a] = b;
+            }
+        }
+    for (a = 0; a < count; a++)
+        if ((b = twin[a]) >= 0) {
+            int alike = twin[b] == a && one[a].turns == one[b].turns && one[a].motion == one[b].motion;
+            for (j = 0; alike && one[a].motion && j < ARM_JOINTS; j++)
+                alike = one[a].moves[j] == one[b].moves[j];
+            if (!alike)
+                return 0;
+        }
+    return 1;
+}
+
+/* A target on an edge: its status, 0 if all of its branches are isolated, 1 if some meet, 2 if some are on self-motions, whose
+   joints are then free; -1 if that is left open. miss: infinite of what is one with a branch that is kept; inside: which
+   branches are within limits. */
+ARM_SELDOM static int arm_folds(const double *goal, const double *q, const double *near, const int *inside, double *miss,
+    uint8_t *free)
+{
+    static const double unit[ARM_JOINTS] = {@unit@}, lowest[ARM_JOINTS] = {@lowest@}, highest[ARM_JOINTS] = {@highest@};
+    double at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS];
     arm_branch one[ARM_BRANCHES];
-    int which[ARM_BRANCHES], twin[ARM_BRANCHES], count = 0, meets = 0, a, b, j;
+    int which[ARM_BRANCHES], twin[ARM_BRANCHES], count = 0, status = 0, legal = 0, at_limit = 0, a, b, j;
     for (b = 0; b < ARM_BRANCHES; b++) {
         const double off = miss[b * ARM_LANES];
         if (!(off <= @accepted@) && !(off >= @seed@ * @seed@)) /* a correction may make a branch of it */
@@ -253,37 +306,33 @@ ARM_SELDOM static int arm_folds(const double *goal, const double *q, double *mis
         return -1;
     arm_pose(at, T, count);
     arm_slope(at, slope, count);
-    for (a = 0; a < count; a++)
+    for (a = 0; a < count; a++) {
         if (!arm_told(q + which[a] * ARM_JOINTS * ARM_LANES, goal, T + a, slope + a, one + a))
             return -1;
-    for (a = 0; a < count; a++)
-        for (twin[a] = -1, b = 0; b < count; b++) {
-            double away = 0.0;
-            for (j = 0; j < ARM_JOINTS; j++) {
-                way[j] = at[j * ARM_POINTS + b] - at[j * ARM_POINTS + a];
-                way[j] = slides[j] ? way[j] / unit[j] : way[j] - ARM_TURN * rint(way[j] / ARM_TURN);
-                away = fmax(away, fabs(way[j]));
-            }
-            if (a == b || !(away < @close_by@))
-                continue;
-            if (!one[a].weak || !one[b].weak)
-                return -1;
-            if (arm_member(one + a, way)) {
-                if (twin[a] >= 0)
-                    return -1;
-                twin[a] = b;
-            }
-        }
-    for (a = 0; a < count; a++) {
-        if ((b = twin[a]) < 0) {
-            meets |= one[a].turns;
-            continue;
-        }
-        if (twin[b] != a || one[a].turns != one[b].turns)
+        if (one[a].motion && !(one[a].alone && one[a].second > @high@ && @motions@))
             return -1;
-        meets |= one[a].turns;
-        if (b < a)
-            miss[which[a] * ARM_LANES] = INFINITY;
+        status = one[a].motion ? 2 : status > one[a].turns ? status : one[a].turns;
     }
-    return meets;
+    if (!arm_twins(one, at, count, twin))
+        return -1;
+    for (a = 0; a < count; a++)
+        if ((b = twin[a]) > a) { /* the first is listed, of a self-motion the one closer to `near` */
+            const double first = arm_motion(at + a, near), second = arm_motion(at + b, near);
+            miss[which[one[a].motion && first > second ? a : b] * ARM_LANES] = INFINITY;
+        }
+    for (b = 0; status && b < ARM_BRANCHES; b++) {
+        int limit = miss[b * ARM_LANES] <= @accepted@;
+        legal |= limit && inside[b * ARM_LANES];
+        for (j = 0; j < ARM_JOINTS; j++) {
+            const double value = q[(b * ARM_JOINTS + j) * ARM_LANES];
+            limit &= value >= lowest[j] - @same@ * unit[j] && value <= highest[j] + @same@ * unit[j];
+        }
+        at_limit |= limit;
+    }
+    if (at_limit && !legal) /* another posture, as close to its target, may be within limits */
+        return -1;
+    for (a = 0; status == 2 && a < count; a++)
+        for (j = 0; j < ARM_JOINTS; j++)
+            free[j] |= one[a].motion && one[a].moves[j];
+    return status;
 }
