@@ -180,7 +180,7 @@ ARM_SELDOM static int arm_second_order(const double *q, const double *goal, cons
 ARM_SELDOM static int arm_told(const double *q, const double *goal, const double *T, const double *slope, arm_branch *out)
 {
     double A[ARM_JOINTS][ARM_JOINTS], V[ARM_JOINTS][ARM_JOINTS], S[ARM_JOINTS], r[ARM_JOINTS], swap;
-    int a, k, j, place, last = ARM_JOINTS - 1;
+    int a, k, j, place, told, last = ARM_JOINTS - 1;
     arm_residual(T, goal, q, ARM_LANES, r);
     for (out->miss = 0.0, k = 0; k < ARM_JOINTS; k++) {
         out->miss += r[k] * r[k];
@@ -203,12 +203,15 @@ ARM_SELDOM static int arm_told(const double *q, const double *goal, const double
     out->weak = S[last] < @folded@, out->turns = out->motion = 0, out->second = S[last - 1];
     if (!out->weak)
         return 1;
-    if (!(S[last] > @solution@) || !(S[last - 1] > @lost@)) /* rounding has turned the lost direction, or there are two */
+    if (!(S[last - 1] > @lost@)) /* two directions are lost */
+        return 0;
+    if (@sums@ && !(S[last] > @solution@)) /* where sums of joints are taken off, rounding parts a double root another way */
         return 0;
     for (a = 0; a < ARM_JOINTS; a++)
         for (k = 0; k < ARM_JOINTS; k++)
             A[a][k] /= S[a];
-    return arm_second_order(q, goal, r, A, V, S, out) || arm_followed(q, goal, A[last], out);
+    told = arm_second_order(q, goal, r, A, V, S, out) || arm_followed(q, goal, A[last], out);
+    return told && (!out->motion || S[last] > @solution@);
 }
 
 /* Whether a posture that far away [rad, reaches] lies on a weak branch's component: `members` in Python. */
