@@ -48,12 +48,7 @@ class Columns:
 
     def row(self, line: bytes, number: int) -> list[float] | None:
         """One line; None for a heading, a comment, an empty line or a row without values."""
-        try:
-            text = line.decode("utf-8-sig" if number == 1 else "utf-8").strip()
-        except UnicodeDecodeError:
-            raise UsageError("this is no UTF-8 text") from None
-        if len(line) >= LONGEST or "\0" in text:
-            raise UsageError("this is no CSV of numbers")
+        text = _text_of(line, "utf-8-sig" if number == 1 else "utf-8")
         if not text or text.startswith("#"):
             return None
         cells = _cells(text)
@@ -73,12 +68,16 @@ class Columns:
                 self.skipped += 1
                 return None
         elif len(cells) == 1 and len(self.names) > 1:
-            if '"' in text:
-                raise UsageError("the numbers of a row stand in one pair of quotes, or behind one: leave quotes out")
-            for separator in (";", "\t", " "):
-                if len(text.split(separator)) == len(self.names):
-                    raise UsageError(f"separate the numbers with commas, not with {separator!r}")
+            self._check_separator(text)
         return numbers(cells, self.names, self.what)
+
+    def _check_separator(self, text: str) -> None:
+        """Raise UsageError for several numbers that something else than commas separates."""
+        if '"' in text:
+            raise UsageError("the numbers of a row stand in one pair of quotes, or behind one: leave quotes out")
+        for separator in (";", "\t", " "):
+            if len(text.split(separator)) == len(self.names):
+                raise UsageError(f"separate the numbers with commas, not with {separator!r}")
 
     def all_plain(self, text: bytes) -> Array | None:
         """All numbers (N, m) of lines whose wanted cells are ordinary numbers: the fast way; None: look closer."""
@@ -323,6 +322,17 @@ def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator
         yield Chunk(index, np.array(good))
     if problem is not None:
         raise problem
+
+
+def _text_of(line: bytes, encoding: str) -> str:
+    """A line's text. Raises UsageError for bytes that are none."""
+    try:
+        text = line.decode(encoding).strip()
+    except UnicodeDecodeError:
+        raise UsageError("this is no UTF-8 text") from None
+    if len(line) >= LONGEST or "\0" in text:
+        raise UsageError("this is no CSV of numbers")
+    return text
 
 
 def _cells(text: str) -> list[str]:

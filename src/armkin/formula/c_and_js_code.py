@@ -123,40 +123,13 @@ class _Writer:
 
     def apply(self, op: str, args: list[Value]) -> Value:
         """The value of an operation: no factors of one, signs moved outwards, equal operations once."""
+        if op in ("multiply", "divide", "add", "subtract"):
+            return self._arithmetic(op, *args)
         if op == "negative":
             return _flipped(args[0], True)
-        if all(x.constant is not None for x in args) and op in ("multiply", "add", "subtract"):
-            x, y = (-a.constant if a.minus else a.constant for a in args)  # type: ignore[operator]
-            assert x is not None
-            assert y is not None
-            return self.constant(x * y if op == "multiply" else x + y if op == "add" else x - y)
-        if op in ("multiply", "divide"):
-            a, b = args
-            minus = a.minus != b.minus
-            a, b = a._replace(minus=False), b._replace(minus=False)
-            if op == "multiply" and a.constant == 1.0:
-                return _flipped(b, minus)
-            if b.constant == 1.0:
-                return _flipped(a, minus)
-            if op == "multiply" and (a.constant == 0.0 or b.constant == 0.0):
-                return self.constant(0.0)
-            args = sorted((a, b)) if op == "multiply" else [a, b]
-            return _flipped(self.emit(op, args), minus)
-        if op in ("add", "subtract"):
-            a, b = args
-            b = _flipped(b, op == "subtract")
-            if a.constant == 0.0:
-                return b
-            if b.constant == 0.0:
-                return a
-            if a.minus == b.minus:
-                plain = sorted((a._replace(minus=False), b._replace(minus=False)))
-                return _flipped(self.emit("add", plain), a.minus)
-            plus, less = (b, a) if a.minus else (a, b)
-            return self.emit("subtract", [plus._replace(minus=False), less._replace(minus=False)])
         if op == "power":
             assert args[1].constant == 2.0, "only squares are recorded"
-            return self.apply("multiply", [args[0], args[0]])
+            return self._arithmetic("multiply", args[0], args[0])
         if op == "absolute":
             args = [args[0]._replace(minus=False)]
         if op == "where" and args[1] == args[2]:
@@ -164,6 +137,34 @@ class _Writer:
         if op in ("maximum", "minimum") and args[0].constant is not None:
             args = args[::-1]
         return self.emit(op, args)
+
+    def _arithmetic(self, op: str, a: Value, b: Value) -> Value:
+        """A product, a quotient, a sum or a difference."""
+        if a.constant is not None and b.constant is not None and op != "divide":
+            x, y = (-c if minus else c for c, minus in ((a.constant, a.minus), (b.constant, b.minus)))
+            return self.constant(x * y if op == "multiply" else x + y if op == "add" else x - y)
+        if op in ("add", "subtract"):
+            return self._sum(a, _flipped(b, op == "subtract"))
+        minus = a.minus != b.minus
+        a, b = a._replace(minus=False), b._replace(minus=False)
+        if op == "multiply" and a.constant == 1.0:
+            return _flipped(b, minus)
+        if b.constant == 1.0:
+            return _flipped(a, minus)
+        if op == "multiply" and 0.0 in (a.constant, b.constant):
+            return self.constant(0.0)
+        return _flipped(self.emit(op, sorted((a, b)) if op == "multiply" else [a, b]), minus)
+
+    def _sum(self, a: Value, b: Value) -> Value:
+        if a.constant == 0.0:
+            return b
+        if b.constant == 0.0:
+            return a
+        if a.minus == b.minus:
+            plain = sorted((a._replace(minus=False), b._replace(minus=False)))
+            return _flipped(self.emit("add", plain), a.minus)
+        plus, less = (b, a) if a.minus else (a, b)
+        return self.emit("subtract", [plus._replace(minus=False), less._replace(minus=False)])
 
     def emit(self, op: str, args: list[Value]) -> Value:
         """A new variable for an operation, or the one that holds it."""

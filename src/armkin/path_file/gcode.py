@@ -110,24 +110,17 @@ class _Program:
             self.feed = values.pop("F") * self._unit_after(codes)
             if self.feed < 0:
                 raise self._wrong("F below 0 is no feed")
-        gripped = values.get("S")
+        gripped = values.pop("S", None)
         for code in m_codes:
             if code not in (0.0, 1.0, 2.0, 30.0):
                 self._switch(code, gripped)
-        values.pop("S", None)
         waits = 4.0 in codes and "P" not in values
         if gripped is not None and not waits and not (self.options.grip_by == "M106" and 106.0 in m_codes):
             self._ignore("S")
         if 4.0 in codes:
             self._dwell(values, gripped)
         self._modes(codes)
-        for code in codes:
-            if code in _IGNORED_G:
-                self._ignore(_IGNORED_G[code])
-                if code in (29.0, 11.0):
-                    values.clear()
-                if code == 64.0:
-                    values.pop("P", None)
+        self._passed_over(codes, values)
         self._offsets_and_motion(codes, values)
         if values:
             letter = next(iter(values))
@@ -136,6 +129,16 @@ class _Program:
             if code in (0.0, 1.0):
                 self.pen.pause(self.line)
         return 2.0 in m_codes or 30.0 in m_codes
+
+    def _passed_over(self, codes: list[float], values: dict[str, float]) -> None:
+        """G codes without a meaning for an arm, and the words that belong to them."""
+        for code in codes:
+            if code in _IGNORED_G:
+                self._ignore(_IGNORED_G[code])
+                if code in (29.0, 11.0):
+                    values.clear()
+                if code == 64.0:
+                    values.pop("P", None)
 
     def _sorted(self) -> tuple[list[float], list[float], dict[str, float]]:
         """The line's G and M codes, and its other words."""

@@ -142,21 +142,8 @@ class _Drawer:
 
     def draw(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
         """An element and all in it; m: from where it stands to millimetres."""
-        self.elements += 1
-        if self.elements > _MOST:
-            raise self._wrong(element, f"is one of more than {_MOST} elements")
-        if depth > _DEEPEST:
-            raise self._wrong(element, f"stands in others deeper than {_DEEPEST}, or uses itself")
-        if element.tag in _REFUSED:
-            raise self._wrong(element, "is not drawn: make its outlines a path first")
-        known = element.tag in _SHAPES or element.tag in _GROUPS or element.tag == "use"
-        if not known or element.style("display") == "none" or element.style("visibility") == "hidden":
+        if not self._is_drawn(element, depth):
             return
-        for key in ("clip-path", "mask"):
-            if element.style(key) not in (None, "none"):
-                raise self._wrong(element, f"has {key}: cut its outlines off first")
-        if element.tag == "svg":
-            raise self._wrong(element, "stands inside of another <svg>")
         try:
             m = times(m, transform(element.attributes.get("transform", "")))
             if element.tag == "use":
@@ -170,6 +157,25 @@ class _Drawer:
         if element.tag in _GROUPS and (element.tag != "symbol" or depth):
             for child in element.children:
                 self.draw(child, m, named, depth + 1)
+
+    def _is_drawn(self, element: _Element, depth: int) -> bool:
+        """Whether an element can be seen. Raises PathFileError for one that would be drawn wrongly."""
+        self.elements += 1
+        if self.elements > _MOST:
+            raise self._wrong(element, f"is one of more than {_MOST} elements")
+        if depth > _DEEPEST:
+            raise self._wrong(element, f"stands in others deeper than {_DEEPEST}, or uses itself")
+        if element.tag in _REFUSED:
+            raise self._wrong(element, "is not drawn: make its outlines a path first")
+        known = element.tag in _SHAPES or element.tag in _GROUPS or element.tag == "use"
+        if not known or element.style("display") == "none" or element.style("visibility") == "hidden":
+            return False
+        for key in ("clip-path", "mask"):
+            if element.style(key) not in (None, "none"):
+                raise self._wrong(element, f"has {key}: cut its outlines off first")
+        if element.tag == "svg":
+            raise self._wrong(element, "stands inside of another <svg>")
+        return True
 
     def _use(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
         href = element.attributes.get("href", element.attributes.get("xlink:href", ""))

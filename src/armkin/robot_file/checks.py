@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from armkin import installed_kinds
+from armkin import board_kinds, installed_kinds
 from armkin.board_kinds import BOARDS
 from armkin.robot_file.model import Gripper, Triple, dot
 
@@ -252,23 +252,8 @@ def _servo_reach(drive: Drive, joint: Joint) -> Iterator[Problem]:
 
 def _motors(robot: RobotKeys) -> Iterator[Problem]:
     for i, joint in enumerate(robot.joints):
-        drive = joint.drive
-        if drive is None:
-            continue
-        if robot.motors is not None:
-            yield ("joints", i, "drive"), "the file also has motors; put all drives there, or use drives only"
-        for path, message in _drive(drive):
-            yield ("joints", i, "drive", *path), message
-        if joint.type == "prismatic":
-            if drive.kind != "stepper":
-                hint = f"use motors: with joints: {{{joint.name}: degrees per mm}}"
-                yield ("joints", i, "drive"), f"a servo turns, and the joint is prismatic; {hint}"
-            elif drive.lead is None:
-                yield ("joints", i, "drive"), "a prismatic joint's stepper needs lead, the mm per turn"
-        elif drive.lead is not None:
-            yield ("joints", i, "drive", "lead"), "is for prismatic joints; use gear or pulley"
-        else:
-            for path, message in _servo_reach(drive, joint):
+        if joint.drive is not None:
+            for path, message in _own_drive(joint, joint.drive, alone=robot.motors is None):
                 yield ("joints", i, *path), message
     if robot.motors is not None:
         yield from _repeated("motor", [motor.name for motor in robot.motors], "motors")
@@ -278,6 +263,24 @@ def _motors(robot: RobotKeys) -> Iterator[Problem]:
         yield from _determined(robot, robot.motors)
     if robot.gripper is not None:
         yield from _gripper(robot)
+
+
+def _own_drive(joint: Joint, drive: Drive, *, alone: bool) -> Iterator[Problem]:
+    """A joint's own drive: all drives stand at joints or none, and it moves as the joint does."""
+    if not alone:
+        yield ("drive",), "the file also has motors; put all drives there, or use drives only"
+    for path, message in _drive(drive):
+        yield ("drive", *path), message
+    if joint.type == "prismatic":
+        if drive.kind != "stepper":
+            hint = f"use motors: with joints: {{{joint.name}: degrees per mm}}"
+            yield ("drive",), f"a servo turns, and the joint is prismatic; {hint}"
+        elif drive.lead is None:
+            yield ("drive",), "a prismatic joint's stepper needs lead, the mm per turn"
+    elif drive.lead is not None:
+        yield ("drive", "lead"), "is for prismatic joints; use gear or pulley"
+    else:
+        yield from _servo_reach(drive, joint)
 
 
 def _weights(motor: Motor, robot: RobotKeys) -> Iterator[Problem]:
@@ -382,10 +385,14 @@ def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
                 yield ("board", key), f"{settings.kind} has settings of its own for this; remove it"
         return
     board = BOARDS[settings.kind]
-    if not board.steppers:
-        for key in ("driver", "enable"):
-            if getattr(settings, key) is not None:
-                yield ("board", key), f"{settings.kind} has no stepper drivers; remove it"
+    for key in () if board.steppers else ("driver", "enable"):
+        if getattr(settings, key) is not None:
+            yield ("board", key), f"{settings.kind} has no stepper drivers; remove it"
+    yield from _inputs(robot, settings, board)
+
+
+def _inputs(robot: RobotKeys, settings: Board, board: board_kinds.Board) -> Iterator[Problem]:
+    """The board senses what it is to sense."""
     if settings.power not in (None, board.power):
         yield ("board", "power"), f"{settings.kind} senses the motors' power at {board.power}, not {settings.power}"
     for i, joint in enumerate(robot.joints):

@@ -5,7 +5,7 @@ becomes ``(path, text)``; the reader adds the file and the line.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from pydantic import BaseModel
@@ -119,12 +119,9 @@ _SYNONYMS: dict[str, str] = {
 
 def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
     """pydantic's error list (``ValidationError.errors()``) as paths and texts."""
-    suggested: set[Path] = set()
-    for error in errors:  # a misspelt key is also a missing one: say it once
-        if error["type"] == "extra_forbidden":
-            key = _suggestion(error["loc"])
-            if key is not None:
-                suggested.add((*error["loc"][:-1], key))
+    # a misspelt key is also a missing one: say it once
+    unknown = [error["loc"] for error in errors if error["type"] == "extra_forbidden"]
+    suggested = {(*loc[:-1], key) for loc in unknown if (key := _suggestion(loc)) is not None}
     wrong_lengths: set[Path] = set()
     for error in errors:
         path: Path = tuple(part for part in error["loc"] if part != "[key]")
@@ -147,53 +144,39 @@ def _text(error: Any) -> str:
     context = error.get("ctx", {})
     if path and path[-1] in ("sign", "direction"):
         return f"must be 1 or -1, not {shown(value)}"
-    if kind == "extra_forbidden":
-        return _unknown_key(path)
-    if kind == "missing":
-        key = str(path[-1])
-        example = "text, for example three_dof" if path == ("name",) else _EXAMPLES.get(key)
-        return f"is required: {example or _first_sentence(_owner(path), key)}"
-    if kind == "too_long" and path in (("joints",), ("motors",)):
+    if kind in _BOUNDS:
+        text = f"{_BOUNDS[kind].format(**context)}, not {shown(value)}"
+        other = path[-1] in ("gear", "pulley") and value < 0
+        return f"{text}; for the other direction write invert: true" if other else text
+    words = _WORDS.get(kind)
+    return str(error["msg"]) if words is None else words(path, value, context)
+
+
+def _missing(path: Path, value: Any, context: Any) -> str:
+    key = str(path[-1])
+    example = "text, for example three_dof" if path == ("name",) else _EXAMPLES.get(key)
+    return f"is required: {example or _first_sentence(_owner(path), key)}"
+
+
+def _too_long(path: Path, value: Any, context: Any) -> str:
+    if path in (("joints",), ("motors",)):
         return f"{len(value)} {path[0]}; armkin takes 1 to {context['max_length']}"
-    if kind == "too_short" and path == ("joints",):
-        return "is empty; an arm has at least one joint"
-    if kind in ("too_short", "too_long"):
-        return f"is too {'short' if kind == 'too_short' else 'long'}; write {_example(path)}"
-    if kind in ("tuple_type", "model_type", "dict_type", "model_attributes_type"):
-        return f"must be {_example(path)}, not {shown(value)}"
-    if kind in ("float_type", "int_type"):
-        return _not_a_number(kind, path, value)
-    if kind == "string_type":
-        return f'must be text, not {shown(value)}; write "{shown(value)}" in quotes if that is meant'
-    if kind == "bool_type":
-        return f"must be true or false, not {shown(value)}"
-    if kind == "literal_error":
-        return _not_a_choice(str(value), context["expected"].replace("'", ""), shown(value))
-    if kind == "string_pattern_mismatch":
-        return f"{shown(value)} is not a name: letters, digits, _ . and -, beginning with a letter"
-    if kind == "string_too_long":
-        return f"is longer than {context['max_length']} characters"
-    if kind == "string_too_short":
-        return "is empty"
-    bound = {
-        "greater_than": "must be above {gt:.10g}",
-        "greater_than_equal": "must be at least {ge:.10g}",
-        "less_than": "must be below {lt:.10g}",
-        "less_than_equal": "must be at most {le:.10g}",
-    }.get(kind)
-    if bound:
-        text = f"{bound.format(**context)}, not {shown(value)}"
-        if path[-1] in ("gear", "pulley") and value < 0:
-            text += "; for the other direction write invert: true"
-        return text
-    return str(error["msg"])
+    return f"is too long; write {_example(path)}"
 
 
-def _not_a_number(kind: str, path: Path, value: Any) -> str:
-    what = "a number" if kind == "float_type" else "a whole number"
+def _too_short(path: Path, value: Any, context: Any) -> str:
+    return "is empty; an arm has at least one joint" if path == ("joints",) else f"is too short; write {_example(path)}"
+
+
+def _another_type(path: Path, value: Any, context: Any) -> str:
+    return f"must be {_example(path)}, not {shown(value)}"
+
+
+def _not_a_number(what: str, path: Path, value: Any) -> str:
+    whole = what == "a whole number"
     if path[-1] in ("gear", "pulley"):
         what += " or teeth {motor: 16, joint: 80}"
-    if kind == "int_type" and isinstance(value, float) and value.is_integer():
+    if whole and isinstance(value, float) and value.is_integer():
         return f"must be {what}, not {value}; write {value:.0f}"
     text = f"must be {what}, not {shown(value)}"
     if not isinstance(value, str):
@@ -312,3 +295,36 @@ def shown(value: Any) -> str:
     if isinstance(value, tuple | list):
         return "a list" if value else "an empty list []"
     return f"the text '{strict_yaml.shown(str(value))}'"
+
+
+_BOUNDS = {
+    "greater_than": "must be above {gt:.10g}",
+    "greater_than_equal": "must be at least {ge:.10g}",
+    "less_than": "must be below {lt:.10g}",
+    "less_than_equal": "must be at most {le:.10g}",
+}
+# What is said of each kind of error, from its path, the value found and what pydantic says besides.
+_WORDS: dict[str, Callable[[Path, Any, Any], str]] = {
+    "extra_forbidden": lambda path, _value, _context: _unknown_key(path),
+    "missing": _missing,
+    "too_long": _too_long,
+    "too_short": _too_short,
+    "tuple_type": _another_type,
+    "model_type": _another_type,
+    "dict_type": _another_type,
+    "model_attributes_type": _another_type,
+    "float_type": lambda path, value, _context: _not_a_number("a number", path, value),
+    "int_type": lambda path, value, _context: _not_a_number("a whole number", path, value),
+    "string_type": lambda _path, value, _context: (
+        f'must be text, not {shown(value)}; write "{shown(value)}" in quotes if that is meant'
+    ),
+    "bool_type": lambda _path, value, _context: f"must be true or false, not {shown(value)}",
+    "literal_error": lambda _path, value, context: _not_a_choice(
+        str(value), context["expected"].replace("'", ""), shown(value)
+    ),
+    "string_pattern_mismatch": lambda _path, value, _context: (
+        f"{shown(value)} is not a name: letters, digits, _ . and -, beginning with a letter"
+    ),
+    "string_too_long": lambda _path, _value, context: f"is longer than {context['max_length']} characters",
+    "string_too_short": lambda _path, _value, _context: "is empty",
+}

@@ -201,13 +201,12 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
         _refuse_what_unfolds(event, line)
         parent = stack[-1] if stack else None
         awaits_key = parent is not None and parent.mapping and parent.key is None
-
+        path = parent.value_path() if parent else ()
         if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
             if awaits_key:
                 raise StrictYamlError(line, "a key must be a word, not a list or mapping")
             if len(stack) >= MAX_DEPTH:
                 raise StrictYamlError(line, _too_deep(kind))
-            path = parent.value_path() if parent else ()
             lines.setdefault(path, line)
             stack.append(_Node(path, isinstance(event, yaml.MappingStartEvent)))
             continue
@@ -219,7 +218,7 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
                 parent.key = _key(event, parent, lines, line)
                 continue
             value = _scalar(event, parent, line, kind)
-            lines.setdefault(parent.value_path() if parent else (), line)
+            lines.setdefault(path, line)
         else:
             continue  # stream and document marks
 
@@ -317,6 +316,12 @@ def _number(text: str, line: int) -> str | int | float:
         return value
     if re.fullmatch(_NOT_FINITE, text):
         raise StrictYamlError(line, f"{text} is not a finite number; write one, or leave the key out for no bound")
+    _refuse_what_misleads(text, line)
+    return text
+
+
+def _refuse_what_misleads(text: str, line: int) -> None:
+    """Raise StrictYamlError for text that YAML, or some reader of it, takes for a number or a date."""
     if re.fullmatch(_SEXAGESIMAL, text):
         raise StrictYamlError(line, _sexagesimal(text))
     if zeros := re.fullmatch(_LEADING_ZERO, text):
@@ -338,7 +343,6 @@ def _number(text: str, line: int) -> str | int | float:
         raise StrictYamlError(line, f"{what}; write {shown(better)}, or quotes for text")
     if re.fullmatch(_TIMESTAMP, text):
         raise StrictYamlError(line, f'{shown(text)} is a date to YAML; write "{text}" for text')
-    return text
 
 
 def _sexagesimal(text: str) -> str:
