@@ -220,10 +220,7 @@ class _CompiledTask:
         rows = near_itself.standing(self.arm, self.task, target, each, most)
         if len(rows):
             self._by_python(out, rows, target, each.reshape(-1, self.n), most - SOLUTION)
-        if self.arm.prismatic.any():
-            out.complete[distance(self.arm, self.task, target) > FAR] = False
-        if not self.geometry.ordered:
-            out.branch[...] = follow(self.arm, self.task, out.q, target)
+        self._finish(out, target)
         target = target.copy() if np.may_share_memory(target, given) else target  # the caller's arrays may change
         close = close.copy()
         q = out.q
@@ -245,6 +242,13 @@ class _CompiledTask:
             complete=out.complete.reshape(lead),
             rounding=rounding.reshape(lead),
         )
+
+    def _finish(self, out: Results, target: Array) -> None:
+        """What is known of far targets, and numbers of branches that have no order of their own."""
+        if self.arm.prismatic.any():
+            out.complete[distance(self.arm, self.task, target) > FAR] = False
+        if not self.geometry.ordered:
+            out.branch[...] = follow(self.arm, self.task, out.q, target)
 
     def _without_a_form(self, targets: ArrayLike, near: ArrayLike | None, said: ArrayLike | None) -> Solutions:
         """As `armkin.ik`; of an arm with a redundant joint the others by machine code."""

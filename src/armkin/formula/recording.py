@@ -76,9 +76,7 @@ class Trace:
         Signs are those of branches, too: ``(s a) (s b)`` is computed once for both values of s.
         """
         if op in ("bitwise_and", "bitwise_or"):
-            for x, y in (inputs, inputs[::-1]):
-                if isinstance(x, bool | np.bool_):  # of two constants
-                    return y if bool(x) == (op == "bitwise_and") else bool(x)
+            return self._of_truths(op, *inputs)
         if op == "power" and inputs[1] == 2:
             return self.simplify("multiply", (inputs[0], inputs[0]))
         if op not in ODD and op not in ("negative", "absolute", "multiply", "divide", "add", "subtract"):
@@ -93,12 +91,22 @@ class Trace:
         if op == "divide":
             return self._signed(self.record(op, (a, b)), _product(s, t))
         if op == "multiply":
-            sign = _product(s, t)
-            for x, y in ((a, b), (b, a)):
-                if not isinstance(x, Node) and _ndim(x) == 0 and abs(x) in (0.0, 1.0):
-                    return self._signed(y, _product(sign, x)) if x else 0.0
-            return self._signed(self._product(a, b), sign)
+            return self._times(a, b, _product(s, t))
         return self._sum(s, a, -t if op == "subtract" else t, b)
+
+    def _of_truths(self, op: str, x: Any, y: Any) -> Any:
+        """``x & y`` or ``x | y``: without an operation where one of the two is known."""
+        for known, other in ((x, y), (y, x)):
+            if isinstance(known, bool | np.bool_):  # of two constants
+                return other if bool(known) == (op == "bitwise_and") else bool(known)
+        return self.record(op, (x, y))
+
+    def _times(self, a: Any, b: Any, sign: Sign) -> Any:
+        """``sign a b``."""
+        for x, y in ((a, b), (b, a)):
+            if not isinstance(x, Node) and _ndim(x) == 0 and abs(x) in (0.0, 1.0):
+                return self._signed(y, _product(sign, x)) if x else 0.0
+        return self._signed(self._product(a, b), sign)
 
     def _sum(self, s: Sign, a: Any, t: Sign, b: Any) -> Any:
         """``s a + t b``."""

@@ -119,15 +119,17 @@ def outlines(tag: str, attributes: Mapping[str, str], m: Matrix) -> list[list[Po
             pen.close()
     elif tag in ("circle", "ellipse"):
         one, other = above_zero(attributes, *(("r", "r") if tag == "circle" else ("rx", "ry")))
-        rx, ry = (other if one is None else one) or 0.0, (one if other is None else other) or 0.0
-        if rx > 0 and ry > 0:
-            x, y = size("cx"), size("cy")
-            pen.move((x + rx, y))
-            pen.ellipse((x, y), rx, ry, 0.0, 0.0, 2 * math.pi)
-            pen.close()
+        _ellipse(pen, size("cx"), size("cy"), other if one is None else one, one if other is None else other)
     elif tag == "rect":
         _rectangle(pen, size("x"), size("y"), attributes)
     return [stroke for stroke in pen.strokes if len(stroke) > 1]
+
+
+def _ellipse(pen: _Outline, x: float, y: float, rx: float | None, ry: float | None) -> None:
+    if rx and ry:
+        pen.move((x + rx, y))
+        pen.ellipse((x, y), rx, ry, 0.0, 0.0, 2 * math.pi)
+        pen.close()
 
 
 def _rectangle(pen: _Outline, x: float, y: float, attributes: Mapping[str, str]) -> None:

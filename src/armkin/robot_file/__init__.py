@@ -1,7 +1,7 @@
 """Robot files: YAML in, one validated, immutable model out, or an error with its line.
 
 strict_yaml.py  YAML without its traps
-model.py        keys, types, bounds, as pydantic has them; checks.py: rules between values
+model.py        keys, types, bounds, as pydantic has them; checks.py, drive_checks.py: rules between values
 robot.py        `RobotFile`: the two together; messages.py: errors in the file's own words
 key_types.py    what all keys are made of; keep_out.py: floors, boxes, capsules; scene.py: such in a file of their own
 schema.py       JSON Schema, for editors

@@ -177,6 +177,10 @@ class _Node:
     def value_path(self) -> Path:
         return (*self.path, self.key if self.mapping and self.key is not None else len(self.items))
 
+    def value(self) -> Any:
+        """All that was added."""
+        return self.items if self.mapping else tuple(self.items)
+
     def add(self, value: Any) -> None:
         """The value of the key that stands before it, or the next item."""
         if self.mapping:
@@ -186,42 +190,37 @@ class _Node:
             self.items.append(value)
 
 
+def _path(parent: _Node | None) -> Path:
+    """The place of the next value."""
+    return parent.value_path() if parent else ()
+
+
 def _build(events: Iterator[Any], kind: Kind) -> Document:
     lines: dict[Path, int] = {}
     stack: list[_Node] = []
     root: Any = None
-    documents = 0
     for event in events:
         line = event.start_mark.line + 1
-        if isinstance(event, yaml.DocumentStartEvent):
-            documents += 1
-            if documents > 1:
-                raise StrictYamlError(line, f"a second document begins here; a {kind.name} is one document")
-            continue
+        if isinstance(event, yaml.DocumentStartEvent) and root is not None:
+            raise StrictYamlError(line, f"a second document begins here; a {kind.name} is one document")
         _refuse_what_unfolds(event, line)
         parent = stack[-1] if stack else None
         awaits_key = parent is not None and parent.mapping and parent.key is None
-        path = parent.value_path() if parent else ()
         if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
-            if awaits_key:
-                raise StrictYamlError(line, "a key must be a word, not a list or mapping")
-            if len(stack) >= MAX_DEPTH:
-                raise StrictYamlError(line, _too_deep(kind))
-            lines.setdefault(path, line)
-            stack.append(_Node(path, isinstance(event, yaml.MappingStartEvent)))
+            _check_place(awaits_key, len(stack), line, kind)
+            stack.append(_Node(_path(parent), isinstance(event, yaml.MappingStartEvent)))
+            lines.setdefault(stack[-1].path, line)
             continue
         if isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
-            node = stack.pop()
-            value: Any = node.items if node.mapping else tuple(node.items)
+            value = stack.pop().value()
         elif isinstance(event, yaml.ScalarEvent):
             if awaits_key and parent is not None:
                 parent.key = _key(event, parent, lines, line)
                 continue
             value = _scalar(event, parent, line, kind)
-            lines.setdefault(path, line)
+            lines.setdefault(_path(parent), line)
         else:
             continue  # stream and document marks
-
         if len(lines) > kind.values:
             raise StrictYamlError(line, f"more than {kind.values} values; no {kind.name} has so many")
         if stack:
@@ -231,6 +230,14 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
     if root is None:
         raise StrictYamlError(0, kind.empty)
     return Document(root, lines)
+
+
+def _check_place(awaits_key: bool, depth: int, line: int, kind: Kind) -> None:
+    """Raise StrictYamlError where no list or mapping may begin."""
+    if awaits_key:
+        raise StrictYamlError(line, "a key must be a word, not a list or mapping")
+    if depth >= MAX_DEPTH:
+        raise StrictYamlError(line, _too_deep(kind))
 
 
 def _refuse_what_unfolds(event: Any, line: int) -> None:

@@ -122,15 +122,7 @@ def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap:
         T = T @ origin(joint, where, snap)
         if joint.kind == "fixed":
             continue
-        if joint.kind not in _MOVING:
-            kinds = "revolute, continuous, prismatic and fixed can be read"
-            raise RobotFileError(f"{where}: type {joint.kind or 'is missing'}; {kinds}")
-        if "mimic" in joint.parts:
-            leader = joint.text("mimic", "joint") or "another joint"
-            raise RobotFileError(
-                f"{where}: mimics {leader}: two joints of the chain move as one, which a robot file cannot say; "
-                "choose another tip"
-            )
+        _check_moving(joint, where)
         direction = T[:3, :3] @ axis(joint, where, snap)
         joints.append(_joint(joint, names[joint.name], T[:3, 3], direction, where, notes))
         if np.abs(T[:3, 3]).max() > FARTHEST:
@@ -156,6 +148,19 @@ def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap:
     return Imported(data, tuple(notes), base, tip)
 
 
+def _check_moving(joint: Joint, where: str) -> None:
+    """Raise RobotFileError for a joint that moves as none of a robot file does."""
+    if joint.kind not in _MOVING:
+        kinds = "revolute, continuous, prismatic and fixed can be read"
+        raise RobotFileError(f"{where}: type {joint.kind or 'is missing'}; {kinds}")
+    if "mimic" in joint.parts:
+        leader = joint.text("mimic", "joint") or "another joint"
+        raise RobotFileError(
+            f"{where}: mimics {leader}: two joints of the chain move as one, which a robot file cannot say; "
+            "choose another tip"
+        )
+
+
 def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, where: str, notes: list[str]) -> dict[str, Any]:
     """A joint of the robot file: screw, limits, home and speed."""
     slides = joint.kind == "prismatic"
@@ -169,21 +174,7 @@ def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, where: str
     lower, upper = (_value(joint, key, where) for key in ("lower", "upper"))
     if joint.kind != "continuous" and "limit" in joint.parts:
         low, high = (tidy((value or 0.0) * size, 9) for value in (lower, upper))
-        if low > high:
-            raise RobotFileError(f"{where}: lower limit {low:g} {unit} is above upper limit {high:g} {unit}")
-        if max(-low, high) > ENDLESS:
-            notes.append(f"joint {name} has limits beyond {ENDLESS:.0f} {unit}: read as no limits")
-        elif low == high == 0:
-            notes.append(f"joint {name} has limits 0 and 0: read as no limits")
-        elif low == high:
-            raise RobotFileError(f"{where}: both limits are {low:g} {unit}; a joint that never moves is fixed")
-        else:
-            entry["limits"] = [low, high]
-            if not slides and max(-low, high) > TURNS * size:
-                notes.append(f"joint {name} turns {low:g} to {high:g} deg: a URDF is in radians, are these degrees?")
-            if not low <= 0 <= high:
-                entry["home"] = tidy((low + high) / 2, 9)
-                notes.append(f"joint {name} has 0 outside its limits: home is their middle, {entry['home']:g} {unit}")
+        entry |= _limits(name, low, high, unit, where, notes)
     elif joint.kind != "continuous":
         notes.append(f"joint {name} has no <limit>: read as no limits")
     speed = _value(joint, "velocity", where) or 0.0
@@ -191,6 +182,27 @@ def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, where: str
         raise RobotFileError(f"{where}: velocity {speed:g} is negative")
     if 1e-6 <= speed * size <= 1e6:
         entry["max_speed"] = tidy(speed * size, 9)
+    return entry
+
+
+def _limits(name: str, low: float, high: float, unit: str, where: str, notes: list[str]) -> dict[str, Any]:
+    """Limits [deg | mm] and home of a joint; none where the URDF means none."""
+    if low > high:
+        raise RobotFileError(f"{where}: lower limit {low:g} {unit} is above upper limit {high:g} {unit}")
+    if max(-low, high) > ENDLESS:
+        notes.append(f"joint {name} has limits beyond {ENDLESS:.0f} {unit}: read as no limits")
+        return {}
+    if low == high == 0:
+        notes.append(f"joint {name} has limits 0 and 0: read as no limits")
+        return {}
+    if low == high:
+        raise RobotFileError(f"{where}: both limits are {low:g} {unit}; a joint that never moves is fixed")
+    entry: dict[str, Any] = {"limits": [low, high]}
+    if unit == "deg" and max(-low, high) > math.degrees(TURNS):
+        notes.append(f"joint {name} turns {low:g} to {high:g} deg: a URDF is in radians, are these degrees?")
+    if not low <= 0 <= high:
+        entry["home"] = tidy((low + high) / 2, 9)
+        notes.append(f"joint {name} has 0 outside its limits: home is their middle, {entry['home']:g} {unit}")
     return entry
 
 

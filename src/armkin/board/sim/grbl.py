@@ -229,13 +229,12 @@ class Grbl(SimulatedTime):
         elif match := re.fullmatch(r"(\d+)=(-?\d+\.?\d*)", line):
             return self._set(int(match[1]), match[2])
         elif line == "$":
-            for number in sorted(self.settings):
-                self._say(f"${number}={self.settings[number]:.3f}".rstrip("0").rstrip("."))
+            values = (f"${n}={value:.3f}".rstrip("0").rstrip(".") for n, value in sorted(self.settings.items()))
+            self._say("\r\n".join(values))
         elif line == "I":
-            self._say("[VER:1.1f.20260817:]" if self.hal else "[VER:1.1h.20190825:]")
-            self._say(f"[OPT:V,{BLOCKS},{RX_BUFFER}]")
-            if self.hal:
-                self._say("[FIRMWARE:grblHAL]")
+            version = "[VER:1.1f.20260817:]" if self.hal else "[VER:1.1h.20190825:]"
+            named = ["[FIRMWARE:grblHAL]"] if self.hal else []
+            self._say("\r\n".join([version, f"[OPT:V,{BLOCKS},{RX_BUFFER}]", *named]))
         elif line == "#":
             self._say("\r\n".join(self.modes.parameters()))
         elif line == "H":

@@ -98,7 +98,9 @@ def _half_turned(value: Array, near: Array | float, low: float, high: float) -> 
     return value
 
 
-def nearest_number(value: float, near: float, lower: float, upper: float, slides: bool) -> tuple[float, bool]:
+def nearest_number(  # noqa: C901 - of every joint and branch of a pose alone: a call more would be felt
+    value: float, near: float, lower: float, upper: float, slides: bool
+) -> tuple[float, bool]:
     """`nearest_copy` of one number, operation by operation; a joint that slides has no copies.
 
     >>> nearest_number(3.0, -2.0, -4.0, 4.0, False) == (3.0 - TURN, True)

@@ -170,6 +170,12 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
     if task.name == "xyz_roll":
         return Geometry("elbow with roll", f"{why}, joint 4 is the roll", True, _roll(arm, task, elbow), labels=labels)
+    return Geometry("elbow with pitch", why, True, _pitch(arm, task, elbow), labels=labels)
+
+
+def _pitch(arm: Arm, task: Task, elbow: Elbow) -> Callable[[list[Entry], Prefer], Candidates]:
+    """Joint 4 takes what joints 2 and 3 leave of the pitch; joint 5, if there is one, is the roll."""
+    link = arm.link
     # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
     past = pose.constant(link[4])
     # Rz(q2) R2 Rz(q3) R3 Rz(q4) = Rz(q2 +- q3 +- q4) R2 R3, the signs those of antiparallel axes
@@ -179,7 +185,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     def pitch(goal: list[Entry], prefer: Prefer) -> Candidates:
         total = (goal[3] - task.offsets[0]) / task.sums[0][1]
         c, s = arrays.cos_sin(total)
-        if n == 5:
+        if arm.n == 5:
             q5 = (goal[4] - task.offsets[1]) / task.sums[1][4]
             fifth = Pair(*arrays.cos_sin(q5))
             P = pose.times(pose.rotate(past, *fifth), pose.constant(link[5]))
@@ -197,7 +203,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         fourth = Pair(c4, sense[2] * s4)
         return Candidates([*pairs, fourth] if fifth is None else [*pairs, fourth, fifth], doubt)
 
-    return Geometry("elbow with pitch", why, True, pitch, labels=labels)
+    return pitch
 
 
 def _roll(arm: Arm, task: Task, elbow: Elbow) -> Callable[[list[Entry], Prefer], Candidates]:

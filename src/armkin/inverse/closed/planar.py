@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Entry
+from armkin.formula.arrays import Array, Bool, Entry
 from armkin.inverse.closed.elbow import TwoLink
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer
@@ -36,16 +36,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
         return None
     _, w = axes(Chain(arm.link, arm.prismatic))
     lift = next((i for i in range(arm.n) if arm.prismatic[i] and abs(w[i, 2]) > 0.5), None)
-    if (task.name == "xyz_yaw") != (lift is not None):
-        return None
-    if np.hypot(*w[~arm.prismatic, :2].T).max(initial=0.0) > tolerance:
-        return None
-    slides = arm.prismatic.copy()
-    if lift is not None:
-        slides[lift] = False
-        if np.hypot(*w[lift, :2]) > tolerance:
-            return None
-    if np.abs(w[slides, 2]).max(initial=0.0) > tolerance:
+    if (task.name == "xyz_yaw") != (lift is not None) or _leaves_plane(w, arm.prismatic, lift) > tolerance:
         return None
     link, prismatic, kept = arm.link, arm.prismatic, list(range(arm.n))
     if lift is not None:
@@ -78,6 +69,14 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     name = "SCARA" if lift is not None else "planar"
     why = f"{kinds}: all joints move in the base's x-y plane" + (" or along z" if lift is not None else "")
     return Geometry(name, why, True, solve, labels=() if prismatic.any() else ("", "elbow", ""))
+
+
+def _leaves_plane(w: Array, prismatic: Bool, lift: int | None) -> float:
+    """How far axes w (n, 3) are from turning about z, sliding in the x-y plane, and lifting along z, at most."""
+    upright, level = ~prismatic, prismatic.copy()
+    if lift is not None:
+        upright[lift], level[lift] = True, False
+    return float(max(np.hypot(*w[upright, :2].T).max(initial=0.0), np.abs(w[level, 2]).max(initial=0.0)))
 
 
 def _two(chain: Chain) -> Solve:

@@ -17,7 +17,7 @@ from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
-from armkin.inverse.closed.candidates import entries, recorded
+from armkin.inverse.closed.candidates import Recorded, entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
 from armkin.inverse.run.edges import AT_ONCE, decided
@@ -99,13 +99,18 @@ def solve(
     edge = np.concatenate([np.empty(0, np.intp), *(some.rows for some in doubted)])
     if geometry.doubts is None:
         if examine and doubted:
-            goals = Goals(arm, task, target, near)
-            if any(some.plain.any() for some in doubted) and not geometry.ends:
-                edge = tell(goals, runner, out, stacked(doubted))
-            for start in range(0, len(edge), AT_ONCE):
-                out = decided(goals, runner, out, edge[start : start + AT_ONCE])
+            out = _examined(Goals(arm, task, target, near), runner, out, doubted, edge)
         edge = edge[:0]
     return Solved(out, math.prod(runner.axes), target, rounding, edge)
+
+
+def _examined(goals: Goals, runner: Recorded, out: Batch, doubted: list[Doubted], edge: NDArray[np.intp]) -> Batch:
+    """The rows on an edge decided: those that two Jacobians decide first, then all that are left."""
+    if any(some.plain.any() for some in doubted) and not runner.geometry.ends:
+        edge = tell(goals, runner, out, stacked(doubted))
+    for start in range(0, len(edge), AT_ONCE):
+        out = decided(goals, runner, out, edge[start : start + AT_ONCE])
+    return out
 
 
 def _keep(

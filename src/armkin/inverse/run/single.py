@@ -71,7 +71,7 @@ class OneTarget:
         self._same = {"arm": arm, "task": definition, "method": geometry.name, "why": geometry.why}
         self._same["names"] = branch_names(arm, definition, geometry, self.count)
 
-    def solve(self, target: Array, given: ArrayLike | None) -> Solutions | None:
+    def solve(self, target: Array, given: ArrayLike | None) -> Solutions | None:  # noqa: C901 - as nearest_number
         """The branches of a single target; None if it is a batch, or if there is more to it. given: `near`."""
         if target.shape != self.shape:
             return None
