@@ -17,7 +17,7 @@ from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
-from armkin.inverse.closed.candidates import Recorded, entries, recorded
+from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
 from armkin.inverse.run.edges import AT_ONCE, decided
@@ -83,12 +83,13 @@ def solve(
                 workspace = workspace or runner.code.workspace(len(goal))
                 room = [buffer[..., : len(goal)] for buffer in workspace]
                 found = list(runner.code.run(entries(task, goal) if columns is None else columns, room))
-            there = None
-            if examine:
-                first = goal[:, 0] if columns is None else cast("Array", columns[9])
-                there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
-            goals = Goals(arm, task, goal, near[some])
-            edge = _keep(goals, runner.axes, rows_of(out, some), found, close, there)
+            first = goal[:, 0] if columns is None else cast("Array", columns[9])
+            there = (
+                near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
+                if examine
+                else None
+            )
+            edge = _keep(Goals(arm, task, goal, near[some]), runner.axes, rows_of(out, some), found, close, there)
             if len(edge.rows):
                 left.append(edge._replace(rows=start + edge.rows))
         return left
@@ -99,18 +100,13 @@ def solve(
     edge = np.concatenate([np.empty(0, np.intp), *(some.rows for some in doubted)])
     if geometry.doubts is None:
         if examine and doubted:
-            out = _examined(Goals(arm, task, target, near), runner, out, doubted, edge)
+            goals = Goals(arm, task, target, near)
+            if any(some.plain.any() for some in doubted) and not geometry.ends:
+                edge = tell(goals, runner, out, stacked(doubted))
+            for start in range(0, len(edge), AT_ONCE):
+                out = decided(goals, runner, out, edge[start : start + AT_ONCE])
         edge = edge[:0]
     return Solved(out, math.prod(runner.axes), target, rounding, edge)
-
-
-def _examined(goals: Goals, runner: Recorded, out: Batch, doubted: list[Doubted], edge: NDArray[np.intp]) -> Batch:
-    """The rows on an edge decided: those that two Jacobians decide first, then all that are left."""
-    if any(some.plain.any() for some in doubted) and not runner.geometry.ends:
-        edge = tell(goals, runner, out, stacked(doubted))
-    for start in range(0, len(edge), AT_ONCE):
-        out = decided(goals, runner, out, edge[start : start + AT_ONCE])
-    return out
 
 
 def _keep(
