@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,8 +118,9 @@ def add(name: str, task: str, make: Make) -> None:
     CLASSES[name] = (make, task)
 
 
+@lru_cache(maxsize=128)
 def random_case(name: str, seed: int) -> Case:
-    """The seed-th random arm of a class."""
+    """The seed-th random arm of a class; the same arm each time, as what is prepared of it is kept by arm."""
     make, task = CLASSES[name]
     return case(make(np.random.default_rng([seed, *name.encode()])), task)
 

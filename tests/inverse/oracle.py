@@ -119,17 +119,34 @@ def forward(screw: Screws, q: Array) -> Array:
 
 
 def forward_and_jacobian(screw: Screws, q: Array) -> tuple[Array, Array]:
-    """Poses (M, 4, 4) and Jacobians (M, 6, n) of the tool, linear rows first."""
-    P = np.broadcast_to(np.eye(4), (len(q), 4, 4))
-    lines = np.empty((len(q), len(screw.prismatic), 3, 2))  # of each axis its direction and a point
-    for i in range(len(screw.prismatic)):
-        lines[:, i] = P[:, :3] @ np.array([[*screw.w[i], 0.0], [*screw.p[i], 1.0]]).T
-        P = P @ exponential(screw, i, q[:, i])
-    T = P @ screw.M
-    w, lever = lines[..., 0], T[:, None, :3, 3] - lines[..., 1]
-    slides = screw.prismatic[:, None]
-    moved = np.where(slides, w, np.cross(w, lever))
-    return T, np.concatenate([moved, np.where(slides, 0.0, w)], axis=2).swapaxes(1, 2)
+    """Poses (M, 4, 4) and Jacobians (M, 6, n) of the tool, linear rows first.
+
+    The batch is the last axis: what is constant of an axis times the rotations so far (column, row, M) is one product.
+    """
+    M, n = q.shape
+    s, c1 = np.sin(q.T), 2 * np.sin(q.T / 2) ** 2
+    R, at = np.repeat(np.eye(3)[..., None], M, axis=2), np.zeros((3, M))
+    axes, points = np.empty((n, 3, M)), np.empty((n, 3, M))
+    for i, slides in enumerate(screw.prismatic):
+        w, p = screw.w[i], screw.p[i]
+        K, twice = _generators(w.tobytes())
+        constant = np.column_stack([w, p, K @ p, twice @ p, K, twice])
+        moved = (constant.T @ R.reshape(3, -1)).reshape(10, 3, M)
+        axes[i], points[i] = moved[0], moved[1] + at
+        if slides:
+            at = at + q[:, i] * moved[0]
+        else:
+            R = R + s[i] * moved[4:7] + c1[i] * moved[7:10]
+            at = at - s[i] * moved[2] - c1[i] * moved[3]
+    T = np.zeros((4, 4, M))
+    T[:, :3] = (screw.M[:3].T @ R.reshape(3, -1)).reshape(4, 3, M)
+    T[3, :3] += at
+    T[3, 3] = 1.0
+    lever, slide = T[3, :3] - points, screw.prismatic[:, None, None]
+    ahead, behind = [1, 2, 0], [2, 0, 1]
+    turned = axes[:, ahead] * lever[:, behind] - axes[:, behind] * lever[:, ahead]
+    J = np.concatenate([np.where(slide, axes, turned), np.where(slide, 0.0, axes)], axis=1)
+    return np.ascontiguousarray(T.transpose(2, 1, 0)), np.ascontiguousarray(J.transpose(2, 1, 0))
 
 
 class Goal(NamedTuple):

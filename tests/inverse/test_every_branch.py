@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,9 @@ def check(report: Report) -> None:
     assert (s.valid.any(axis=1) == (s.status != armkin.Status.UNREACHABLE)).all()
 
 
+@cache
 def shipped(name: str) -> tuple[Arm, Screws]:
+    """The same arm each time, as what is prepared of it is kept by arm."""
     arm = armkin.load(ROBOTS / f"{name}.yaml")
     screw = screws(arm.file)
     if arm.n == 7:  # one of the joints is held
