@@ -149,7 +149,8 @@ class _Groups:
         self.known, self.moves, self.pushed = on.copy(), on.copy(), self.asked.copy()
         self.which, self.edge = at.sure.copy(), np.zeros((K, M), bool)
         self.ended, self.alone = np.zeros((K, M), bool), on.copy()
-        self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
+        # which candidates are one with each, as rows of `component`; compared: (K, M) of which that is known
+        self.place, self.component, self.compared = np.zeros((K, M), np.int64), np.zeros((1, M), bool), on.copy()
         self.chosen, self.curve = at.simple.copy(), np.zeros((K, M, n), bool)
         self.free, self.singular, self.double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
 
@@ -170,29 +171,32 @@ class _Groups:
         valid, sigma, M = self.open, self.lost.sigma, self.open.shape[1]
         on: Bool = np.asarray(self.at.sure.any(axis=2))
         mine, others = valid & ~on, ~np.eye(M, dtype=bool)
-        close = np.zeros((len(valid), M, M), bool)
+        close, apart = np.zeros((2, len(valid), M, M), bool)
         k, i, j = np.nonzero(mine[:, :, None] & mine[:, None] & others)
         away = np.abs(newton.difference(self.goals.arm, self.at.q[k, i], self.at.q[k, j])).max(axis=1, initial=0.0)
-        close[k, i, j] = away < CLOSE_BY
+        close[k, i, j], apart[k, i, j] = away < CLOSE_BY, away > SAME
         weak = mine & self.weak
-        told = weak & self.known & ~self.moves
-        other = weak & ~(told & (sigma >= SOLUTION))  # may be on a self-motion
+        told = weak & self.compared & ~self.moves
+        other = weak & ~(told & self.known & (sigma >= SOLUTION))  # may be on a self-motion
         alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
         told &= ~np.asarray((weak & (self.moves | ~self.pushed)).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[
             :, None
         ]
         some = np.flatnonzero(told.any(axis=1))
         if len(some):
-            mine, one = told[some], self.component[self.place[some]] & valid[some, None] & others
-            one &= mine[:, :, None]
+            mine, known = told[some], self.known[some]
+            one = self.component[self.place[some]] & valid[some, None] & others & mine[:, :, None]
             mine &= (one == one.swapaxes(1, 2)).all(axis=2) & ~(close[some] & ~mine[:, None]).any(axis=2)
+            mine &= ~(one & (known[:, :, None] != known[:, None])).any(axis=2)
             mine &= (one.sum(axis=2) < 2) & ~one[:, :, 0]
             mine &= (~one | mine[:, None]).all(axis=2)
             # the most exact of each, the first of those that need no correction: the same in all arithmetics
-            rank = np.argsort(np.argsort(np.maximum(self.at.size[some], CLOSED), axis=1, kind="stable"), axis=1)
+            size = np.maximum(self.at.size[some], np.where(known, CLOSED, 0.0))
+            rank = np.argsort(np.argsort(size, axis=1, kind="stable"), axis=1)
             leads = mine & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
             self.chosen[some] |= leads
-            self.double[some] |= (leads & self.edge[some]).any(axis=1)
+            double = np.where(known, self.edge[some], (one & apart[some]).any(axis=2) | (sigma[some] < DOUBLE))
+            self.double[some] |= (leads & double).any(axis=1)
             told[some] = mine
         self.chosen |= alone
         self.open &= ~(alone | told)
@@ -212,6 +216,7 @@ class _Groups:
             at = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
             self.known[i, c], self.moves[i, c] = at.known, at.manifold
             self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
+            self.compared[i, c] = at.known
             on, self.ended[i, c], self.alone[i, c], self.which[i, c] = chains.whole(
                 arm, task, at, q[i, c], q[i], target[i]
             )
@@ -232,19 +237,26 @@ class _Groups:
             )
             self.moves[k, b], self.which[k, b] = found
 
+    def _compare(self, k: Int, b: Int) -> None:
+        """Which candidates are one with these, whose component is not known."""
+        some = ~self.compared[k, b]
+        if some.any():
+            k, b = k[some], b[some]
+            self.compared[k, b], self.place[k, b] = True, len(self.component) + np.arange(len(k))
+            at, (arm, task, target, _) = self.at, self.goals
+            one = roots.alike(arm, task, at.q, k, b, self.lost.sigma, at.size, target)
+            self.component = np.concatenate([self.component, one])
+
     def _lead(self, k: Int, b: Int) -> None:
         """One group of each of targets k (m,): those that are one with their b-th candidate (m,)."""
         self._push(k, b)
+        self._compare(k, b)
         arm, near, sigma = self.goals.arm, self.goals.near, self.lost.sigma
         q, label, size = self.at.q, self.at.label, self.at.size
         sure = self.known[k, b]
         exact = np.where(sure[:, None], np.maximum(size[k], CLOSED), size[k])  # of known components as in `_plain`
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
         one: Bool = np.asarray(self.component[self.place[k, b]])
-        some = np.flatnonzero(~sure)
-        if len(some):
-            far = away[some].max(axis=2)
-            one[some] = roots.alike(arm, self.goals.task, q, k[some], b[some], far, sigma, size, self.goals.target)
         self._inherit(k, b, one)
         moving, joints = self.moves[k, b], self.which[k, b]
         one &= self.open[k]
@@ -318,10 +330,11 @@ class _Groups:
         if some.any() and (few or some.sum() <= AT_ONCE):
             self._ask(*np.nonzero(some))
         if few:
-            self._plain()
             some = self.open & self.asked & ~self.pushed  # of one target eight in a row take five times as long
             if 0 < some.sum() <= AT_ONCE:
                 self._push(*np.nonzero(some))
+            self._compare(*np.nonzero(self.open & self.weak & self.pushed & ~self.moves))
+            self._plain()
         while self.open.any():
             k = np.flatnonzero(self.open.any(axis=1))
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))

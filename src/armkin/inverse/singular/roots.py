@@ -57,7 +57,6 @@ def alike(
     q: Array,
     k: NDArray[np.int64],
     b: NDArray[np.int64],
-    away: Array,
     sigma: Array,
     size: Array,
     target: Array,
@@ -67,6 +66,7 @@ def alike(
     Those that rounding explains, and those between which and it the posture in the middle solves the target.
     """
     with np.errstate(invalid="ignore"):
+        away = newton.wrapped_distance(arm, q[k], q[k, b][:, None])
         same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
         row, column = np.nonzero(~same & (away < CLOSE_BY))
     if len(row):
