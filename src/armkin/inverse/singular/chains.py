@@ -19,7 +19,7 @@ from armkin.inverse.tasks.task import Task
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LINKS = 12  # curves on each side of a posture, twice as long each time, or half where one fails
+LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect
 
 
 def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
@@ -36,7 +36,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
     if not len(left):
         return inside, ended, ended & at.alone, at.joints
     joints, least, most, alone = at.joints.copy(), at.least.copy(), at.most.copy(), at.alone.copy()
-    who, span = np.tile(left, 2), 2.0 * np.tile(at.span[left], 2)
+    who, span = np.tile(left, 2), np.tile((at.longer * at.span)[left], 2)
     start, ahead = leaves(arm, at, who, q[who], np.concatenate([at.v[left], -at.v[left]]))
     done = np.isnan(start[:, 0])
     going = np.flatnonzero(~done)
@@ -46,7 +46,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
         own, last, way, rows = who[going], start[going], ahead[going], np.arange(len(going))
         link = stretch(arm, task, last, target[own], span[going])
         good = link.known & (link.second > HIGH)
-        span[going] *= np.where(good, 2.0, 0.5)
+        span[going] *= link.longer
         # `q` itself comes again, ahead, on a curve that closes
         apart = newton.difference(arm, np.concatenate([others[own], q[own, None]], axis=1), last[:, None])
         on = members(link, rows, apart) & good[:, None]
@@ -59,7 +59,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
         there, onwards = leaves(arm, link, rows, last, way)
         start[going[good]], ahead[going[good]] = there[good], onwards[good]
         done[going] = good & (home | np.isnan(there[:, 0]))
-        going = going[~done[going]]
+        going = going[~done[going] & (link.second > HIGH)]
     ended[left] = done.reshape(2, -1).all(axis=0)
     extent = (most - least)[left]
     joints[left] = extent > MOVED * extent.max(axis=1)[:, None]

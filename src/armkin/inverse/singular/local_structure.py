@@ -43,6 +43,7 @@ NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev's, 
 ITERATIONS = 8  # Newton steps onto the curve
 SHRINK = 8  # a curve that turns away within a span is asked for a span so many times shorter,
 SHRINKS = 3  # as often as this
+LONGER = 0.25, 2.0  # times as long as the last a span is, at least and at most
 STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
@@ -61,9 +62,9 @@ class Structure(NamedTuple):
     known: (M,) whether the curve was followed far enough to tell. manifold, boundary: (M,) what the component is, if
     neither, an isolated root. joints: (M, n) those that move along a manifold. low, high: (M,) ends of the component
     along v, at most `span` (M,) away, as far as the polynomials hold. least, most: (M, n) how far the joints' ways go
-    between these. alone: (M,) no other curve crosses within the span. v: (M, n). second: (M,) the second smallest
-    singular value. x: (NODES, M, n) coefficients of the joints' ways [rad, reaches] in powers of t / span,
-    g: (NODES, M, k) of the residual.
+    between these. longer: (M,) how many times as long a span is likely to hold. alone: (M,) no other curve crosses
+    within the span. v: (M, n). second: (M,) the second smallest singular value. x: (NODES, M, n) coefficients of the
+    joints' ways [rad, reaches] in powers of t / span, g: (NODES, M, k) of the residual.
     """
 
     known: Bool
@@ -75,6 +76,7 @@ class Structure(NamedTuple):
     span: Array
     least: Array
     most: Array
+    longer: Array
     alone: Bool
     v: Array
     second: Array
@@ -136,6 +138,7 @@ def _unknown(at: newton.Linear) -> Structure:
         span=1.2 * REACH / np.abs(V[:, -1]).max(axis=1),
         least=np.zeros((M, n)),
         most=np.zeros((M, n)),
+        longer=np.ones(M),
         alone=np.zeros(M, bool),
         v=V[:, -1],
         second=S[:, n - 2] if n > 1 else np.ones(M),
@@ -162,12 +165,13 @@ def _follow(
     """Follow the curves of some postures as far as their spans, and write what those tell that stay at hand (m,)."""
     n = q.shape[1]
     span, u = out.span[rows], U[rows, :, n - 1 :]
-    on, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
+    on, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
     # where another curve is near, that may be the one which Newton's method found
     on &= np.abs(x[0]).max(axis=1) <= 4.0 * (SMOOTH * span + SOLUTION / np.maximum(out.second[rows], TINY))
-    some = rows[on]
-    out.x[:, some], out.g[:, some], out.alone[some] = x[:, on], g[:, on], alone[on]
-    _decide(out, some)
+    some, out.longer[rows] = rows[on], longer
+    if len(some):
+        out.x[:, some], out.g[:, some], out.alone[some] = x[:, on], g[:, on], alone[on]
+        _decide(out, some)
     return on
 
 
@@ -229,9 +233,9 @@ def _second_order(
 
 def _polynomials(
     arm: Arm, task: Task, q: Array, target: Array, u: Array, v: Array, w: Array, span: Array
-) -> tuple[Bool, Bool, Array, Array]:
-    """Which curves (M,) stay at hand as far as their spans, on which of these no other crosses, and coefficients of x
-    (NODES, M, n) and g (NODES, M, k).
+) -> tuple[Bool, Array, Bool, Array, Array]:
+    """Which curves (M,) stay at hand as far as their spans, how many times as long spans they may (M,), on which of
+    these no other crosses, and coefficients of x (NODES, M, n) and g (NODES, M, k).
 
     q: (M, n) where they begin, along v (M, n); u: (M, rows, k) directions out of reach; w: (M, n) the second
     derivative, as far as it is known; span: (M,).
@@ -245,18 +249,15 @@ def _polynomials(
     bordered = np.zeros((len(t), rows + 1, rows + 1))
     bordered[:, :rows, n:], bordered[:, rows, :n] = u[who], v[who]
     away = t[:, None] * v[who] + 0.5 * (t * t)[:, None] * w[who]
-    g, active, regular = np.full((len(t), k), np.nan), np.arange(len(t)), np.zeros(len(t))
+    inverse, left, active = np.empty_like(bordered), np.empty((len(t), k)), np.arange(len(t))
     for _ in range(ITERATIONS):
         one = who[active]
         r, bordered[active, :rows, :n] = newton.scaled(arm, task, q[one] + away[active] * unit, target[one])
         ahead = t[active] - (v[one] * away[active]).sum(axis=1)
-        inverse = newton.nudged(np.linalg.inv, bordered[active])
-        step = (inverse @ np.concatenate([r, ahead[:, None]], axis=1)[:, :, None])[:, :, 0]
+        inverse[active] = last = newton.nudged(np.linalg.inv, bordered[active])
+        step = (last @ np.concatenate([r, ahead[:, None]], axis=1)[:, :, None])[:, :, 0]
         away[active] += step[:, :n]
-        # the last rows span what no motion across v reaches: u has turned on the way
-        across = inverse[:, n:, :rows]
-        g[active] = _least(across, step[:, n:])
-        regular[active] = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
+        left[active] = step[:, n:]
         size = np.abs(step[:, :n]).max(axis=1)
         active = active[~(size < ARRIVED) & (np.abs(away[active]).max(axis=1) < 3.0 * np.abs(t[active]))]
         if not len(active):
@@ -264,19 +265,26 @@ def _polynomials(
     good = np.abs(away).max(axis=1) < 3.0 * np.abs(t)
     good[active] = False
     on = good.reshape(NODES, M).all(axis=0)
+    # the last rows span what no motion across v reaches: u has turned on the way
+    g = _least(inverse[:, n:, :rows], left)
     chebyshev = np.tensordot(_FIT, np.concatenate([away, g], axis=1).reshape(NODES, M, n + k), axes=1)
     # the polynomials are exact on the span if their last coefficients are small
     last = np.abs(chebyshev[-2:]).max(axis=0)
-    with np.errstate(invalid="ignore"):
-        on &= last[:, :n].max(axis=1) < SMOOTH * span
-        on &= last[:, n:].max(axis=1) < 0.01 * SOLUTION
+    with np.errstate(invalid="ignore", divide="ignore"):
+        off = np.maximum(last[:, :n].max(axis=1) / (SMOOTH * span), last[:, n:].max(axis=1) / (0.01 * SOLUTION))
+        # these grow with as high a power of the span
+        longer = np.where(on, np.clip(0.9 * off ** (1.0 / (2 - NODES)), *LONGER), LONGER[0])
+        on &= off < 1.0
     # a crossing is a zero of the bordered Jacobian's smallest singular value, which no two nodes are as close to as it
     # changes between any two
-    weakest, apart = regular.reshape(NODES, M), np.multiply.outer(-np.diff(NODE), span)
+    weakest, apart = (
+        (1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))).reshape(NODES, M),
+        np.multiply.outer(-np.diff(NODE), span),
+    )
     steepest = (np.abs(np.diff(weakest, axis=0)) / apart).max(axis=0)
     alone = (weakest[1:] + weakest[:-1] > 2.0 * steepest * apart).all(axis=0)
     power = np.tensordot(_POWERS, chebyshev, axes=1)
-    return np.asarray(on), np.asarray(alone), power[:, :, :n], power[:, :, n:]
+    return np.asarray(on), longer, np.asarray(alone), power[:, :, :n], power[:, :, n:]
 
 
 def _least(across: Array, left: Array) -> Array:
@@ -340,12 +348,13 @@ def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
     out.least[rows], out.most[rows] = way.min(axis=0), way.max(axis=0)
     extent = out.most[rows] - out.least[rows]
     long = extent.max(axis=1) >= REACH
-    slope = _values(g[1:] * np.arange(1, NODES)[:, None, None], s) / span[:, None]  # (FINE, M, k)
-    steepest = np.linalg.norm(slope, axis=2).argmax(axis=0)
-    up = slope[steepest, np.arange(len(rows))]
-    along = (slope * up).sum(axis=2) / np.maximum(np.linalg.norm(up, axis=1), TINY)
-    out.known[rows] = long | (below & above)
-    out.manifold[rows], out.boundary[rows] = long, ~long & (along.min(axis=0) <= SOLUTION)
+    out.known[rows], out.manifold[rows], short = long | (below & above), long, np.flatnonzero(~long)
+    if len(short):
+        slope = _values(g[1:, short] * np.arange(1, NODES)[:, None, None], s[:, short]) / span[short, None]
+        steepest = np.linalg.norm(slope, axis=2).argmax(axis=0)
+        up = slope[steepest, np.arange(len(short))]
+        along = (slope * up).sum(axis=2) / np.maximum(np.linalg.norm(up, axis=1), TINY)
+        out.boundary[rows[short]] = along.min(axis=0) <= SOLUTION
     out.joints[rows] = long[:, None] & (extent > MOVED * extent.max(axis=1)[:, None])
     out.low[rows], out.high[rows] = low * span, high * span
 
