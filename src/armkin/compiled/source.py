@@ -152,7 +152,7 @@ def _of_folds(arm: Arm, task: Task) -> dict[str, str]:
     named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it
     named |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
     named |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
-    named |= {"fine": str(local_structure.FINE), "points_count": str(len(local_structure.POINTS))}
+    named |= {"fine": str(len(local_structure.FINE)), "points_count": str(len(local_structure.POINTS))}
     tables = {"nodes": local_structure.NODE, "points": local_structure.POINTS}
     tables |= {"fit": local_structure.TO_POWERS, "last": local_structure.TO_LAST}
     named |= {name: ", ".join(number(float(v)) for v in table.ravel()) for name, table in tables.items()}

@@ -52,8 +52,8 @@ BACK = 5  # steps at most back onto the curve
 SERIES = 0.01  # [rad, reaches] as far as a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
-FINE = 33  # points of a component at which its slope is compared, and of an interval in which it ends
-FINER = 4  # times that this interval is the one between two of these: to a millionth of it
+FINE = np.linspace(0.0, 1.0, 33)[:, None]  # of a component: where its slope is compared
+FINER = np.linspace(0.0, 1.0, 1025)[:, None]  # of an interval in which it ends, and of the one between two of these
 
 
 class Structure(NamedTuple):
@@ -328,8 +328,8 @@ def _ends(g: Array) -> tuple[Array, Bool]:
     some, first = some[there], first[there]
     ends[some] = True
     low, high = POINTS[np.maximum(first - 1, 0)], POINTS[first]
-    for _ in range(FINER if len(some) else 0):
-        between = low + np.linspace(0.0, 1.0, FINE)[:, None] * (high - low)
+    for _ in range(2 if len(some) else 0):
+        between = low + FINER * (high - low)
         beyond = _size(g[:, some], between[1:]) > SOLUTION
         beyond[-1] = True
         first = beyond.argmax(axis=0)
@@ -343,7 +343,7 @@ def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
     g, x, span = out.g[:, rows], out.x[:, rows], out.span[rows]
     (low, high), (below, above) = _ends(g)
     low = -low
-    s = low + np.linspace(0.0, 1.0, FINE)[:, None] * (high - low)  # (FINE, M)
+    s = low + FINE * (high - low)  # (points, M)
     way = _values(x, s)
     out.least[rows], out.most[rows] = way.min(axis=0), way.max(axis=0)
     extent = out.most[rows] - out.least[rows]
