@@ -12,7 +12,7 @@ from test_every_branch import shipped
 
 import armkin
 from armkin import Status
-from armkin.inverse.answers.batch import Goals
+from armkin.inverse.answers.batch import Examined, Goals
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.numeric import newton
 from armkin.inverse.singular import components
@@ -60,7 +60,7 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
     known = []
     examine = components.examine
 
-    def counted(goals: Goals, *more: Any) -> components.Examined:
+    def counted(goals: Goals, *more: Any) -> Examined:
         known.append(len(goals.target))
         return examine(goals, *more)
 

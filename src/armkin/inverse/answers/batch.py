@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
+OWN = -1  # label of a posture that comes from `near`
+
+
 class Goals(NamedTuple):
     """What is asked of a solver: targets (N, m) or (N, 4, 4) of a task, and the postures to stay close to (N, n)."""
 
@@ -48,6 +51,31 @@ class Seeds(NamedTuple):
         none, label = np.zeros(q.shape[:2], bool), np.broadcast_to(label, q.shape[:2])
         sure = np.zeros(q.shape, bool)
         return cls(q, none if loose is None else loose, label, sure, none if simple is None else simple)
+
+
+class Examined(NamedTuple):
+    """What is known of K targets.
+
+    q: (K, W, n) branches, nan past the last.  valid: (K, W).  label: (K, W) the branch that a posture is, of the
+    solver's own numbering.  status: (K,).  free: (K, n).  again, surface: (K,) whether more postures have to be tried,
+    and whether a self-motion is a surface.  moved: (K, n) joints that move along self-motions other than those of which
+    all is known.  beyond: (K,) all that is near lies beyond a fold.
+    """
+
+    q: Array
+    valid: Bool
+    label: NDArray[np.int64]
+    status: NDArray[np.int8]
+    free: Bool
+    again: Bool
+    surface: Bool
+    moved: Bool
+    beyond: Bool
+
+    def wider(self, width: int) -> Examined:
+        """In at least so many columns."""
+        q, valid, label = (widened(array, width) for array in (self.q, self.valid, self.label))
+        return self._replace(q=q, valid=valid, label=label)
 
 
 class Batch(NamedTuple):

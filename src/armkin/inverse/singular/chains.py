@@ -19,7 +19,7 @@ from armkin.inverse.tasks.task import Task
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect
+LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect, or half where that fails
 
 
 def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
@@ -46,7 +46,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
         own, last, way, rows = who[going], start[going], ahead[going], np.arange(len(going))
         link = stretch(arm, task, last, target[own], span[going])
         good = link.known & (link.second > HIGH)
-        span[going] *= link.longer
+        span[going] *= np.where(good, link.longer, np.minimum(link.longer, 0.5))
         # `q` itself comes again, ahead, on a curve that closes
         apart = newton.difference(arm, np.concatenate([others[own], q[own, None]], axis=1), last[:, None])
         on = members(link, rows, apart) & good[:, None]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.formula.rows import rows_of, widened
-from armkin.inverse.answers.batch import Goals, Seeds
+from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
@@ -42,37 +42,11 @@ from armkin.inverse.singular.local_structure import beyond_folds, local_structur
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
 FEW = 24  # candidates of a target that are compared all with all
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
-OWN = -1  # label of a posture that comes from `near`
 
 Int = NDArray[np.int64]
 # For targets (rows of those examined) and whether branches seem lost: more postures to start from (rows, M, n), their
 # branches (M,), and of which targets (rows,) these may not lead to all.
 More = Callable[[Int, Bool], tuple[Array, Int, Bool]]
-
-
-class Examined(NamedTuple):
-    """What is known of K targets.
-
-    q: (K, W, n) branches, nan past the last.  valid: (K, W).  label: (K, W) the branch that a posture is, of the
-    solver's own numbering.  status: (K,).  free: (K, n).  again, surface: (K,) whether more postures have to be tried,
-    and whether a self-motion is a surface.  moved: (K, n) joints that move along self-motions other than those of which
-    all is known.  beyond: (K,) all that is near lies beyond a fold.
-    """
-
-    q: Array
-    valid: Bool
-    label: Int
-    status: NDArray[np.int8]
-    free: Bool
-    again: Bool
-    surface: Bool
-    moved: Bool
-    beyond: Bool
-
-    def wider(self, width: int) -> Examined:
-        """In at least so many columns."""
-        q, valid, label = (widened(array, width) for array in (self.q, self.valid, self.label))
-        return self._replace(q=q, valid=valid, label=label)
 
 
 def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None) -> Examined:
@@ -149,8 +123,8 @@ class _Groups:
         self.known, self.moves, self.pushed = on.copy(), on.copy(), self.asked.copy()
         self.which, self.edge = at.sure.copy(), np.zeros((K, M), bool)
         self.ended, self.alone = np.zeros((K, M), bool), on.copy()
-        # which candidates are one with each, as rows of `component`; compared: (K, M) of which that is known
-        self.place, self.component, self.compared = np.zeros((K, M), np.int64), np.zeros((1, M), bool), on.copy()
+        # which candidates are one with each: rows of `component`, the first for those of which that is not known
+        self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
         self.chosen, self.curve = at.simple.copy(), np.zeros((K, M, n), bool)
         self.free, self.singular, self.double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
 
@@ -171,12 +145,12 @@ class _Groups:
         valid, sigma, M = self.open, self.lost.sigma, self.open.shape[1]
         on: Bool = np.asarray(self.at.sure.any(axis=2))
         mine, others = valid & ~on, ~np.eye(M, dtype=bool)
-        close, apart = np.zeros((2, len(valid), M, M), bool)
+        close = np.zeros((len(valid), M, M), bool)
         k, i, j = np.nonzero(mine[:, :, None] & mine[:, None] & others)
         away = np.abs(newton.difference(self.goals.arm, self.at.q[k, i], self.at.q[k, j])).max(axis=1, initial=0.0)
-        close[k, i, j], apart[k, i, j] = away < CLOSE_BY, away > SAME
+        close[k, i, j] = away < CLOSE_BY
         weak = mine & self.weak
-        told = weak & self.compared & ~self.moves
+        told = weak & (self.place > 0) & ~self.moves
         other = weak & ~(told & self.known & (sigma >= SOLUTION))  # may be on a self-motion
         alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
         told &= ~np.asarray((weak & (self.moves | ~self.pushed)).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[
@@ -195,8 +169,7 @@ class _Groups:
             rank = np.argsort(np.argsort(size, axis=1, kind="stable"), axis=1)
             leads = mine & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
             self.chosen[some] |= leads
-            double = np.where(known, self.edge[some], (one & apart[some]).any(axis=2) | (sigma[some] < DOUBLE))
-            self.double[some] |= (leads & double).any(axis=1)
+            self.double[some] |= (leads & self.edge[some]).any(axis=1)
             told[some] = mine
         self.chosen |= alone
         self.open &= ~(alone | told)
@@ -215,8 +188,8 @@ class _Groups:
             i, c = k[one], b[one]
             at = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
             self.known[i, c], self.moves[i, c] = at.known, at.manifold
-            self.edge[i, c], self.place[i, c] = at.boundary, len(self.component) + np.arange(len(i))
-            self.compared[i, c] = at.known
+            self.edge[i, c] = at.boundary
+            self.place[i, c] = np.where(at.known, len(self.component) + np.arange(len(i)), 0)
             on, self.ended[i, c], self.alone[i, c], self.which[i, c] = chains.whole(
                 arm, task, at, q[i, c], q[i], target[i]
             )
@@ -239,19 +212,18 @@ class _Groups:
 
     def _compare(self, k: Int, b: Int) -> None:
         """Which candidates are one with these, whose component is not known."""
-        some = ~self.compared[k, b]
-        if some.any():
-            k, b = k[some], b[some]
-            self.compared[k, b], self.place[k, b] = True, len(self.component) + np.arange(len(k))
-            at, (arm, task, target, _) = self.at, self.goals
-            one = roots.alike(arm, task, at.q, k, b, self.lost.sigma, at.size, target)
-            self.component = np.concatenate([self.component, one])
+        at, (arm, task, target, _), sigma = self.at, self.goals, self.lost.sigma
+        self.place[k, b] = len(self.component) + np.arange(len(k))
+        one, away = roots.alike(arm, task, at.q, k, b, sigma, at.size, target)
+        self.edge[k, b] = (one & self.valid[k] & (away > SAME)).any(axis=1) | (sigma[k, b] < DOUBLE)
+        self.component = np.concatenate([self.component, one])
 
     def _lead(self, k: Int, b: Int) -> None:
         """One group of each of targets k (m,): those that are one with their b-th candidate (m,)."""
         self._push(k, b)
-        self._compare(k, b)
-        arm, near, sigma = self.goals.arm, self.goals.near, self.lost.sigma
+        if (some := ~self.known[k, b] & (self.place[k, b] == 0)).any():
+            self._compare(k[some], b[some])
+        arm, near = self.goals.arm, self.goals.near
         q, label, size = self.at.q, self.at.label, self.at.size
         sure = self.known[k, b]
         exact = np.where(sure[:, None], np.maximum(size[k], CLOSED), size[k])  # of known components as in `_plain`
@@ -264,8 +236,7 @@ class _Groups:
         on[np.arange(len(k)), b] = True
         mine = on | one  # but what is one with it along a curve beside the self-motion is not on that
         self.open[k] &= ~mine
-        other = (one & (away.max(axis=2) > SAME)).any(axis=1) | (~moving & (sigma[k, b] < DOUBLE))
-        self.double[k] |= np.where(sure, self.edge[k, b], other)
+        self.double[k] |= self.edge[k, b]
         self.singular[k] |= moving
         self.free[k] |= joints & moving[:, None]
         # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
@@ -333,7 +304,9 @@ class _Groups:
             some = self.open & self.asked & ~self.pushed  # of one target eight in a row take five times as long
             if 0 < some.sum() <= AT_ONCE:
                 self._push(*np.nonzero(some))
-            self._compare(*np.nonzero(self.open & self.weak & self.pushed & ~self.moves))
+            some = self.open & self.weak & self.pushed & ~self.known & ~self.moves
+            if some.any():
+                self._compare(*np.nonzero(some))
             self._plain()
         while self.open.any():
             k = np.flatnonzero(self.open.any(axis=1))
@@ -403,7 +376,7 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     rests: Bool = np.zeros(size.shape, bool)
     lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)
     if (lost.nullity[:, 1:] > 1).any():
-        q, label, size, rests = meetings.ways_out(goals, q, label, size, lost, OWN)
+        q, label, size, rests = meetings.ways_out(goals, q, label, size, lost)
         if q.shape[1] > sure.shape[1]:
             sure, simple = (widened(array, q.shape[1]) for array in (sure, simple))
             lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)

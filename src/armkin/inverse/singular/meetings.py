@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.formula.rows import rows_of
 from armkin.forward import fk
-from armkin.inverse.answers.batch import Goals
+from armkin.inverse.answers.batch import OWN, Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, BENT, FOLD_WAY, GROWTH, HIGH, SOLUTION
 from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
@@ -38,14 +38,12 @@ SPREAD = 5.0  # times that in some direction: no surface of solutions, and the z
 Int = NDArray[np.int64]
 
 
-def ways_out(
-    goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost, none: int
-) -> tuple[Array, Int, Array, Bool]:
+def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost) -> tuple[Array, Int, Array, Bool]:
     """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those that meet.
 
     The first of a target, `near`, stays where it is. Others that no self-motion leaves stay, too: roots of
-    high order, and postures of surfaces. lost: what they lose. none: the label of what is no candidate. Also which of
-    them (K, M) rest: no push takes them along a self-motion.
+    high order, and postures of surfaces. lost: what they lose. Also which of them (K, M) rest: no push takes them
+    along a self-motion.
     """
     arm, task, target, _ = goals
     k, b = np.nonzero((size[:, 1:] <= SOLUTION) & (lost.nullity[:, 1:] > 1))
@@ -62,7 +60,7 @@ def ways_out(
     whose, row = label[k[first], b[first]][who], row[who]
     place = np.arange(len(row)) - np.searchsorted(row, row)
     shape = len(q), int(place.max(initial=-1)) + 1
-    more, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, none), np.full(shape, np.inf)
+    more, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, OWN), np.full(shape, np.inf)
     more[row, place], labels[row, place] = there, whose
     sizes[row, place] = newton.missing(arm, task, there, target[row])
     resting = np.zeros((len(q), q.shape[1] + shape[1]), bool)

@@ -60,8 +60,8 @@ def alike(
     sigma: Array,
     size: Array,
     target: Array,
-) -> Bool:
-    """Which candidates are one with the b-th of their target: (k, M).
+) -> tuple[Bool, Array]:
+    """Which candidates are one with the b-th of their target, and how far they are from it: (k, M).
 
     Those that rounding explains, and those between which and it the posture in the middle solves the target.
     """
@@ -84,7 +84,7 @@ def alike(
                 apart = newton.wrapped_distance(arm, there[:, None], there[some])
                 close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], some]))
             same[i] |= close.any(axis=1)
-    return np.asarray(same)
+    return np.asarray(same), away
 
 
 def _radius(sigma: Array) -> Array:

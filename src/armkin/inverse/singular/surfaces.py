@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.answers.batch import Goals, Seeds
+from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FOLDED
-from armkin.inverse.singular.components import OWN, Examined, More, examine
+from armkin.inverse.singular.components import More, examine
 from armkin.model.lock import lock
 
 if TYPE_CHECKING:
