@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import compiled_ik, ik_text, inputs, lock_and_sweep, output, piped_answers, render
+from armkin.cli.ik_answer import answer_of, nearest_to
 from armkin.cli.numbers import decimals
 from armkin.cli.options import (
     AllBranches,
@@ -37,11 +38,10 @@ from armkin.model import units
 from armkin.model.targets import label_units, targets_in, targets_out
 
 if TYPE_CHECKING:
-    from armkin.cli.answers import Branch, Closest, Ik
+    from armkin.cli.answers import Ik
     from armkin.columns.table import Table
     from armkin.formula.arrays import Array
     from armkin.inverse import choose_branch
-    from armkin.inverse.answers.closest import Closest as NearestPose
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -106,23 +106,27 @@ def ik(
     if position_first:
         position_first_is_for(choose_branch.locked(request), what.name)
     if compiled:
-        request = replace(request, ik=compiled_ik.ik, fk=partial(compiled_ik.fk, task=what.name))
-        compiled_ik.prepare(arm, what.name)
+        request = _compiled(request, what.name)
     questions = Questions(request, what, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
-        inputs.no_numbers(target)
         from armkin.cli.batch import Batch as Run
         from armkin.cli.batch_pieces import Rows
 
+        inputs.no_numbers(target)
         rows = Rows(batch, what.labels, f"task {what.name}", None, reached or [])
-        if continuous:  # each row waits for the one before
-            workers, cluster = 1, None
-        Run(questions, out, json, workers, cluster, resume, questions.asked).run(rows).conclude(questions.unsolvable)
+        engine = (1, None) if continuous else (workers, cluster)  # each row waits for the one before
+        Run(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
         return
     inputs.one_alone(workers, cluster, resume)
     values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
     words = None if reached is not None else [[decimals(word) for word in target or ()]]
     _one(questions, values, words, out, json=json)
+
+
+def _compiled(request: choose_branch.Request, task: str) -> choose_branch.Request:
+    """The same by machine code, which is built here if it is not there yet."""
+    compiled_ik.prepare(request.arm, task)
+    return replace(request, ik=compiled_ik.ik, fk=partial(compiled_ik.fk, task=task))
 
 
 def _check_together(
@@ -147,7 +151,7 @@ def _one(questions: Questions, values: Array, words: list[list[int]] | None, out
     request, task = questions.request, questions.task
     goal = targets_in(task.labels, values)
     [found] = choose_branch.solve(request, goal, _rounding(request.arm, task, values, words))
-    answer = _answer(
+    answer = answer_of(
         request, task, values[0].tolist(), goal[0], found, questions.all_branches, questions.turns, with_closest=True
     )
     with output.destination(out, "one answer is", output.TEXT) as write:
@@ -258,136 +262,14 @@ class Questions:
                 else ((self.request, one) for one in found)
             )
             alone = self.continuous or not with_closest  # each row's `near` is another one
-            nearest = {} if alone else _nearest_to(self.request, targets, found)
+            nearest = {} if alone else nearest_to(self.request, targets, found)
             for k, (values, goal, (request, one)) in enumerate(zip(part.tolist(), targets, each, strict=True)):
-                yield _answer(
+                yield answer_of(
                     request, self.task, values, goal, one, self.all_branches, self.turns,
                     with_closest=with_closest, nearest=nearest.get(k),
                 )  # fmt: skip
                 if self.continuous and one.best is not None:
                     self.request = replace(request, near=one.branches[one.best].joints)
-
-
-def _answer(
-    request: choose_branch.Request,
-    task: Task,
-    values: list[float],
-    goal: Array,
-    found: choose_branch.Answer,
-    all_branches: bool,
-    turns: bool,
-    *,
-    with_closest: bool,
-    nearest: NearestPose | None = None,
-) -> Ik:
-    arm = request.arm
-    listed, best = found.branches, found.best
-    if not all_branches:
-        listed, best = ([], None) if best is None else ([listed[best]], 0)
-    head = render.head(arm)
-    answer: Ik = {
-        "robot": head["robot"],
-        "robot_file": head["robot_file"],
-        "robot_sha256": head["robot_sha256"],
-        "task": task.name,
-        "target": values,
-        "target_labels": list(task.labels),
-        "near": request.near_out,
-        "status": found.status,
-        "method": found.method,
-        "why": found.why,
-        "complete": found.complete,
-        "joint_units": units.names(arm),
-        "branch_count": found.total,
-        "branches_within_limits": found.within_limits,
-        "branches": [_branch(request, branch, turns) for branch in listed],
-        "best": best,
-        "closest": _closest(request, goal, found, nearest) if best is None and with_closest else None,
-        "free_joints": found.free,
-    }
-    answer.update(render.given(arm))
-    if arm.keep_out:
-        answer["branches_free"] = sum(branch.may_be_taken for branch in found.branches)
-    return answer
-
-
-def _nearest_to(
-    request: choose_branch.Request, targets: Array, found: Sequence[choose_branch.Answer]
-) -> dict[int, NearestPose]:
-    """The nearest poses of those targets that no legal branch reaches, all at once."""
-    from armkin.inverse import choose_branch
-
-    rows = [k for k, one in enumerate(found) if one.best is None and not one.within_limits]
-    return dict(zip(rows, choose_branch.closest(request, targets[rows]), strict=True)) if rows else {}
-
-
-def _closest(
-    request: choose_branch.Request, goal: Array, found: choose_branch.Answer, nearest: NearestPose | None
-) -> Closest | None:
-    """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for.
-
-    None where every branch within limits hits something. nearest: if it is known.
-    """
-    import armkin
-    from armkin.inverse import choose_branch
-
-    arm = request.arm
-    if found.branches and found.branches[0].within_limits:  # only the branch asked for is outside
-        legal = found.branches[0]
-        if legal.hits:
-            return None
-        answer: Closest = {
-            "joints": legal.joints,
-            "position_mm": (armkin.fk(arm, legal.q)[:3, 3] + 0.0).tolist(),
-            "distance_mm": legal.residual_mm,
-            "angle_deg": legal.residual_deg,
-            "converged": True,
-            "branch": legal.name,
-        }
-        answer.update(_near_to(arm, legal))
-        return answer
-    if nearest is None:
-        [nearest] = choose_branch.closest(request, goal[None])
-    answer = {
-        "joints": units.joints_out(arm, nearest.q).tolist(),
-        "position_mm": nearest.position.tolist(),
-        "distance_mm": nearest.distance,
-        "angle_deg": float(units.angles_out(nearest.angle)),
-        "converged": nearest.converged,
-        "branch": None,
-    }
-    answer.update(render.near_by(arm, nearest.q[None])[0])
-    return answer
-
-
-def _near_to(arm: Arm, branch: choose_branch.Branch) -> Any:
-    """What a branch is near to, where there are keep-outs."""
-    return {"clearance_mm": branch.clearance, "hits": list(branch.hits)} if arm.keep_out else {}
-
-
-def _branch(request: choose_branch.Request, branch: choose_branch.Branch, turns: bool) -> Branch:
-    arm = request.arm
-    row: Branch = {
-        "joints": branch.joints,
-        "name": branch.name,
-        "within_limits": branch.within_limits,
-        "violations": [render.violation(arm, i, branch.joints[i]) for i in branch.outside],
-        "residual_mm": branch.residual_mm,
-        "residual_deg": branch.residual_deg,
-        "motion": branch.motion,
-    }
-    row.update(_near_to(arm, branch))
-    from armkin.inverse import choose_branch
-    from armkin.inverse.solvers.redundant import redundant_joint
-
-    if branch.interval is not None:
-        row["family"] = {
-            "joint": redundant_joint(choose_branch.locked(request), request.task),
-            "interval": [*branch.interval],
-        }
-    if turns:
-        row["turns"] = choose_branch.turns(request, branch)
-    return row
 
 
 def _records(arm: Arm, row: int, answer: Ik) -> Iterator[list[Any]]:

@@ -125,10 +125,8 @@ def send(
     arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near, scene, tool)
     output.check(trace, "a plan is", ".csv")
     arm = keep_outs.marked(arm, ignore_keep_out)
-    if accel is not None:
-        arm = _accelerated(arm, number(accel, "--accel"))
-    if not dry_run:
-        arm = board_link.rehearsed(arm, port)
+    arm = _accelerated(arm, accel)
+    arm = arm if dry_run else board_link.rehearsed(arm, port)
     planner = Planner(_board(arm, rehearsal=rehearsal), fraction, radius)
     stands = board_link.assumed(arm, assume)
     if dry_run:
@@ -247,12 +245,15 @@ def _carry_out(planner: Planner, plans: Sequence[Planned], held: Any) -> None:
         board.machine.run(planner.noted(left), tell)
 
 
-def _accelerated(arm: Arm, value: float) -> Arm:
-    """The arm with an acceleration [deg/s2 | mm/s2] for the joints that have none."""
+def _accelerated(arm: Arm, text: str | None) -> Arm:
+    """The arm with `--accel` [deg/s2 | mm/s2] for the joints that have no acceleration."""
     import dataclasses
 
     import numpy as np
 
+    if text is None:
+        return arm
+    value = number(text, "--accel")
     if not 1e-6 <= value <= 1e6:
         raise UsageError(f"--accel: {value:g} must be from 0.000001 to 1000000 deg/s2 (mm/s2)")
     given = units.joints_in(arm, [value] * arm.n)

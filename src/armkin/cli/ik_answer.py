@@ -1,0 +1,140 @@
+"""The answer of `armkin ik` as JSON has it: branches, what each misses and hits, or the nearest pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from armkin.cli import render
+from armkin.model import units
+
+if TYPE_CHECKING:
+    from armkin.cli.answers import Branch, Closest, Ik
+    from armkin.formula.arrays import Array
+    from armkin.inverse import choose_branch
+    from armkin.inverse.answers.closest import Closest as NearestPose
+    from armkin.inverse.tasks.task import Task
+    from armkin.model.arm import Arm
+
+
+def answer_of(
+    request: choose_branch.Request,
+    task: Task,
+    values: list[float],
+    goal: Array,
+    found: choose_branch.Answer,
+    all_branches: bool,
+    turns: bool,
+    *,
+    with_closest: bool,
+    nearest: NearestPose | None = None,
+) -> Ik:
+    """The JSON of one target [mm, deg]: its branches, or the nearest pose where none is; nearest: if it is known."""
+    arm = request.arm
+    listed, best = found.branches, found.best
+    if not all_branches:
+        listed, best = ([], None) if best is None else ([listed[best]], 0)
+    head = render.head(arm)
+    answer: Ik = {
+        "robot": head["robot"],
+        "robot_file": head["robot_file"],
+        "robot_sha256": head["robot_sha256"],
+        "task": task.name,
+        "target": values,
+        "target_labels": list(task.labels),
+        "near": request.near_out,
+        "status": found.status,
+        "method": found.method,
+        "why": found.why,
+        "complete": found.complete,
+        "joint_units": units.names(arm),
+        "branch_count": found.total,
+        "branches_within_limits": found.within_limits,
+        "branches": [_branch(request, branch, turns) for branch in listed],
+        "best": best,
+        "closest": _closest(request, goal, found, nearest) if best is None and with_closest else None,
+        "free_joints": found.free,
+    }
+    answer.update(render.given(arm))
+    if arm.keep_out:
+        answer["branches_free"] = sum(branch.may_be_taken for branch in found.branches)
+    return answer
+
+
+def nearest_to(
+    request: choose_branch.Request, targets: Array, found: Sequence[choose_branch.Answer]
+) -> dict[int, NearestPose]:
+    """The nearest poses of those targets that no legal branch reaches, all at once."""
+    from armkin.inverse import choose_branch
+
+    rows = [k for k, one in enumerate(found) if one.best is None and not one.within_limits]
+    return dict(zip(rows, choose_branch.closest(request, targets[rows]), strict=True)) if rows else {}
+
+
+def _closest(
+    request: choose_branch.Request, goal: Array, found: choose_branch.Answer, nearest: NearestPose | None
+) -> Closest | None:
+    """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for.
+
+    None where every branch within limits hits something. nearest: if it is known.
+    """
+    import armkin
+    from armkin.inverse import choose_branch
+
+    arm = request.arm
+    if found.branches and found.branches[0].within_limits:  # only the branch asked for is outside
+        legal = found.branches[0]
+        if legal.hits:
+            return None
+        answer: Closest = {
+            "joints": legal.joints,
+            "position_mm": (armkin.fk(arm, legal.q)[:3, 3] + 0.0).tolist(),
+            "distance_mm": legal.residual_mm,
+            "angle_deg": legal.residual_deg,
+            "converged": True,
+            "branch": legal.name,
+        }
+        answer.update(_near_to(arm, legal))
+        return answer
+    if nearest is None:
+        [nearest] = choose_branch.closest(request, goal[None])
+    answer = {
+        "joints": units.joints_out(arm, nearest.q).tolist(),
+        "position_mm": nearest.position.tolist(),
+        "distance_mm": nearest.distance,
+        "angle_deg": float(units.angles_out(nearest.angle)),
+        "converged": nearest.converged,
+        "branch": None,
+    }
+    answer.update(render.near_by(arm, nearest.q[None])[0])
+    return answer
+
+
+def _near_to(arm: Arm, branch: choose_branch.Branch) -> Any:
+    """What a branch is near to, where there are keep-outs."""
+    return {"clearance_mm": branch.clearance, "hits": list(branch.hits)} if arm.keep_out else {}
+
+
+def _branch(request: choose_branch.Request, branch: choose_branch.Branch, turns: bool) -> Branch:
+    arm = request.arm
+    row: Branch = {
+        "joints": branch.joints,
+        "name": branch.name,
+        "within_limits": branch.within_limits,
+        "violations": [render.violation(arm, i, branch.joints[i]) for i in branch.outside],
+        "residual_mm": branch.residual_mm,
+        "residual_deg": branch.residual_deg,
+        "motion": branch.motion,
+    }
+    row.update(_near_to(arm, branch))
+    from armkin.inverse import choose_branch
+    from armkin.inverse.solvers.redundant import redundant_joint
+
+    if branch.interval is not None:
+        row["family"] = {
+            "joint": redundant_joint(choose_branch.locked(request), request.task),
+            "interval": [*branch.interval],
+        }
+    if turns:
+        row["turns"] = choose_branch.turns(request, branch)
+    return row
