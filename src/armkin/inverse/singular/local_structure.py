@@ -277,10 +277,8 @@ def _polynomials(
         on &= off < 1.0
     # a crossing is a zero of the bordered Jacobian's smallest singular value, which no two nodes are as close to as it
     # changes between any two
-    weakest, apart = (
-        (1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))).reshape(NODES, M),
-        np.multiply.outer(-np.diff(NODE), span),
-    )
+    weakest = (1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))).reshape(NODES, M)
+    apart = np.multiply.outer(-np.diff(NODE), span)
     steepest = (np.abs(np.diff(weakest, axis=0)) / apart).max(axis=0)
     alone = (weakest[1:] + weakest[:-1] > 2.0 * steepest * apart).all(axis=0)
     power = np.tensordot(_POWERS, chebyshev, axes=1)
