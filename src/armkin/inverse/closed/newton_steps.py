@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Entry, Truth
+from armkin.formula.arrays import Array, Entry, Truth
 from armkin.inverse.closed.elbow import together
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, spin
-from armkin.inverse.numeric.tolerances import APART_ROOTS, LAST_ERROR, NO_DETERMINANT
+from armkin.inverse.numeric.tolerances import APART_ROOTS, LAST_ERROR, NO_DETERMINANT, NO_SIZE
 from armkin.inverse.tasks.task import Task
+from armkin.model.rotation import joint_motion, rotation_about
 from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
@@ -41,7 +42,12 @@ class NewtonSteps:
     def __init__(self, arm: Arm, task: Task, off: float) -> None:
         """off: how far the arm is from the class whose roots are the seeds, lengths in units of the reach."""
         self.arm, self.size = arm, task.position  # equations and unknowns: 2 or 3
-        self.link = [pose.constant(L) for L in arm.link]
+        link, offset = _peeled(arm)
+        self.base: pose.Pose | None = None
+        if self.size == 3:  # what the target misses is told in the first joint's frame
+            self.base, link[0] = pose.inverse(pose.constant(link[0])), np.eye(4)
+        self.link = [pose.constant(L) for L in link]
+        self.offset = [Pair(math.cos(v), math.sin(v)) for v in offset]
         self.unit = [float(v) for v in radian_or_reach(arm)]
         own, rest = task.sums[:, : self.size], task.sums[:, self.size :]
         follow = -np.linalg.solve(rest, own) if len(task.sums) else np.zeros((0, self.size))
@@ -58,7 +64,8 @@ class NewtonSteps:
 
         Where the roots are counted, all four must be there, each apart from the others; else those that may be real.
         """
-        pairs, where, first = seeds.pairs, goal[: self.size], None
+        where = goal[: self.size] if self.base is None else pose.apply(self.base, goal[:3])
+        pairs, first = self._turned(seeds.pairs, 1.0), None
         for _ in range(self.steps):
             missing, columns = self._linear(pairs, where)
             adjugate, det = _adjugate(columns)
@@ -69,9 +76,15 @@ class NewtonSteps:
         miss = arrays.dot(missing := self._linear(pairs, where)[0], missing)
         there = miss < precision().nearby
         left: Truth = miss >= precision().nearby
+        pairs = self._turned(pairs, -1.0)
         if self.absent is not None:
             left = left & (arrays.dot(first, first) < self.absent)
         return Candidates(pairs, seeds.doubt | (_merged(pairs, self.unit) & there) | left, miss)
+
+    def _turned(self, pairs: list[Pair], sense: float) -> list[Pair]:
+        """Joints as the links without their turns have them, or with sense -1 back."""
+        each = zip(pairs, self.offset, strict=True)
+        return [pair if pair.s is None else together(pair, off, sense) for pair, off in each]
 
     def _linear(self, pairs: list[Pair], where: list[Entry]) -> tuple[list[Entry], list[list[Entry]]]:
         """What the point still misses, and its change with each of the first joints [reaches a radian or reach].
@@ -122,6 +135,31 @@ class NewtonSteps:
                     turned = together(turned, turn, sense)
             out.append(turned)
         return out
+
+
+def _peeled(arm: Arm) -> tuple[Array, list[float]]:
+    """The links without their turns about joints that turn, and these turns [rad], joint by joint.
+
+    Between two such joints a link is a turn about x and a translation: half of the products of a step.
+    """
+    link, turns = arm.link.copy(), [0.0] * arm.n
+    slides = arm.prismatic.tolist()
+    for i in range(arm.n + 1):
+        front, back = i > 0 and not slides[i - 1], i < arm.n and not slides[i]
+        if front:
+            x, y = link[i, :2, 3] if i == arm.n else (-link[i, 1, 2], link[i, 0, 2])
+            turn = math.atan2(y, x) if math.hypot(x, y) > NO_SIZE else 0.0
+            turns[i - 1] += turn
+            link[i] = joint_motion(False, -turn) @ link[i]
+        if back and i > 0:
+            x, y = (link[i, 0, 0], -link[i, 0, 1]) if front else (link[i, 2, 1], link[i, 2, 0])
+            turns[i] += (turn := math.atan2(y, x))
+            link[i] = link[i] @ joint_motion(False, -turn)
+        if front and back:
+            link[i, :3, :3] = rotation_about(0, math.atan2(link[i, 2, 1], link[i, 2, 2]))
+        elif i == arm.n and front:
+            link[i, 1, 3] = 0.0
+    return link, turns
 
 
 def steps(
