@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
+from functools import lru_cache
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -116,6 +118,12 @@ def function_of(
 ) -> Callable[..., tuple[Any, ...]]:
     """A function made of these lines. They consist of names and numbers written by this package alone."""
     source = "\n    ".join([f"def run({', '.join(parameters)}):", *lines, f"return ({', '.join(outputs)},)"])
-    exec(source, scope)
+    exec(_compiled(source), scope)
     run: Callable[..., tuple[Any, ...]] = scope["run"]
     return run
+
+
+@lru_cache(maxsize=128)
+def _compiled(source: str) -> CodeType:
+    """An arm that is read again, or another of its size, has the same lines: compiling them is most of the time."""
+    return compile(source, "<formula>", "exec")
