@@ -9,19 +9,24 @@ const bySize = []; // the columns, that of the largest singular value first
 /**
  * Singular value decomposition A = U S V' of a small matrix by rotations of its columns (Hestenes 1958): `columns`, `sizes`
  * and `bySize`, until the next one.
- * @param {number[][]} A m rows of n @returns {number} m + n, the length of the columns
+ * @param {number[][]} A m rows of n @param {boolean} [on] from the V that stands: that of a matrix nearly the same
+ * @returns {number} m + n, the length of the columns
  */
-function rotate(A) {
+function rotate(A, on = false) {
   const m = A.length;
   const n = A[0].length;
   const all = m + n;
   const W = columns;
   const square = squares;
+  for (let j = 0; j < n && !on; j++) for (let i = 0; i < n; i++) W[all * j + m + i] = i === j ? 1 : 0;
   for (let i = 0; i < m; i++) {
     const row = A[i];
-    for (let j = 0; j < n; j++) W[all * j + i] = row[j];
+    for (let j = 0; j < n; j++) {
+      let sum = on ? 0 : row[j];
+      for (let k = 0; k < n && on; k++) sum += row[k] * W[all * j + m + k];
+      W[all * j + i] = sum;
+    }
   }
-  for (let j = 0; j < n; j++) for (let i = 0; i < n; i++) W[all * j + m + i] = i === j ? 1 : 0;
   for (let sweep = 0, rotated = true; rotated && sweep < 40; sweep++) {
     rotated = false;
     for (let j = 0; j < n; j++) {

@@ -22,11 +22,11 @@ function between(a, b) {
   return out;
 }
 
-/** The directions that the Jacobian loses at q, or nearly. @param {Numbers} q @param {number} most */
-function lost(q, most) {
+/** The directions that the Jacobian loses at q, or nearly. @param {Numbers} q @param {number} most @param {boolean} [on] as `rotate` has it */
+function lost(q, most, on = false) {
   const J = slope(q);
   const [m, n] = [J.length, ARM.joints];
-  const all = rotate(J);
+  const all = rotate(J, on);
   let from = 0;
   while (from < Math.min(m, n) && sizes[bySize[from]] > most) from++;
   const weak = bySize.slice(from);
@@ -62,7 +62,7 @@ function follow(q, v, goal) {
         closed = true;
         break;
       }
-      const { V, S } = lost(next.q, STRIDE);
+      const { V, S } = lost(next.q, STRIDE, path.length > 2);
       if (S.length > 1) seconds.set(next.q, S[S.length - 2]);
       const along = V.map((u) => dot(u, move) / size);
       const turned = next.q.map((_, j) => V.reduce((sum, u, k) => sum + along[k] * u[j], 0));
@@ -86,7 +86,10 @@ function follow(q, v, goal) {
 function crossing([a, b, c], goal) {
   const [back, on] = [between(a, b), between(c, b)];
   const at = (/** @type {number} */ t) => newton(t < 0 ? stepped(b, back, -t) : stepped(b, on, t), goal, 4, SPLIT / 10).q;
-  const square = (/** @type {number} */ t) => decompose(slope(at(t))).S[ARM.joints - 2] ** 2; // a parabola beside a crossing
+  const square = (/** @type {number} */ t) => { // a parabola beside a crossing
+    rotate(slope(at(t)));
+    return sizes[bySize[ARM.joints - 2]] ** 2;
+  };
   let [t, h] = [0, 0.5];
   for (let round = 0; round < 4; round++) {
     const [low, middle, high] = [square(t - h), square(t), square(t + h)];
@@ -114,7 +117,7 @@ function spread(path) {
  * @param {number[][]} V
  */
 function ways(V) {
-  const [n, count] = [V[0].length, V.length === 2 ? 24 : 64];
+  const [n, count] = [V[0].length, V.length === 2 ? 12 : 64];
   /** @type {number[][]} */
   const mixes = [];
   for (let k = 0; k < count; k++) {
