@@ -21,8 +21,8 @@ from served import Elsewhere, teaching
 def test_a_page_that_is_gone_holds_the_arm(browser: Browser, how: str) -> None:
     """The board is asked by another page afterwards: the arm's position is known, and is that of the pins."""
     mark = f"--armkin-test={uuid.uuid4()}"
-    # at 0.4 of real time: a busy computer notices the page's end late, and that is no time of the arm's
-    with EmulatedBoard(speed=0.4) as board, teaching("three_dof", "--port", board.port) as url:
+    # at 0.2 of real time: a busy computer notices the page's end late, and that is no time of the arm's
+    with EmulatedBoard(speed=0.2) as board, teaching("three_dof", "--port", board.port) as url:
         with launched(browser.browser_type, mark) as another:
             page = another.new_page()
             page.set_default_timeout(120_000)
