@@ -66,8 +66,7 @@ ARM_INLINE void arm_past_caches(double *to, const double *row)
    number of joints. read: whether the targets have been read; free: zeros, which become 1 where joints are free. Returns
    how many are not done. */
 int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t near_step, int64_t read, double *out_q,
-    uint8_t *valid, uint8_t *within, int8_t *branch, int8_t *status, uint8_t *free,
-    uint8_t *state)
+    uint8_t *valid, uint8_t *within, int8_t *branch, int8_t *status, uint8_t *free, uint8_t *state)
 {
     double goal[ARM_GOAL * ARM_LANES], close[ARM_JOINTS * ARM_LANES];
     double q[ARM_BRANCHES * ARM_JOINTS * ARM_LANES], miss[ARM_BRANCHES * ARM_LANES];
@@ -159,7 +158,8 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
     return left;
 }
 
-/* One target. block: target, near; then the results: q, and as bytes valid, within, branch, free, status, state. Returns its status, or ARM_LEFT if it is left to Python. */
+/* One target. block: target, near; then the results: q, and as bytes valid, within, branch, free, status, state. Returns
+   its status, or ARM_LEFT if it is left to Python. */
 enum { ARM_LEFT = 4 };
 int64_t arm_single(double *block)
 {

@@ -228,8 +228,8 @@ function merge(goal, found) {
 
 /** As of a closed form. Doubt: an answer near a singularity, merged answers, touching roots, or a pose that no pass settled.
  * @param {Numbers} goal columns x, y, z and the position [mm] @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss
- * @param {number} [passes] at most */
-function candidatesOfPose(goal, near, q, miss, passes = LOOP.shakes.length) {
+ * @param {number} [passes] at most, of those that may prove an answer complete: the target is not moved; by default all */
+function candidatesOfPose(goal, near, q, miss, passes) {
   const target = new Float64Array(12);
   const scaled = new Float64Array(12);
   const there = new Float64Array(12);
@@ -240,7 +240,8 @@ function candidatesOfPose(goal, near, q, miss, passes = LOOP.shakes.length) {
   let found = [];
   let [open, edge] = [true, false];
   const kind = kindOf(there);
-  for (let pass = 0; pass < passes && open; pass++) {
+  const most = passes === undefined ? LOOP.shakes.length : Math.min(passes, LOOP.shakes.filter((shake) => shake === 0).length);
+  for (let pass = 0; pass < most && open; pass++) {
     edge = edge || LOOP.shakes[pass] > 0; // a singular posture may be missing where the target had to be moved
     const told = attempt(there, kind, pass, found);
     open = told.open;

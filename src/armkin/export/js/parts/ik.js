@@ -150,9 +150,9 @@ function solutions(goal, near, edge) {
   // joints that a target leaves free may be out of reach where `near` has them: ask elsewhere, too
   for (let k = 0; CLOSED_FORM && k <= 24; k++)
     seed(goal, Array.from(near, (x, j) => x + (k && ((k - 0.63) / 12 - 1) * Math.PI * ARM.unit[j])), 1e-6, 0);
-  // of two roots in one an elimination may see none: beside the target both are real on one side; passes after four prove nothing
+  // of two roots in one an elimination may see none: beside the target both are real on one side
   let sure = true;
-  for (let k = 0; !CLOSED_FORM && k < 8; k++) sure = !seed(beside(goal, k), near, Infinity, sure ? 4 : 2) && sure;
+  for (let k = 0; !CLOSED_FORM && k < 8; k++) sure = !seed(beside(goal, k), near, Infinity, sure ? Infinity : 2) && sure;
   let found = solutionSet(seeds, goal, near);
   if (!CLOSED_FORM && found.status === 'singular') {
     // a self-motion takes all roots of an elimination, and a target beside it has none there: others are searched for
