@@ -15,7 +15,7 @@ import pytest
 from armkin.compiled import toolchain
 
 if TYPE_CHECKING:
-    from armkin.compiled.arm import CompiledArm
+    from armkin.compiled.compiled_arm import CompiledArm
     from armkin.model.arm import Arm
 
 _load = toolchain.load
@@ -33,7 +33,7 @@ def install() -> None:
 
 @lru_cache(maxsize=16)
 def _optimised(arm: Arm) -> CompiledArm:
-    from armkin.compiled.arm import CompiledArm
+    from armkin.compiled.compiled_arm import CompiledArm
 
     return CompiledArm(arm)
 
@@ -41,7 +41,7 @@ def _optimised(arm: Arm) -> CompiledArm:
 @pytest.fixture
 def optimised(monkeypatch: pytest.MonkeyPatch) -> None:
     """`armkin.compile` as users have it."""
-    import armkin.compiled.arm
+    import armkin.compiled.compiled_arm
 
     monkeypatch.setattr(toolchain, "load", _load)
-    monkeypatch.setattr(armkin.compiled.arm, "_compiled", _optimised)
+    monkeypatch.setattr(armkin.compiled.compiled_arm, "_compiled", _optimised)

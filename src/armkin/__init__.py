@@ -33,8 +33,8 @@ __version__ = "1.0.0"
 
 if TYPE_CHECKING:
     from armkin.calibration.procedure import calibrate as calibrate
-    from armkin.compiled.arm import CompiledArm as CompiledArm
-    from armkin.compiled.arm import compile as compile
+    from armkin.compiled.compiled_arm import CompiledArm as CompiledArm
+    from armkin.compiled.compiled_arm import compile as compile
     from armkin.errors import ArmkinError as ArmkinError
     from armkin.errors import FileError as FileError
     from armkin.errors import LinkError as LinkError
@@ -77,8 +77,8 @@ if TYPE_CHECKING:
 
 # Public name -> its module. (The block above says the same to type checkers; a test compares them.)
 _HOME = {
-    "CompiledArm": "compiled.arm",
-    "compile": "compiled.arm",
+    "CompiledArm": "compiled.compiled_arm",
+    "compile": "compiled.compiled_arm",
     "calibrate": "calibration.procedure",
     "ArmkinError": "errors",
     "FileError": "errors",

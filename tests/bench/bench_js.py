@@ -24,8 +24,8 @@ from exported_js import ask, differences, goals_of
 
 import armkin
 from armkin.errors import UsageError
-from armkin.export.c.program import identifier, program
-from armkin.export.js.program import module
+from armkin.export.c.c_program import identifier, program
+from armkin.export.js.es_module import module
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.model.arm import actual
 from armkin.robot_file import catalogue

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 
 from armkin.cli import batch, csv_rows
 from armkin.cli.csv_rows import Columns
-from armkin.columns import finished_chunks, ik_columns, text
+from armkin.columns import csv_and_json_lines, finished_chunks, ik_columns
 from armkin.columns.csv_cells import csv_line
 from armkin.columns.table import Table, Words, part
 from armkin.compiled import nearest as compiled_nearest
-from armkin.compiled import text as compiled_text
+from armkin.compiled import table_lines as compiled_text
 from armkin.errors import UnfinishedError
 from command_line import THREE_DOF, Result, run
 
@@ -35,8 +35,8 @@ def test_a_reader_of_csv_gets_every_word_back() -> None:
 
 
 def by_python(table: Table, monkeypatch: pytest.MonkeyPatch) -> tuple[bytes, bytes]:
-    monkeypatch.setattr(text, "WORTH", 10**9)
-    return text.csv(table), text.json_lines(table)
+    monkeypatch.setattr(csv_and_json_lines, "WORTH", 10**9)
+    return csv_and_json_lines.csv(table), csv_and_json_lines.json_lines(table)
 
 
 @pytest.fixture
@@ -50,12 +50,12 @@ def table() -> Table:
 
 
 def test_pyarrow_prints_the_bytes_that_python_prints(table: Table, monkeypatch: pytest.MonkeyPatch) -> None:
-    fast = text.csv(table), text.json_lines(table)
+    fast = csv_and_json_lines.csv(table), csv_and_json_lines.json_lines(table)
     assert fast == by_python(table, monkeypatch)
     with monkeypatch.context() as patch:
-        patch.setattr(text, "BLOCK", 3_333)
-        patch.setattr(text, "WORTH", 2_000)
-        assert fast == (text.csv(table), text.json_lines(table))
+        patch.setattr(csv_and_json_lines, "BLOCK", 3_333)
+        patch.setattr(csv_and_json_lines, "WORTH", 2_000)
+        assert fast == (csv_and_json_lines.csv(table), csv_and_json_lines.json_lines(table))
     names = ["", 'with, comma and "quote"', "right"]
     assert fast[0].splitlines()[7] == b"7,right,1.5e-07,true"
     assert csv_line([names[1]]).encode() in fast[0]
@@ -70,12 +70,12 @@ def test_machine_code_prints_the_bytes_that_python_prints(table: Table, monkeypa
     near = [10.0 ** rng.uniform(-6, 18, 20_000), 2.0 ** np.arange(-1074, 1024), rng.uniform(-400, 400, 20_000).round(3)]
     for values in (doubles, *near):
         one: Table = {"row": np.arange(len(values)) - 7, "value": values, "far": -values}
-        assert text.csv(one, compiled_text.lines) == by_python(one, monkeypatch)[0]
-    fast = text.csv(table, compiled_text.lines), text.json_lines(table, compiled_text.lines)
+        assert csv_and_json_lines.csv(one, compiled_text.lines) == by_python(one, monkeypatch)[0]
+    fast = csv_and_json_lines.csv(table, compiled_text.lines), csv_and_json_lines.json_lines(table, compiled_text.lines)
     assert fast == by_python(table, monkeypatch)
-    assert text.csv(part(one, slice(0, 0)), compiled_text.lines) == b""
+    assert csv_and_json_lines.csv(part(one, slice(0, 0)), compiled_text.lines) == b""
     whole = np.array([0, 9, 10, 99, 100, 2**32 - 1, 2**32, 10**8, 10**16, 2**63 - 1, -(2**63), -10])
-    assert text.csv({"a": whole}, compiled_text.lines).decode().split() == list(map(str, whole.tolist()))
+    assert csv_and_json_lines.csv({"a": whole}, compiled_text.lines).decode().split() == list(map(str, whole.tolist()))
 
 
 @given(st.lists(st.floats(-1e9, 1e9), min_size=4, max_size=4), st.sampled_from(["%r", " %r", "%.3f", "%.17e"]))

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.compiled import toolchain
 from armkin.compiled.source import PARTS
-from armkin.export.c.text import part
+from armkin.export.c.source_parts import part
 
 AROUND = """
 #define ARM_MOST 24

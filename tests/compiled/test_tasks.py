@@ -9,8 +9,7 @@ import pytest
 
 import armkin
 import quickly_built
-from armkin.compiled import arm as compiled_arm
-from armkin.compiled import toolchain
+from armkin.compiled import compiled_arm, toolchain
 
 
 def loaded(monkeypatch: pytest.MonkeyPatch) -> list[str]:

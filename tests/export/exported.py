@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import armkin
-from armkin.export.c.program import identifier, program
+from armkin.export.c.c_program import identifier, program
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 

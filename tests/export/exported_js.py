@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import armkin
-from armkin.export.js.program import module
+from armkin.export.js.es_module import module
 from armkin.inverse.numeric.newton import difference
 from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.solvers.recognise import solver

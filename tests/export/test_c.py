@@ -14,7 +14,7 @@ from exported import Exported, agreement, postures, texts_of
 
 import armkin
 import right_angles
-from armkin.export.c.program import identifier, program
+from armkin.export.c.c_program import identifier, program
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.build import build

@@ -14,7 +14,7 @@ from exported_js import ask, differences, goals_of
 import armkin
 import right_angles
 from armkin.errors import UsageError
-from armkin.export.js.program import module
+from armkin.export.js.es_module import module
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.residuals import residual

@@ -12,7 +12,7 @@ import pytest
 from emulator import EmulatedBoard
 
 import armkin
-from armkin.export.c.program import identifier, program
+from armkin.export.c.c_program import identifier, program
 from armkin.formula.c_and_js_code import number
 
 HERE = Path(__file__).parent

@@ -101,7 +101,7 @@ def work(job: Job, piece: Piece) -> Done:
     format = format_of(f"x{job.format}")
     encoded = format.encoded
     if job.compiled and format.is_text:
-        from armkin.compiled.text import lines
+        from armkin.compiled.table_lines import lines
 
         encoded = partial(encoded, lines=lines)
     rows = parsed(piece)

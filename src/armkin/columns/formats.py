@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import IO
 
-from armkin.columns import npz, parquet, text
+from armkin.columns import csv_and_json_lines, npz, parquet
 from armkin.files import ending
 
 Source = Callable[[], Iterable[IO[bytes]]]  # opens the parts, one after the other, as often as it is called
@@ -28,8 +28,8 @@ def _joined(file: IO[bytes], parts: Source) -> None:
         shutil.copyfileobj(part, file, 1 << 20)
 
 
-CSV = Format("csv", text.csv, _joined, is_text=True)
-JSON_LINES = Format("jsonl", text.json_lines, _joined, is_text=True)
+CSV = Format("csv", csv_and_json_lines.csv, _joined, is_text=True)
+JSON_LINES = Format("jsonl", csv_and_json_lines.json_lines, _joined, is_text=True)
 _BY_ENDING = {
     ".npz": Format("npz", npz.encoded, npz.together),
     ".parquet": Format("parquet", parquet.encoded, parquet.together),

@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from armkin.export.c import elimination, formulas, keep_outs, kernel, program
-from armkin.export.c.text import part
+from armkin.export.c import c_program, elimination, formulas, keep_outs, kernel
+from armkin.export.c.source_parts import part
 from armkin.formula.c_and_js_code import number
 from armkin.inverse.numeric.tolerances import (
     ACCEPTED,
@@ -68,14 +68,14 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
     commanded: the arm; arm: the same in actual joint values, `armkin.model.arm.actual`, of which the branches are.
     """
     solve, branches, level = "", 0, 3
-    if task is not None and geometry is not None and program.has_form(geometry):
-        solve, branches = program.candidates(arm, task, geometry, prefer=False, lanes="".join(map(_part, _LOCKSTEP)))
+    if task is not None and geometry is not None and c_program.has_form(geometry):
+        solve, branches = c_program.candidates(arm, task, geometry, prefer=False, lanes="".join(map(_part, _LOCKSTEP)))
     fields = {
-        "about": f"{program.identifier(arm.name)}: built for this computer by armkin.compile.",
+        "about": f"{c_program.identifier(arm.name)}: built for this computer by armkin.compile.",
         "joints": str(arm.n),
         "lanes": str(LANES),
     }
-    parts = [_part("head"), program.settings(), _fast_numbers()]
+    parts = [_part("head"), c_program.settings(), _fast_numbers()]
     parts += [kernel.forward_kinematics(commanded), _of_joints("Poses", "arm_pose", 16)]
     parts += [kernel.position(commanded), _of_joints("Positions of the tool", "arm_point", 3)]
     if commanded.keep_out and commanded.whole is None:
@@ -93,12 +93,12 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         folds = _part("no_folds")
         if geometry is not None and _judges(arm, task, geometry) and branches <= LANES:
             parts.append(kernel.jacobian(arm))
-            folds = program.filled(
+            folds = c_program.filled(
                 _part("folds").replace("@followed@", _part("followed") + "\n"), _of_folds(arm, task) | fields
             )
         parts += [_part("sizes"), solve, part("copies"), _choose(arm, branches), _part(gather), folds, _part("batch")]
         parts += [_part("rows")] if has_rows(task, geometry) else []
-    text = program.filled("\n".join(parts), {**fields, "content": "@content@"})
+    text = c_program.filled("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
     return Library(text.replace("@content@", content), content, branches, level)
 
@@ -115,7 +115,7 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
         most += [number(2.0)] * 3
     return {
         "branches": str(branches),
-        "target": str(program.target_size(task)),
+        "target": str(c_program.target_size(task)),
         "goal": str(formulas.goal_size(task)),
         "accepted": number(accepted),
         "room": number(ROOM * arm.reach),
@@ -176,7 +176,7 @@ def _part(name: str) -> str:
 
 def _of_joints(what: str, formula: str, size: int) -> str:
     """A loop over a batch of joint values."""
-    return program.filled(_part("of_joints"), {"what": what, "formula": formula, "size": str(size)})
+    return c_program.filled(_part("of_joints"), {"what": what, "formula": formula, "size": str(size)})
 
 
 def _fast_numbers() -> str:

@@ -33,7 +33,7 @@ def about(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
 
 def own_solver(arm: Arm) -> dict[str, Any]:
     """The module's text and `about`; none where the arm has no module."""
-    from armkin.export.js.program import module  # only pages that are open need it
+    from armkin.export.js.es_module import module  # only pages that are open need it
 
     try:
         return {"module": module(arm), "about": about(arm)}

@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armkin.export.js.program import module
+from armkin.export.js.es_module import module
 from armkin.teach.browser_solver import about
 from armkin.teach.playing import played
 from armkin.teach.reach_slice import reach_slice

@@ -17,7 +17,7 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
-    from armkin.compiled.arm import CompiledArm
+    from armkin.compiled.compiled_arm import CompiledArm
     from armkin.formula.arrays import Array
     from armkin.inverse.answers.solutions import Solutions
     from armkin.model.arm import Arm
@@ -53,7 +53,7 @@ class QuickIk:
         return self._built.ik(targets, task, near, **more)
 
     def _build(self, arm: Arm, task: str) -> None:
-        from armkin.compiled.arm import compile
+        from armkin.compiled.compiled_arm import compile
 
         with suppress(ArmkinError):  # no compiler, or nowhere to build: Python goes on
             built = compile(arm, task)

@@ -113,14 +113,14 @@ def _table(arm: Arm, convention: str, out: str | None) -> None:
 
 
 def _json(arm: Arm, out: str | None) -> None:
-    from armkin.export.numbers import numbers
+    from armkin.export.arm_json import numbers
 
     with output.destination(out) as write:
         write(f"{render.to_json({**render.head(arm), **numbers(arm)})}\n")
 
 
 def _js(arm: Arm, task: str | None, out: str | None) -> None:
-    from armkin.export.js.program import module
+    from armkin.export.js.es_module import module
 
     with _without_lock("JavaScript"):
         text = module(arm, task)
@@ -158,7 +158,7 @@ def _without_lock(language: str) -> Iterator[None]:
 
 def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
     """Three files: what was named, its header, and its test program."""
-    from armkin.export.c.program import program
+    from armkin.export.c.c_program import program
 
     if out is None or Path(out).suffix != ".c":
         raise UsageError("--c writes a source, its header and a test program: name the source, for example -o arm.c")

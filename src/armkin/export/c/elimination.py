@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armkin.export.c.text import part
+from armkin.export.c.source_parts import part
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.elimination.choose_variable import Kind

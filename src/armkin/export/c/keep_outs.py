@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.export.c import kernel
-from armkin.export.c.text import part
+from armkin.export.c.source_parts import part
 from armkin.formula.c_and_js_code import number
 from armkin.keep_out.bodies import ends_formula
 from armkin.keep_out.guard import guard

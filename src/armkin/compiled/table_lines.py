@@ -1,4 +1,4 @@
-"""Columns as lines of text by machine code: the bytes of `armkin.columns.text`, several times as fast."""
+"""Columns as lines of text by machine code: the bytes of `armkin.columns.csv_and_json_lines`, several times as fast."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from armkin.columns.table import Column, Table, Words, part, rows
 from armkin.compiled import toolchain
 
-SOURCE = Path(__file__).parent / "parts" / "text.c"
+SOURCE = Path(__file__).parent / "parts" / "table_lines.c"
 LEAST, MOST = -292, 324  # powers of ten that doubles need
 WIDEST = 25  # characters of a number: -2.2250738585072014e-308
 SPARE = 64  # characters behind the last one that C may write
@@ -22,7 +22,7 @@ BLOCK = 4_096  # rows printed at once: their text stays in the cache
 
 
 def lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
-    """See `armkin.columns.text.Lines`."""
+    """See `armkin.columns.csv_and_json_lines.Lines`."""
     count = rows(table)
     print_rows = _library()
     texts = [_texts(column, quoted) for column in table.values()]
@@ -70,7 +70,7 @@ def _values(column: Column) -> tuple[int, np.ndarray[Any, Any]]:
 
 @cache
 def _library() -> Any:
-    """`arm_lines` of parts/text.c. Raises MissingExtraError without a C compiler."""
+    """`arm_lines` of parts/table_lines.c. Raises MissingExtraError without a C compiler."""
     powers = ",\n".join(f"    {{{_hex(high)}, {_hex(low)}}}" for high, low in map(_power, range(LEAST, MOST + 1)))
     text = SOURCE.read_text(encoding="utf-8").replace("@powers@", powers)
     text = text.replace("@least@", str(LEAST)).replace("@count@", str(MOST - LEAST + 1))

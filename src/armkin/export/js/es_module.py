@@ -13,8 +13,8 @@ import numpy as np
 from armkin import __version__, forward, motors
 from armkin.errors import UsageError
 from armkin.export.c import formulas
+from armkin.export.c.c_program import has_form, plain_form, why_no_form
 from armkin.export.c.keep_outs import tables
-from armkin.export.c.program import has_form, plain_form, why_no_form
 from armkin.export.js import elimination
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names

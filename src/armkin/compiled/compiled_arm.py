@@ -16,7 +16,7 @@ from armkin.compiled import eliminated, source, toolchain
 from armkin.compiled.one_target import Single
 from armkin.compiled.results import Results
 from armkin.errors import UsageError
-from armkin.export.c import program
+from armkin.export.c import c_program
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.inverse import solve
@@ -130,7 +130,7 @@ class _CompiledTask:
         self.turned = actual(arm)  # formulas are those of actual joint values
         which, form = _class_of(self.turned, task)
         if which is not None and form is not None:  # an elimination named after a class is that elimination in C
-            form = program.plain_form(self.turned, which, form) if form.places is not None else form
+            form = c_program.plain_form(self.turned, which, form) if form.places is not None else form
         library = source.library(arm, self.turned, which, form)
         code = toolchain.load(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64

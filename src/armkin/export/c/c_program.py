@@ -10,7 +10,7 @@ from armkin import __version__
 from armkin.errors import UsageError
 from armkin.export.c import elimination, formulas, keep_outs, kernel
 from armkin.export.c.golden import golden_test
-from armkin.export.c.text import part
+from armkin.export.c.source_parts import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number
 from armkin.inverse.branches.names import branch_names
