@@ -12,7 +12,7 @@ import armkin.keep_out.loading
 import armkin.model.build
 from armkin.model.arm import Arm
 from armkin.robot_file import RobotFile
-from armkin.robot_file.scene import Scene
+from armkin.robot_file.scene_file import Scene
 
 _build = armkin.model.build.build
 _arms: dict[tuple[str, str], Arm] = {}

@@ -21,7 +21,7 @@ from armkin.board.sim.grbl import Grbl
 from armkin.errors import LinkError, UsageError
 from armkin.model.build import build
 from armkin.robot_file import parse
-from armkin.robot_file.model import Gripper
+from armkin.robot_file.robot_keys import Gripper
 from command_line import ROOT, THREE_DOF
 
 ARM = armkin.load("three_dof")

@@ -9,7 +9,7 @@ import pytest
 
 import random_drawings
 from armkin.errors import PathFileError
-from armkin.path_file import gcode, svg, table
+from armkin.path_file import csv_path, gcode, svg
 from armkin.path_file.drawing import DrawingOptions
 from read_twice import AS_IT_IS
 
@@ -60,7 +60,7 @@ def test_what_is_damaged_is_read_or_refused_with_its_line(kind: str) -> None:
 def test_a_cell_without_end_is_refused_with_its_line() -> None:
     """Python's own reader of CSV gives up at 131,072 characters: an internal error."""
     with pytest.raises(PathFileError, match=r"^t:2: no row of numbers: field larger than"):
-        table.parse(b"1,2,3\n" + b"9" * 200_000 + b",1,2\n", "t")
+        csv_path.parse(b"1,2,3\n" + b"9" * 200_000 + b",1,2\n", "t")
 
 
 @pytest.mark.parametrize(
@@ -74,5 +74,5 @@ def test_a_cell_without_end_is_refused_with_its_line() -> None:
 )
 def test_a_table_s_columns_and_numbers_are_those_of_a_path(text: str, said: str) -> None:
     with pytest.raises(PathFileError) as found:
-        table.parse(text.encode(), "t.csv")
+        csv_path.parse(text.encode(), "t.csv")
     assert str(found.value).startswith(said)

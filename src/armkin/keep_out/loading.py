@@ -11,7 +11,7 @@ from armkin.model.build import build
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file.robot import RobotFile
-    from armkin.robot_file.scene import Scene
+    from armkin.robot_file.scene_file import Scene
 
 
 def load(
@@ -33,7 +33,7 @@ def load(
 
     file, around = robot_file.read(path), None
     if scene is not None:
-        from armkin.robot_file.scene import read
+        from armkin.robot_file.scene_file import read
 
         around = read(scene)
     return checked(file, around, tool)

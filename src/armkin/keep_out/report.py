@@ -10,7 +10,7 @@ from armkin.forward import frames
 from armkin.keep_out.bodies import ends
 from armkin.keep_out.clearance import hits
 from armkin.keep_out.guard import guard
-from armkin.robot_file.keep_out import names
+from armkin.robot_file.keep_out_keys import names
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

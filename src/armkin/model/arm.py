@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array
 
 if TYPE_CHECKING:
     from armkin.robot_file import Board, Gripper, Homing, Motor, RobotFile
-    from armkin.robot_file.keep_out import Entry
+    from armkin.robot_file.keep_out_keys import Entry
 
 
 @dataclass(frozen=True, eq=False, repr=False)

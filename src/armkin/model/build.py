@@ -15,7 +15,7 @@ from armkin.model.rotation import FLIP, cos_sin_deg, inverse, transform
 
 if TYPE_CHECKING:
     from armkin.robot_file import Joint, RobotFile
-    from armkin.robot_file.scene import Scene
+    from armkin.robot_file.scene_file import Scene
 
 
 def load(path: str | PathLike[str]) -> Arm:

@@ -46,7 +46,7 @@ def planned(
 ) -> PathPlan:
     """`armkin.path` of an arm none of whose joints is redundant, and whose rates are checked: as that says."""
     from armkin.path_file import check_robot
-    from armkin.path_file.model import LEAST_TOLERANCE, LEAST_TOOL_SPEED
+    from armkin.path_file.path_keys import LEAST_TOLERANCE, LEAST_TOOL_SPEED
 
     check_robot(file, arm.name, arm.path)
     for name, value in (("speed", speed), ("accel", accel)):

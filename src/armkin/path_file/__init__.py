@@ -1,9 +1,11 @@
 """Path files: YAML or CSV in, one validated path out, or an error with its line.
 
-    model.py   keys, types, bounds       messages.py   errors in the file's own words
-    table.py   CSV: one row a corner, columns chosen by the header
-    drawing.py foreign files as moves: gcode.py (its words: gcode_words.py, its arcs: gcode_arcs.py)
-    svg.py     and SVG (its outlines: svg_shapes.py)
+path_keys.py        keys, types, bounds
+path_key_errors.py  errors in the file's own words
+csv_path.py         CSV: one row a corner, columns chosen by the header
+drawing.py          foreign files as moves
+gcode.py            G-code; gcode_words.py: its words, gcode_arcs.py: its arcs
+svg.py              SVG; svg_shapes.py: its outlines
 
 This package imports pydantic and yaml, and is itself imported only when a path is read.
 """
@@ -18,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from armkin.errors import FileError, PathFileError
-from armkin.path_file.model import Move, PathFile, Source
+from armkin.path_file.path_keys import Move, PathFile, Source
 from armkin.robot_file import strict_yaml
 
 if TYPE_CHECKING:
@@ -89,9 +91,9 @@ def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
     if not data.strip():
         raise _invalid(name, [(0, "the path is empty; it needs moves, or one row of CSV a corner")])
     if name.endswith(".csv") or not (name.endswith((".yaml", ".yml")) or _is_yaml(data)):
-        from armkin.path_file import table
+        from armkin.path_file import csv_path
 
-        return table.parse(data, name)
+        return csv_path.parse(data, name)
     try:
         document = strict_yaml.loads(data, _KIND)
     except strict_yaml.StrictYamlError as error:
@@ -99,9 +101,9 @@ def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
     try:
         return PathFile.model_validate(_lists(document.data)).read_from(Source(name, document.lines))
     except ValidationError as error:
-        from armkin.path_file import messages
+        from armkin.path_file import path_key_errors
 
-        raise _invalid(name, [(document.line(at), text) for at, text in messages.problems(error)]) from None
+        raise _invalid(name, [(document.line(at), text) for at, text in path_key_errors.problems(error)]) from None
 
 
 def validated(data: dict[str, Any], name: str = "path") -> PathFile:
@@ -109,9 +111,9 @@ def validated(data: dict[str, Any], name: str = "path") -> PathFile:
     try:
         return PathFile.model_validate(_lists(data))
     except ValidationError as error:
-        from armkin.path_file import messages
+        from armkin.path_file import path_key_errors
 
-        raise _invalid(name, [(0, text) for _, text in messages.problems(error)]) from None
+        raise _invalid(name, [(0, text) for _, text in path_key_errors.problems(error)]) from None
 
 
 def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:

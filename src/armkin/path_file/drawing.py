@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from armkin.errors import PathFileError
-from armkin.path_file.model import LEAST_TOOL_SPEED, Arc, Circle, Move, PathFile, Source
-from armkin.robot_file.model import cross
+from armkin.path_file.path_keys import LEAST_TOOL_SPEED, Arc, Circle, Move, PathFile, Source
+from armkin.robot_file.robot_keys import cross
 
 Point = tuple[float, float, float]
 LARGEST = 1e6  # [mm] of a coordinate

@@ -12,7 +12,7 @@ from armkin.errors import PathFileError
 from armkin.path_file import gcode_arcs
 from armkin.path_file.drawing import LARGEST, DrawingOptions, Pen, Placing, Point
 from armkin.path_file.gcode_words import PLAIN, Words, lines, words_of, wrong
-from armkin.path_file.model import MOST_POINTS, PathFile
+from armkin.path_file.path_keys import MOST_POINTS, PathFile
 
 AXES = "XYZ"
 INCH = 25.4

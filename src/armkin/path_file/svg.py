@@ -8,7 +8,7 @@ from xml.parsers import expat
 
 from armkin.errors import PathFileError
 from armkin.path_file.drawing import LARGEST, DrawingOptions, Pen, Placing
-from armkin.path_file.model import MOST_POINTS, PathFile
+from armkin.path_file.path_keys import MOST_POINTS, PathFile
 from armkin.path_file.svg_shapes import (
     Matrix,
     Point,

@@ -19,7 +19,7 @@ from armkin.model.units import DEGREE
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.robot_file.keep_out import Entry
+    from armkin.robot_file.keep_out_keys import Entry
 
 INSIDE = 1e-6  # [mm] of a base that stands on an obstacle, by rounding
 
@@ -40,7 +40,7 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
     own = len(arm.keep_out) - arm.of_scene
     mine, there, clearance, sha256 = arm.keep_out[:own], list(arm.keep_out[own:]), arm.clearance, arm.scene_sha256
     if scene is not None:
-        from armkin.robot_file.scene import read
+        from armkin.robot_file.scene_file import read
 
         more = read(os.fspath(scene))
         there, clearance, sha256 = [*there, *more.keep_out], max(clearance, more.clearance), more.sha256

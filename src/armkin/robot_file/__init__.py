@@ -1,14 +1,15 @@
 """Robot files: YAML in, one validated, immutable model out, or an error with its line.
 
-strict_yaml.py  YAML without its traps
-model.py        keys, types, bounds, as pydantic has them; checks.py, drive_checks.py: rules between values
-robot.py        `RobotFile`: the two together; messages.py: errors in the file's own words
-key_types.py    what all keys are made of; keep_out.py: floors, boxes, capsules; scene.py: such in a file of their own
-schema.py       JSON Schema, for editors
-catalogue.py    the shipped robots by name
-new_file.py     a robot file from a DH table
-edit.py         other values in a robot file's text; writing.py: a whole file's text
-urdf.py         a URDF as a robot file; urdf_document.py: its XML
+strict_yaml.py    YAML without its traps
+robot_keys.py     keys, types, bounds, as pydantic has them; checks.py, drive_checks.py: rules between values
+robot.py          `RobotFile`: the two together; robot_key_errors.py: errors in the file's own words
+key_types.py      what all keys are made of
+keep_out_keys.py  floors, boxes, capsules; scene_file.py: such in a file of their own
+schema.py         JSON Schema, for editors
+catalogue.py      the shipped robots by name
+new_file.py       a robot file from a DH table
+edit.py           other values in a robot file's text; writing.py: a whole file's text
+urdf.py           a URDF as a robot file; urdf_document.py: its XML
 
 This package imports pydantic and yaml, and is itself imported only when a robot file is read.
 """
@@ -22,8 +23,8 @@ from pydantic import ValidationError
 
 from armkin.errors import FileError, RobotFileError
 from armkin.robot_file import catalogue, strict_yaml
-from armkin.robot_file.model import DH, Board, Drive, Gripper, Homing, Joint, Motor, Pose, Screw
 from armkin.robot_file.robot import RobotFile
+from armkin.robot_file.robot_keys import DH, Board, Drive, Gripper, Homing, Joint, Motor, Pose, Screw
 
 __all__ = [
     "DH",
@@ -78,11 +79,11 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
     try:
         robot = _validated(document.data)
     except ValidationError as error:
-        from armkin.robot_file import messages  # for invalid files only
+        from armkin.robot_file import robot_key_errors  # for invalid files only
 
         problems = [
             (document.line(path), f"{_where(path, document.data)}{text}")
-            for path, text in messages.problems(error.errors(include_url=False))
+            for path, text in robot_key_errors.problems(error.errors(include_url=False))
         ]
         problems.sort(key=lambda problem: problem[0])
         raise _invalid(name, problems) from None

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 from armkin import board_kinds, installed_kinds
 from armkin.board_kinds import BOARDS
 from armkin.robot_file.drive_checks import Path, Problem, of_drive, reach_of_drive
-from armkin.robot_file.model import Triple, dot
+from armkin.robot_file.robot_keys import Triple, dot
 
 if TYPE_CHECKING:
     from armkin.board_kinds import ForeignBoard
-    from armkin.robot_file.model import Board, Drive, Joint, Motor, RobotKeys
+    from armkin.robot_file.robot_keys import Board, Drive, Joint, Motor, RobotKeys
 
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
 _LEAST_WEIGHT = 1e-6  # of a joint on a motor: less would divide by nothing
@@ -45,9 +45,9 @@ def problems(robot: RobotKeys) -> Iterator[Problem]:
     yield from _motors(robot)
     yield from _axes(robot)
     if robot.keep_out:
-        from armkin.robot_file import keep_out  # for files that have some alone
+        from armkin.robot_file import keep_out_keys  # for files that have some alone
 
-        yield from keep_out.problems(robot.keep_out, ["base", *(joint.name for joint in robot.joints)])
+        yield from keep_out_keys.problems(robot.keep_out, ["base", *(joint.name for joint in robot.joints)])
 
 
 def _poses(robot: RobotKeys) -> Iterator[Problem]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from armkin.robot_file.model import Gripper
+from armkin.robot_file.robot_keys import Gripper
 
 if TYPE_CHECKING:
-    from armkin.robot_file.model import Drive, Joint
+    from armkin.robot_file.robot_keys import Drive, Joint
 
 Path = tuple[str | int, ...]
 Problem = tuple[Path, str]

@@ -1,4 +1,4 @@
-"""The robot file whole: the keys of ``model``, held to the rules of ``checks``."""
+"""The robot file whole: the keys of ``robot_keys``, held to the rules of ``checks``."""
 
 from collections.abc import Sequence
 from typing import Self
@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from armkin.errors import UsageError
 from armkin.robot_file import checks
-from armkin.robot_file.model import Pose, RobotKeys
+from armkin.robot_file.robot_keys import Pose, RobotKeys
 
 
 class RobotFile(RobotKeys):

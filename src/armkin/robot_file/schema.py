@@ -10,9 +10,9 @@ from pydantic import BaseModel, TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from armkin.robot_file import keep_out
-from armkin.robot_file.model import Base, Pose
+from armkin.robot_file import keep_out_keys
 from armkin.robot_file.robot import RobotFile
+from armkin.robot_file.robot_keys import Base, Pose
 
 # The smallest useful file of each convention.
 EXAMPLES: list[dict[str, Any]] = [
@@ -84,18 +84,18 @@ def json_schema() -> dict[str, Any]:
 
 def scene_schema() -> dict[str, Any]:
     """The schema of a scene."""
-    from armkin.robot_file.scene import Scene
+    from armkin.robot_file.scene_file import Scene
 
     return with_keep_out(made_from(Scene, "armkin scene"))
 
 
 def with_keep_out(schema: dict[str, Any]) -> dict[str, Any]:
     """A schema whose `keep_out` says what an entry is: the word self, or one of the shapes."""
-    made = _tidied(TypeAdapter(keep_out.Entry).json_schema(schema_generator=_Generator))
+    made = _tidied(TypeAdapter(keep_out_keys.Entry).json_schema(schema_generator=_Generator))
     schema.setdefault("$defs", {}).update(made.pop("$defs", {}))
     schema["$defs"]["Entry"] = made
-    items = {"anyOf": [{"const": keep_out.SELF}, {"$ref": "#/$defs/Entry"}]}
-    schema["properties"]["keep_out"] |= {"items": items, "maxItems": keep_out.MOST}
+    items = {"anyOf": [{"const": keep_out_keys.SELF}, {"$ref": "#/$defs/Entry"}]}
+    schema["properties"]["keep_out"] |= {"items": items, "maxItems": keep_out_keys.MOST}
     return schema
 
 

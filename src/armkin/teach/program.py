@@ -246,7 +246,7 @@ class Program:
 
 
 def _kind(move: Mapping[str, Any]) -> str:
-    from armkin.path_file.model import KINDS
+    from armkin.path_file.path_keys import KINDS
 
     return next(kind for kind in KINDS if kind in move)
 

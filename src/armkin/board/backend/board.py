@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.robot_file.model import Gripper
+    from armkin.robot_file.robot_keys import Gripper
 
 Never = Callable[[], bool]
 JOG_PIECE = 0.3  # [s] of one piece of a jog on a board that cannot be told to go on

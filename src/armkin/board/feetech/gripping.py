@@ -11,7 +11,7 @@ from armkin.errors import LinkError
 
 if TYPE_CHECKING:
     from armkin.board.feetech.bus import Bus
-    from armkin.robot_file.model import Gripper
+    from armkin.robot_file.robot_keys import Gripper
 
 SPEED = 500.0  # [counts/s] of a gripper without max_speed, 44 deg/s
 ARRIVED = 12  # [counts] from the goal, 1 degree

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
-    from armkin.robot_file.model import Gripper
+    from armkin.robot_file.robot_keys import Gripper
 
 _REST = 30.0  # [s] that a hold may take
 _FRESH = 5.0  # [s] after which the settings are read again: jogging prepares three times a second

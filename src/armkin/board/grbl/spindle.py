@@ -13,7 +13,7 @@ from armkin.errors import LinkError
 
 if TYPE_CHECKING:
     from armkin.board.grbl.session import Session
-    from armkin.robot_file.model import Gripper
+    from armkin.robot_file.robot_keys import Gripper
 
 GRIPPING = 0.5  # [s] that a gripper without max_speed takes
 

@@ -101,7 +101,7 @@ class _Session:
         """The board of the file as it is corrected so far."""
         from armkin.keep_out.loading import checked
         from armkin.robot_file import parse
-        from armkin.robot_file.scene import read
+        from armkin.robot_file.scene_file import read
 
         file = parse(self.corrected(found), self.path)
         arm = checked(file, None if self.scene is None else read(self.scene))

@@ -5,7 +5,7 @@ floor.py, box.py, capsule.py; segments.py: how far segments are from each other
 floor.py, box.py, capsule.py; segments.py: how far segments are from each other
 
 A shape tells its signed distance to segments (negative inside), its corners for pictures, and its numbers for C.
-Another shape is one more file, a line in `_OF`, its keys in `armkin.robot_file.keep_out` and its distance in C.
+Another shape is one more file, a line in `_OF`, its keys in `armkin.robot_file.keep_out_keys` and its distance in C.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from armkin.keep_out.shapes import box, capsule, floor
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
-    from armkin.robot_file.keep_out import Entry
+    from armkin.robot_file.keep_out_keys import Entry
 
 
 class Shape(Protocol):

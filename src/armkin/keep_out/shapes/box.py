@@ -12,7 +12,7 @@ from armkin.formula.arrays import Array
 from armkin.model.rotation import transform
 
 if TYPE_CHECKING:
-    from armkin.robot_file.keep_out import Entry
+    from armkin.robot_file.keep_out_keys import Entry
 
 
 @dataclass(frozen=True, eq=False)

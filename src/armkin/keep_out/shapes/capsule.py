@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array
 from armkin.keep_out.shapes.segments import between
 
 if TYPE_CHECKING:
-    from armkin.robot_file.keep_out import Entry
+    from armkin.robot_file.keep_out_keys import Entry
 
 _ROUND = 24  # corners of its circles in pictures
 

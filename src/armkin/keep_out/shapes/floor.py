@@ -10,7 +10,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 
 if TYPE_CHECKING:
-    from armkin.robot_file.keep_out import Entry
+    from armkin.robot_file.keep_out_keys import Entry
 
 
 @dataclass(frozen=True)

@@ -55,10 +55,10 @@ Size = Annotated[float, Field(ge=0, le=1e6)]
 
 
 def _keep_out(values: Any) -> Any:
-    """The entries of `armkin.robot_file.keep_out`, whose models are built for files that have some alone."""
-    from armkin.robot_file import keep_out
+    """The entries of `armkin.robot_file.keep_out_keys`, whose models are built for files that have some alone."""
+    from armkin.robot_file import keep_out_keys
 
-    return keep_out.read(values)
+    return keep_out_keys.read(values)
 
 
 KeepOut = Annotated[tuple[Any, ...], BeforeValidator(_keep_out)]

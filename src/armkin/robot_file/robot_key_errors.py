@@ -10,31 +10,31 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from armkin.robot_file import keep_out, model, strict_yaml
+from armkin.robot_file import keep_out_keys, robot_keys, strict_yaml
 
 Path = tuple[str | int, ...]
 
 # Which model the keys under a name belong to.
 _MODELS: dict[str, type[BaseModel]] = {
-    "": model.RobotKeys,
-    "joints": model.Joint,
-    "dh": model.DH,
-    "screw": model.Screw,
-    "drive": model.Drive,
-    "motors": model.Motor,
-    "gripper": model.Gripper,
-    "homing": model.Homing,
-    "board": model.Board,
-    "base": model.Base,
-    "body": model.Body,
-    "tool": model.Pose,
-    "zero_pose": model.Pose,
+    "": robot_keys.RobotKeys,
+    "joints": robot_keys.Joint,
+    "dh": robot_keys.DH,
+    "screw": robot_keys.Screw,
+    "drive": robot_keys.Drive,
+    "motors": robot_keys.Motor,
+    "gripper": robot_keys.Gripper,
+    "homing": robot_keys.Homing,
+    "board": robot_keys.Board,
+    "base": robot_keys.Base,
+    "body": robot_keys.Body,
+    "tool": robot_keys.Pose,
+    "zero_pose": robot_keys.Pose,
 }
 # The same of keep-outs, whose keys (min, max, from, to) are other keys' synonyms elsewhere.
 _KEEP_OUT: dict[str, type[BaseModel]] = {
-    "keep_out": keep_out.Entry,
-    "box": keep_out.Box,
-    "capsule": keep_out.Capsule,
+    "keep_out": keep_out_keys.Entry,
+    "box": keep_out_keys.Box,
+    "capsule": keep_out_keys.Capsule,
 }
 _EXAMPLES: dict[str, str] = {
     "body": "{radius: 40}, in mm",
@@ -221,7 +221,7 @@ def _unknown_key(path: Path) -> str:
     for name, other in _models(path).items():
         if key in other.model_fields and other is not owner and name:
             return f"unknown key here; it belongs in {_place(name)}"
-    if key in model.RobotKeys.model_fields and path[0] != "keep_out":
+    if key in robot_keys.RobotKeys.model_fields and path[0] != "keep_out":
         return "unknown key here; it belongs at the top of the file"
     return f"unknown key; the keys here are {', '.join(_keys(owner))}"
 
@@ -255,7 +255,7 @@ def _nearest(word: str, choices: list[str], synonyms: dict[str, str] = _SYNONYMS
 
 def _owner(path: Path) -> type[BaseModel]:
     names = [part for part in path[:-1] if isinstance(part, str)]
-    return _models(path).get(names[-1] if names else "", model.RobotKeys)
+    return _models(path).get(names[-1] if names else "", robot_keys.RobotKeys)
 
 
 def _models(path: Path) -> dict[str, type[BaseModel]]:

@@ -6,8 +6,8 @@ import difflib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from armkin.path_file.model import EXAMPLES, KINDS, Arc, Circle, Move, Offset, PathFile, Start
-from armkin.robot_file.messages import shown
+from armkin.path_file.path_keys import EXAMPLES, KINDS, Arc, Circle, Move, Offset, PathFile, Start
+from armkin.robot_file.robot_key_errors import shown
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError

@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 from armkin.errors import PathFileError
-from armkin.path_file.model import LARGEST, LEAST_TOOL_SPEED, MOST_POINTS, Move, PathFile, Source
+from armkin.path_file.path_keys import LARGEST, LEAST_TOOL_SPEED, MOST_POINTS, Move, PathFile, Source
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")

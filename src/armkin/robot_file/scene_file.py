@@ -9,10 +9,10 @@ from typing import NoReturn
 from pydantic import Field, PrivateAttr, ValidationError
 
 from armkin.errors import FileError, RobotFileError
-from armkin.robot_file import keep_out as entries
-from armkin.robot_file import messages, strict_yaml
+from armkin.robot_file import keep_out_keys as entries
+from armkin.robot_file import robot_key_errors, strict_yaml
 from armkin.robot_file.key_types import Model
-from armkin.robot_file.model import KeepOut, Size
+from armkin.robot_file.robot_keys import KeepOut, Size
 
 _KIND = strict_yaml.Kind("scene", "keep_out", "keep_out: [self, floor: 0]", 1024 * 1024, 50_000)
 _TOLD = 20  # problems that are told at once
@@ -61,7 +61,7 @@ def parse(raw: bytes | str, name: str = "scene.yaml") -> Scene:
         scene = Scene.model_validate(document.data)
     except ValidationError as error:
         told = []
-        for path, text in messages.problems(error.errors(include_url=False)):
+        for path, text in robot_key_errors.problems(error.errors(include_url=False)):
             if text.startswith("unknown key") and len(path) == 1:
                 text = "unknown key; a scene has clearance and keep_out"
             told.append((path, text))
