@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 
 from armkin.board.firmware.wire.protocol import State
-from armkin.board.sim.board import SimBoard
+from armkin.board.sim.sim_board import SimBoard
 from armkin.board_kinds import BOARDS
 from pty_port import Patient, Pty
 

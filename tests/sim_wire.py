@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from armkin.board.sim.board import SimBoard
-from armkin.board.sim.port import SimPort
+from armkin.board.sim.sim_board import SimBoard
+from armkin.board.sim.sim_port import SimPort
 
 
 class Wire(SimPort):

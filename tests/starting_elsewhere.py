@@ -18,7 +18,7 @@ from armkin.board.backend import Backend
 from armkin.board.backend.board import Board
 from armkin.board.firmware.configuration import configure
 from armkin.board.kinds import board_of
-from armkin.board.klipper.axes import axes_of
+from armkin.board.klipper.extra_axes import axes_of
 from armkin.board.sim.servo_bus import Servo
 from armkin.board_kinds import BOARDS
 from armkin.formula.arrays import Array

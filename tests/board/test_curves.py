@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.board.backend.sent_positions import braking
-from armkin.board.firmware.segments import curves
+from armkin.board.firmware.segments import curve_segments
 from armkin.board.firmware.segments.counts_to_segments import cycles_of
 from armkin.board.firmware.segments.trajectory_to_counts import cut
 from armkin.board.kinds import board_of
@@ -104,11 +104,11 @@ def test_chords_that_may_be_long_are_told_without_a_look(seed: int, monkeypatch:
         looked.append(len(q))
         return armkin.jacobian(arm, q)
 
-    monkeypatch.setattr(curves, "jacobian", counted)
+    monkeypatch.setattr(curve_segments, "jacobian", counted)
 
     def bounds(arm: armkin.Arm) -> list[float]:
         ways = [s for s in plan.motion.stretches if isinstance(s, Curve)]
-        parts = [curves.CurveSegments(arm, s, at, at, 16_000_000, 576, 0.05) for s in ways]
+        parts = [curve_segments.CurveSegments(arm, s, at, at, 16_000_000, 576, 0.05) for s in ways]
         return [t for part in parts for t in part.bounds().tolist()]
 
     found, few = bounds(arm), sum(looked)

@@ -19,8 +19,8 @@ from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Info, Status
 from armkin.board.firmware.wire.reply_checks import BoardSaysError, ReplacedError
 from armkin.board.kinds.firmware import Switches
-from armkin.board.sim.board import SimBoard
-from armkin.board.sim.port import SimPort
+from armkin.board.sim.sim_board import SimBoard
+from armkin.board.sim.sim_port import SimPort
 from armkin.board_kinds import BOARDS
 from armkin.errors import LinkError
 from armkin.model import build as arms

@@ -11,8 +11,8 @@ import pytest
 
 import armkin
 from armkin.board.backend import StoppedError
-from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.machine import GrblMachine
+from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.ports import record_path
 from armkin.board.sim.grbl import Grbl

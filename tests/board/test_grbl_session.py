@@ -7,7 +7,7 @@ import random
 import pytest
 
 from armkin.board.grbl import replies, settings
-from armkin.board.grbl.session import GrblError, Session
+from armkin.board.grbl.grbl_session import GrblError, Session
 from armkin.board.grbl.settings import Axis
 from armkin.board.sim.grbl import Grbl
 from armkin.errors import LinkError

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.kinds import board_of
-from armkin.board.klipper import axes as klipper_axes
+from armkin.board.klipper import extra_axes as klipper_axes
 from armkin.board.ports import record_path
 from armkin.board.sim.grbl import Grbl
 from armkin.board.sim.klipper import Klipper

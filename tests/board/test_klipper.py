@@ -17,7 +17,7 @@ import armkin
 from armkin.board import path_run
 from armkin.board.backend import StoppedError
 from armkin.board.backend.sent_positions import Job
-from armkin.board.klipper.axes import axes_of, differences, printer_cfg, settings_of
+from armkin.board.klipper.extra_axes import axes_of, differences, printer_cfg, settings_of
 from armkin.board.klipper.gcode import Lines
 from armkin.board.klipper.machine import KlipperMachine
 from armkin.board.sim.klipper import Klipper

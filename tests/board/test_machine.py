@@ -18,8 +18,8 @@ from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.firmware.wire.session import ReplacedError
-from armkin.board.sim.board import SimBoard
-from armkin.board.sim.port import SimPort
+from armkin.board.sim.sim_board import SimBoard
+from armkin.board.sim.sim_port import SimPort
 from armkin.board_kinds import BOARDS
 from armkin.errors import LinkError, UsageError
 from armkin.model import build as arms

@@ -16,8 +16,8 @@ from armkin.board.firmware.segments.rest_of_plan import onwards, places_on
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
 from armkin.board.firmware.wire.protocol import HALF, STEP
 from armkin.board.ports import note_path
-from armkin.board.sim.board import SimBoard
-from armkin.board.sim.port import SimPort
+from armkin.board.sim.sim_board import SimBoard
+from armkin.board.sim.sim_port import SimPort
 from armkin.board_kinds import BOARDS
 from armkin.motion.joint_moves import straight
 from armkin.motion.timing.trajectory import Trajectory

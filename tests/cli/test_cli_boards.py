@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.kinds import board_of
 from armkin.board.ports import note_path

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import armkin
-from armkin.board.klipper.axes import axes_of, settings_of
+from armkin.board.klipper.extra_axes import axes_of, settings_of
 from armkin.board.sim.klipper import Klipper
 from command_line import ROOT, run
 from unix_port import UnixPort

@@ -4,7 +4,7 @@ import pytest
 
 import armkin
 from armkin.board import ports
-from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.sim.grbl import Grbl
 from armkin.board.sim.servo_bus import Servo, ServoBus

@@ -8,7 +8,7 @@ import pytest
 
 import armkin
 from armkin.errors import NoSolutionError, PathFileError
-from armkin.teach.program import MOST, Program
+from armkin.teach.recorded_program import MOST, Program
 from command_line import ROOT, THREE_DOF, run
 
 START = "moves:\n  - point: [390, 80, 300]\n"

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from armkin.board.firmware.wire.protocol import State
-from armkin.board.sim.board import SimBoard
+from armkin.board.sim.sim_board import SimBoard
 from armkin.board_kinds import BOARDS
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, patiently, process, run
 from pty_board import PtyBoard

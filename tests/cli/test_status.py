@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from armkin.board.firmware.machine import Machine
-from armkin.board.sim.board import SimBoard
+from armkin.board.sim.sim_board import SimBoard
 from armkin.board_kinds import BOARDS
 from armkin.cli.commands import status
 from command_line import ROOT, THREE_DOF, run

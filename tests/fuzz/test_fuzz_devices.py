@@ -12,16 +12,16 @@ from attack import attack, generator
 from armkin import load
 from armkin.board.firmware import streaming
 from armkin.board.firmware.wire import session
-from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
-from armkin.board.klipper.axes import axes_of as klipper_axes_of
-from armkin.board.klipper.axes import settings_of
+from armkin.board.klipper.extra_axes import axes_of as klipper_axes_of
+from armkin.board.klipper.extra_axes import settings_of
 from armkin.board.ports import Port
-from armkin.board.sim.board import SimBoard
 from armkin.board.sim.grbl import Grbl
 from armkin.board.sim.klipper import Klipper
-from armkin.board.sim.port import SimPort
 from armkin.board.sim.servo_bus import Servo, ServoBus
+from armkin.board.sim.sim_board import SimBoard
+from armkin.board.sim.sim_port import SimPort
 from armkin.board_kinds import BOARDS
 from command_line import ROOT
 

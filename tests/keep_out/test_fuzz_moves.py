@@ -29,8 +29,8 @@ from armkin.board.firmware.wire.protocol import State
 from armkin.board.kinds import board_of
 from armkin.board.kinds.firmware import FirmwareBoard
 from armkin.board.kinds.klipper import KlipperBoard
-from armkin.board.sim.board import SimBoard
-from armkin.board.sim.port import SimPort
+from armkin.board.sim.sim_board import SimBoard
+from armkin.board.sim.sim_port import SimPort
 from armkin.board.stopping import Stop
 from armkin.board_kinds import BOARDS
 from armkin.keep_out.guard import Guard, guard

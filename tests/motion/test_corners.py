@@ -69,7 +69,7 @@ def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, mon
     rows = wander(three_dof, 60, 20.0)
     whole = cut(rounded(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 50)
-    monkeypatch.setattr("armkin.board.firmware.segments.curves._SAMPLES", 700)
+    monkeypatch.setattr("armkin.board.firmware.segments.curve_segments._SAMPLES", 700)
     parts = cut(rounded(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
     assert parts.duration == pytest.approx(whole.duration, rel=1e-12)
     [[one], [other]] = ([*map(list, (move.segments for move in laid.moves()))] for laid in (whole, parts))

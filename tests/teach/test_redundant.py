@@ -11,7 +11,7 @@ import numpy as np
 
 import armkin
 from armkin.model import units
-from armkin.teach.scene import scene
+from armkin.teach.arm_description import scene
 from armkin.teach.server import STATIC
 
 _ASK = """

@@ -18,7 +18,7 @@ from served import served
 
 import armkin
 from armkin.model import units
-from armkin.teach.scene import scene
+from armkin.teach.arm_description import scene
 from armkin.teach.server import Server
 from command_line import ROOT, run
 

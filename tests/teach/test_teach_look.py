@@ -11,9 +11,9 @@ import pytest
 
 import armkin
 from armkin.model import units
+from armkin.teach.arm_description import first_lock, scene
 from armkin.teach.pose_answers import Question, look
 from armkin.teach.quick_ik import QuickIk
-from armkin.teach.scene import first_lock, scene
 from command_line import ROOT, run
 
 ROBOTS = sorted(path.stem for path in (ROOT / "robots").glob("*.yaml"))

@@ -14,7 +14,7 @@ import armkin
 from armkin import path_file
 from armkin.errors import ArmkinError
 from armkin.teach.playing import played
-from armkin.teach.program import Program
+from armkin.teach.recorded_program import Program
 from command_line import ROOT, run
 
 POSES = [[10, 80, -80], [-20, 60, -70], [20, 45, -60]]

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.teach import request_checks
+from armkin.teach.arm_description import first_lock, jogs, scene
 from armkin.teach.page_key import RefusedError
 from armkin.teach.program_actions import ProgramActions
-from armkin.teach.scene import first_lock, jogs, scene
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.teach.board import BoardActions
+    from armkin.teach.board_actions import BoardActions
     from armkin.teach.quick_ik import QuickIk
 
 
@@ -38,7 +38,7 @@ class Actions:
         self.program_actions = ProgramActions(arm, self.stands, lambda state: self.tabs.tell("program", state))
         self.for_control: dict[str, Action] = {"look": self._look, **self.program_actions.actions()}  # by name
         if port is not None:
-            from armkin.teach.board import BoardActions
+            from armkin.teach.board_actions import BoardActions
             from armkin.teach.board_thread import BoardThread
 
             thread = BoardThread(arm, port, baud, lambda state: self.tabs.tell("board", state))

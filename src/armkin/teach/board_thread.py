@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from armkin.board.backend import Backend, StoppedError
 from armkin.board.kinds import board_of
 from armkin.board.ports import SIM
-from armkin.board.sim.port import Paced
+from armkin.board.sim.sim_port import Paced
 from armkin.errors import ArmkinError, LinkError
 from armkin.model import units
 from armkin.motors import joints as joints_of

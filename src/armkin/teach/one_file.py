@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armkin.export.js.es_module import module
+from armkin.teach.arm_description import scene
 from armkin.teach.browser_solver import about
 from armkin.teach.playing import played
 from armkin.teach.reach_slice import reach_slice
-from armkin.teach.scene import scene
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -12,7 +12,7 @@ from armkin.model import units
 from armkin.motors import joints as joints_of
 from armkin.teach import request_checks
 from armkin.teach.playing import played
-from armkin.teach.program import Program
+from armkin.teach.recorded_program import Program
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array

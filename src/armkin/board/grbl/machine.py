@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from armkin.board.backend.sent_positions import Job
 from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.grbl import gcode, replies, settings
-from armkin.board.grbl.axes import axes_of
+from armkin.board.grbl.grbl_session import GrblError, Session
+from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.position import Place
-from armkin.board.grbl.session import GrblError, Session
 from armkin.board.grbl.spindle import Spindle
 from armkin.board.grbl.watch import Watch
 from armkin.errors import LinkError

@@ -19,8 +19,8 @@ from armkin.board.backend.starting import unbelievable
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
+    from armkin.board.grbl.grbl_session import Session
     from armkin.board.grbl.replies import Report
-    from armkin.board.grbl.session import Session
     from armkin.board.grbl.settings import Axis
     from armkin.model.arm import Arm
 

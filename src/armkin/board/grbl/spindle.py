@@ -12,7 +12,7 @@ from armkin.board.grbl import replies
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
-    from armkin.board.grbl.session import Session
+    from armkin.board.grbl.grbl_session import Session
     from armkin.robot_file.robot_keys import Gripper
 
 GRIPPING = 0.5  # [s] that a gripper without max_speed takes

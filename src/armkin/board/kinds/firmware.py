@@ -46,8 +46,8 @@ def open_port(
     LinkError with what to do.
     """
     if name == SIM:
-        from armkin.board.sim.board import SimBoard
-        from armkin.board.sim.port import SimPort
+        from armkin.board.sim.sim_board import SimBoard
+        from armkin.board.sim.sim_port import SimPort
 
         return SimPort(SimBoard(board, switches))
     return SerialPort(name, baud, reset=reset)

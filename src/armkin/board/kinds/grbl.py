@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.board import Board, Gripped
-from armkin.board.grbl.axes import axes_of
 from armkin.board.grbl.gcode import job
+from armkin.board.grbl.grbl_session import Session
 from armkin.board.grbl.machine import GrblMachine
-from armkin.board.grbl.session import Session
+from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board_kinds import ForeignBoard
 from armkin.errors import UsageError

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend.board import Board
 from armkin.board.klipper.api import Api
-from armkin.board.klipper.axes import SOCKETS, axes_of, printer_cfg, settings_of
+from armkin.board.klipper.extra_axes import SOCKETS, axes_of, printer_cfg, settings_of
 from armkin.board.klipper.machine import KlipperMachine, job
 from armkin.board.ports import SIM, SocketPort, is_socket
 from armkin.board_kinds import ForeignBoard

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.klipper.axes import PIECE, RATE, Axis
+from armkin.board.klipper.extra_axes import PIECE, RATE, Axis
 from armkin.motors import places, pulses
 
 if TYPE_CHECKING:

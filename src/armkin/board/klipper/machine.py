@@ -20,7 +20,7 @@ from armkin.board.backend.starting import unbelievable
 from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.klipper import gcode
 from armkin.board.klipper.api import Api
-from armkin.board.klipper.axes import PIECE, Axis, Difference, axes_of, differences
+from armkin.board.klipper.extra_axes import PIECE, Axis, Difference, axes_of, differences
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:

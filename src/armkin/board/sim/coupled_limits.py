@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armkin.board.firmware.wire.protocol import Error, GuardImage, Image
-from armkin.board.sim.axes import row_value
+from armkin.board.sim.axis_counts import row_value
 from armkin.board.sim.frames import RefusedError
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armkin.board.sim.axes import Axes, row_value, within
+from armkin.board.sim.axis_counts import Axes, row_value, within
 
 _TICK = 0.001  # [s]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 
 from armkin.board.firmware.wire.protocol import HALF, STEP, Segment
-from armkin.board.sim.axes import Axes
+from armkin.board.sim.axis_counts import Axes
 
 _TOO_FAST = 0.030  # [s] time to a stop from which an abrupt stop loses steps
 _SLOW = 0.024  # [s] the same, below which the arm may stand where its queue ends

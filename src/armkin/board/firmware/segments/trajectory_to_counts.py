@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from armkin.board.backend.starting import Laid
 from armkin.board.firmware.segments.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
-from armkin.board.firmware.segments.curves import CurveSegments, rates
+from armkin.board.firmware.segments.curve_segments import CurveSegments, rates
 from armkin.board.firmware.segments.straight_lines import Pieces, along, count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array

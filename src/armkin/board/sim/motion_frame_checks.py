@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armkin.board.firmware.wire.protocol import STEP, Error, Segment
-from armkin.board.sim.axes import within
+from armkin.board.sim.axis_counts import within
 from armkin.board.sim.coupled_limits import Rows
 from armkin.board.sim.frames import Batch, RefusedError
+from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.queue import Queue
-from armkin.board.sim.setup import Setup
 from armkin.board.sim.velocity import Velocity, times_valid
 
 

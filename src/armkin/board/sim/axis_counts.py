@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armkin.board.firmware.wire.protocol import Image, RowImage
-from armkin.board.sim.setup import Setup
+from armkin.board.sim.host_settings import Setup
 
 
 def within(lower: int, upper: int, before: int, after: int) -> bool:

@@ -9,7 +9,7 @@ from armkin.board.ports import BAUD, SIM
 
 if TYPE_CHECKING:
     from armkin.board.ports import Port
-    from armkin.board.sim.board import SimBoard
+    from armkin.board.sim.sim_board import SimBoard
 
 _LATE = (
     0.02  # [s] that a board in the clock's time makes up for at once: its queue must not run dry for a busy computer

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from armkin.board.sim.coupled_limits import toward
-from armkin.board.sim.setup import Setup
+from armkin.board.sim.host_settings import Setup
 
 
 class Inputs:
