@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 import armkin
-from armkin.plot.path import plot_path
+from armkin.plot.path_picture import plot_path
 
 arm = armkin.load("yaw_two_link")
 # The homework gives no speeds: these are ours.

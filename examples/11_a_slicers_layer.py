@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import armkin
-from armkin.plot.path import plot_path
+from armkin.plot.path_picture import plot_path
 
 arm = armkin.load("three_dof")
 # The file's zero lies 320 mm in front of the arm, 20 mm to its right, 200 mm up.

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import armkin
-from armkin.plot.path import plot_path
+from armkin.plot.path_picture import plot_path
 
 arm = armkin.load("three_dof")
 # feed: mm/s along the strokes; lift: mm that the pen goes up between them.

@@ -34,7 +34,7 @@ from armkin.motion.timing.cubics import Knots
 from armkin.motion.timing.curve import Curve
 from armkin.motion.timing.profile import seven_phases
 from armkin.motion.timing.time_optimal import Bounds, finer, optimal
-from armkin.motion.tool_path.geometry import spot
+from armkin.motion.tool_path.path_pieces import spot
 
 SIX = ("three_dof", "irb2400", "puma560", "ar4", "labvolt_5150", "ur5e")
 ARMS = ("three_dof", "irb2400", "puma560", "irb120", "ar4", "labvolt_5150", "parol6", "ra02")

@@ -62,7 +62,7 @@ MUTANTS = [
            "cli/test_cli_errors.py cli/test_cli_commands.py"),
     Mutant("motion/timing/limit_jerk.py", "(2 * accel / np.asarray", "(accel / np.asarray", "motion"),
     Mutant("keep_out/proof.py", "(apart[:-1] + apart[1:] - moved) / 2", "(apart[:-1] + apart[1:]) / 2", "keep_out"),
-    Mutant("motion/tool_path/geometry.py", "omega - np.cross(w, omega) / 2", "omega + np.cross(w, omega) / 2",
+    Mutant("motion/tool_path/path_pieces.py", "omega - np.cross(w, omega) / 2", "omega + np.cross(w, omega) / 2",
            "motion"),
     Mutant("path_file/svg_shapes.py", "0.0) if kind == \"skewX\" else", "0.0) if kind == \"skewY\" else", "path_file"),
     Mutant("board/grbl/gcode.py", "max(60 * speed, SLOWEST)", "max(speed, SLOWEST)", "board"),

@@ -3,7 +3,7 @@
 import pytest
 
 from armkin.cli.negative_numbers import options_first
-from armkin.cli.numbers import comma_separated, number, numbers, whole
+from armkin.cli.number_parsing import comma_separated, number, numbers, whole
 from armkin.errors import UsageError
 from command_line import THREE_DOF, run
 

@@ -266,19 +266,19 @@ def test_a_batch_in_a_folder_that_may_not_be_written_has_nothing_to_go_on_with(
 
 
 def test_a_bug_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    from armkin.cli import inputs
+    from armkin.cli import arguments
 
     def bug(*_: object) -> None:
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(inputs, "load", bug)
+    monkeypatch.setattr(arguments, "load", bug)
     result = run("fk", DOF, 1, 2, 3)
     assert (result.code, result.out) == (1, "")
     assert "internal error: ZeroDivisionError" in result.err
     assert "Traceback" not in result.err
     monkeypatch.setenv("ARMKIN_TRACEBACK", "1")
     assert "Traceback" in run("fk", DOF, 1, 2, 3).err
-    monkeypatch.setattr(inputs, "load", lambda *_: (_ for _ in ()).throw(MemoryError))
+    monkeypatch.setattr(arguments, "load", lambda *_: (_ for _ in ()).throw(MemoryError))
     assert "not enough memory" in run("fk", DOF, 1, 2, 3).err
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.motion.tool_path.geometry import Piece, Spot, line, spot
+from armkin.motion.tool_path.path_pieces import Piece, Spot, line, spot
 
 
 def random_line(arm: armkin.Arm, rng: np.random.Generator) -> Piece:

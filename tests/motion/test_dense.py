@@ -17,7 +17,7 @@ from armkin.motion.plan import playback
 from armkin.motion.timing.curve import Curve
 from armkin.motion.tool_path import fit_points
 from armkin.motion.tool_path.b_spline import banded
-from armkin.plot import path as picture
+from armkin.plot import path_picture as picture
 
 CORNER = np.deg2rad(20)
 

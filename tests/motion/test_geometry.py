@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.motion.tool_path.geometry import arc, blend, line, spot, turn
+from armkin.motion.tool_path.path_pieces import arc, blend, line, spot, turn
 
 TASK = task_for(armkin.load("three_dof"))
 

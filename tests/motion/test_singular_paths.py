@@ -15,7 +15,7 @@ from armkin.model.rotation import rpy
 from armkin.motion.branch_report import answer, passes
 from armkin.motion.branches import wrist_turn
 from armkin.motion.branches.branch_columns import Columns, Samples
-from armkin.plot.path import plot_path
+from armkin.plot.path_picture import plot_path
 
 
 def with_rates(name: str) -> armkin.Arm:

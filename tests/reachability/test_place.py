@@ -15,8 +15,8 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.motion import path_redundant
-from armkin.reachability import place as places
 from armkin.reachability import place_path, place_targets, place_upright
+from armkin.reachability import place_search as places
 from armkin.reachability.place_arm import Around, standing
 from command_line import ROOT, run
 from interrupted import interrupted

@@ -9,8 +9,8 @@ What the words come to:
 
 negative_numbers.py  negative numbers are no options
 options.py           options that several commands share; completion.py: what Tab offers
-numbers.py           numbers as people write them; unit_notes.py: those that look like metres or radians
-inputs.py            the arm, a pose, a target; lock_and_sweep.py: joints held or swept
+number_parsing.py    numbers as people write them; unit_notes.py: those that look like metres or radians
+arguments.py         the arm, a pose, a target; lock_and_sweep.py: joints held or swept
 drawing_path.py      drawings as paths: G-code and SVG
 row_chunks.py        many of them in chunks; csv_rows.py: from CSV; batch_pieces.py: shared out; batch.py: their answers
 piped_answers.py     answers on standard input; send_goals.py: all that `send` can be told

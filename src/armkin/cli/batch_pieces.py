@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from armkin import files
 from armkin.cli import csv_rows
 from armkin.cli.csv_rows import Columns
-from armkin.cli.numbers import LARGEST
+from armkin.cli.number_parsing import LARGEST
 from armkin.cli.row_chunks import Chunk
 from armkin.errors import ArmkinError, UsageError
 

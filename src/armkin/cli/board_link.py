@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import completion, inputs, output, render
+from armkin.cli import arguments, completion, output, render
 from armkin.cli.default_port import port_name
-from armkin.cli.numbers import whole
+from armkin.cli.number_parsing import whole
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -189,7 +189,7 @@ def standing(arm: Arm, text: str, option: str) -> Array:
     """Joint values (n,) [rad | mm] where an arm stands or a plan begins; NoSolutionError outside its limits."""
     from armkin.model.limits import check_limits
 
-    q: Array = units.joints_in(arm, inputs.joint_list(arm, text, option))
+    q: Array = units.joints_in(arm, arguments.joint_list(arm, text, option))
     try:
         check_limits(arm, q[None])
     except NoSolutionError as error:

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.numbers import LARGEST, numbers
+from armkin.cli.number_parsing import LARGEST, numbers
 from armkin.cli.row_chunks import ROWS as ROWS
 from armkin.cli.row_chunks import Chunk
 from armkin.errors import FileError, UsageError

@@ -8,7 +8,7 @@ import typer
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.numbers import number, place
+from armkin.cli.number_parsing import number, place
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:

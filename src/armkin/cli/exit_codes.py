@@ -104,7 +104,7 @@ def _meant(error: Any, context: Any) -> list[str]:
 def _unexpected(error: BaseException) -> int:
     """Typer's own complaints about the command line, and our bugs."""
     if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
-        from armkin.cli.numbers import is_number
+        from armkin.cli.number_parsing import is_number
 
         message = str(error.format_message()).rstrip(".")
         context = getattr(error, "ctx", None)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import inputs, output
+from armkin.cli import arguments, output
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ _SHOWN = 4001  # postures of a motion in which hits that are ignored are looked 
 
 def moving(robot: str, scene: str | None, ignore: bool = False, tool: str | None = None) -> Arm:
     """The arm of a command that moves it; radii that are assumed are named."""
-    return marked(inputs.load(robot, scene, tool), ignore)
+    return marked(arguments.load(robot, scene, tool), ignore)
 
 
 def marked(arm: Arm, ignore: bool) -> Arm:

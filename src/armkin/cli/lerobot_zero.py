@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import inputs, output, render
+from armkin.cli import arguments, output, render
 from armkin.errors import UsageError
 from armkin.model import units
 
@@ -35,7 +35,7 @@ def record(
     from armkin.robot_file.edit import replaced
 
     arm = board.arm
-    q = None if pose is None else units.joints_in(arm, inputs.joint_list(arm, pose, "--pose"))
+    q = None if pose is None else units.joints_in(arm, arguments.joint_list(arm, pose, "--pose"))
     keep(path)
     try:
         found = board.calibration(path, q)

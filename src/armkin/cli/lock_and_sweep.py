@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli.numbers import number, whole
+from armkin.cli.number_parsing import number, whole
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 

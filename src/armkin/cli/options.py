@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from armkin.cli import completion, output
-from armkin.cli.numbers import whole
+from armkin.cli.number_parsing import whole
 
 Robot = Annotated[
     str,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import inputs, output
+from armkin.cli import arguments, output
 from armkin.errors import FileError, NoSolutionError, UsageError
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ def poses(
     """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
     if not words and (found := joint_values(robot, scene, tool)) is not None:
         return found
-    arm = inputs.load(inputs.named(robot), scene, tool)
-    return arm, [inputs.joints(arm, words)]
+    arm = arguments.load(arguments.named(robot), scene, tool)
+    return arm, [arguments.joints(arm, words)]
 
 
 def joint_values(
@@ -114,7 +114,7 @@ def answers(
     """The arm, and the answers on standard input as data; None if there is a robot and nothing on standard input."""
     text = _text()
     if not text.strip():
-        inputs.named(robot)
+        arguments.named(robot)
         return None
     try:
         parsed = [_parsed(part) for part in _parts(text)]
@@ -122,7 +122,7 @@ def answers(
         if robot is None or text.lstrip()[:1] == "{":
             raise
         raise UsageError("standard input is no JSON; for rows of CSV add --batch -") from None
-    arm = inputs.load(robot or parsed[0]["robot_file"], scene, tool)
+    arm = arguments.load(robot or parsed[0]["robot_file"], scene, tool)
     for answer in parsed:
         if answer["robot_sha256"] != arm.sha256:
             name = answer["robot_file"]
@@ -139,7 +139,7 @@ def _text() -> str:
     if sys.stdin is None or sys.stdin.isatty():
         return ""
     try:
-        return inputs.standard_input(_LARGEST, ": give rows to --batch - instead").decode("utf-8-sig")
+        return arguments.standard_input(_LARGEST, ": give rows to --batch - instead").decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UsageError(_NO_JSON) from None
 

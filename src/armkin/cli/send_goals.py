@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from armkin.cli import inputs, lock_and_sweep, piped_answers
+from armkin.cli import arguments, lock_and_sweep, piped_answers
 from armkin.cli.csv_rows import streamed_rows
-from armkin.cli.numbers import decimals
+from armkin.cli.number_parsing import decimals
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
 from armkin.model.targets import label_units, targets_in
@@ -34,7 +34,7 @@ def goals(
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
     given = [name for name, what in (("Q...", q), ("--target", target), ("--batch", batch)) if what]
     if target is not None and q and robot is not None and batch is None:
-        inputs.check_commas(inputs.load(robot), task, target, q)
+        arguments.check_commas(arguments.load(robot), task, target, q)
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)}: give one of them")
     if target is None and (branch is not None or task is not None or near is not None or lock):
@@ -43,12 +43,12 @@ def goals(
         return _from_pipe(robot, scene, tool)
     if robot is None:
         raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
-    arm = inputs.load(robot, scene, tool)
+    arm = arguments.load(robot, scene, tool)
     if target is not None:
         return arm, _of_target(arm, target, task, branch, lock, near)
     if batch is not None:
         return arm, _of_rows(arm, batch)
-    return arm, _checked(arm, [], [inputs.joints(arm, q)])
+    return arm, _checked(arm, [], [arguments.joints(arm, q)])
 
 
 def _of_target(
@@ -61,8 +61,8 @@ def _of_target(
     from armkin.inverse.tasks.choose_task import task_for
 
     what = task_for(arm, task)
-    values = np.array([inputs.target_list(arm, what, target)])
-    close = None if near is None else inputs.joint_list(arm, near, "--near")
+    values = np.array([arguments.target_list(arm, what, target)])
+    close = None if near is None else arguments.joint_list(arm, near, "--near")
     shown = [[decimals(word) for word in target.split(",")]]
     rounding = printed(label_units(what.labels), values, arm.reach, shown)
     held = lock_and_sweep.locks(arm, lock)
@@ -138,7 +138,7 @@ def _from_pipe(robot: str | None, scene: str | None, tool: str | None) -> tuple[
     import armkin
 
     answer = piped_answers.read(robot)
-    arm = inputs.load(answer.robot_file, scene, tool)
+    arm = arguments.load(answer.robot_file, scene, tool)
     if answer.scene_sha256 is not None and answer.scene_sha256 != arm.scene_sha256:
         raise FileError(
             f"the answer on standard input was computed in the scene {answer.scene}; "

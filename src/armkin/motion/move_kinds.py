@@ -10,7 +10,7 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.forward import fk
-from armkin.motion.tool_path import geometry, path_numbers
+from armkin.motion.tool_path import path_numbers, path_pieces
 from armkin.motion.tool_path.dense_points import Polyline
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def _point(walk: Walk, move: Move, value: list[float]) -> None:
 def _line(walk: Walk, move: Move, value: list[float], inner: bool = False) -> None:
     corner = walk.corner(move, inner)
     if corner is not None and walk.dense is None:
-        walk.add(move, geometry.line(walk.task, walk.spot, walk.target(value)))
+        walk.add(move, path_pieces.line(walk.task, walk.spot, walk.target(value)))
         return
     _gather(walk, move, [value])
     if corner is not None:
@@ -63,7 +63,7 @@ def _gather(walk: Walk, move: Move, targets: list[list[float]]) -> None:
 
 def _arc(walk: Walk, move: Move, value: Any) -> None:
     via = path_numbers.place(walk.task, value.via)
-    walk.add(move, geometry.arc(walk.task, walk.spot, via, walk.target(value.to)))
+    walk.add(move, path_pieces.arc(walk.task, walk.spot, via, walk.target(value.to)))
 
 
 def _circle(walk: Walk, move: Move, value: Any) -> None:
@@ -74,11 +74,11 @@ def _circle(walk: Walk, move: Move, value: Any) -> None:
     if np.linalg.norm(normal) < 1e-9:
         raise UsageError("circle: its normal has no length")
     centre, angle = path_numbers.place(walk.task, value.centre), 2 * np.pi * value.turns
-    walk.add(move, geometry.circle(walk.task, walk.spot, centre, normal, angle, value.rise, None))
+    walk.add(move, path_pieces.circle(walk.task, walk.spot, centre, normal, angle, value.rise, None))
 
 
 def _spline(walk: Walk, move: Move, value: list[list[float]]) -> None:
-    walk.add(move, geometry.spline(walk.task, walk.spot, [walk.target(target) for target in value]))
+    walk.add(move, path_pieces.spline(walk.task, walk.spot, [walk.target(target) for target in value]))
 
 
 def _offset(walk: Walk, move: Move, value: Any) -> None:
@@ -93,7 +93,7 @@ def _offset(walk: Walk, move: Move, value: Any) -> None:
             walk.clear(None)
             walk.typed(typed)
             d = (fk(walk.arm, walk.q)[:3, :3] @ np.append(d, 0.0)[:3])[: len(d)]
-    walk.add(move, geometry.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + d)))
+    walk.add(move, path_pieces.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + d)))
 
 
 def _wait(walk: Walk, move: Move, value: float) -> None:

@@ -12,7 +12,7 @@ from armkin.motion.branches.branch_path import Pace
 from armkin.motion.move_kinds import MOVES
 from armkin.motion.path_planner import TOLERANCE, corners_wished
 from armkin.motion.plan_moves import PathOptions, Walk
-from armkin.motion.tool_path.geometry import line
+from armkin.motion.tool_path.path_pieces import line
 from armkin.motion.tool_path.route import joined
 
 if TYPE_CHECKING:

@@ -30,10 +30,10 @@ from armkin.motion.timing.curve import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, way_of, ways_of
 from armkin.motion.timing.profile import at_rest
 from armkin.motion.timing.trajectory import Straight, Stretch
-from armkin.motion.tool_path import geometry, path_numbers
+from armkin.motion.tool_path import path_numbers, path_pieces
 from armkin.motion.tool_path.dense_points import FIT, PLAN, Polyline
-from armkin.motion.tool_path.geometry import Piece, Spot
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
+from armkin.motion.tool_path.path_pieces import Piece, Spot
 from armkin.motion.tool_path.route import Reduced, joined
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Walk:
         if self.dense is not None:
             return self.dense.last
         if self._spot is None:
-            self._spot = geometry.spot(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
+            self._spot = path_pieces.spot(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
         return self._spot
 
     def clear(self, goal: Spot | None, branch: str | None = None) -> None:
@@ -236,7 +236,7 @@ class Walk:
         tolerance = self.pace.tolerance
         pauses = frozenset(self.pauses)
         route, order = joined(self.task, self.pieces, self.blends, pauses, FIT * tolerance, self.plan.reduced)
-        if route.length < geometry.SMALL:
+        if route.length < path_pieces.SMALL:
             raise UsageError("the tool's way has no length: its points are all the same")
         free = self.goal is not None
         near = self.q if self.options.near is None else self.options.near
@@ -329,7 +329,7 @@ def _reached(walk: Walk, goal: Spot, branch: str | None) -> Array:
 
 def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
     """Joint values of a target on all branches within limits, or on the named one, the nearest first."""
-    found = ik(walk.arm, geometry.line(walk.task, goal, goal).targets(np.zeros(1))[0], walk.task.name, near=walk.q)
+    found = ik(walk.arm, path_pieces.line(walk.task, goal, goal).targets(np.zeros(1))[0], walk.task.name, near=walk.q)
     meant = find(found.names, wanted) if (wanted := branch or walk.options.branch) else None
     free = found.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
     good = found.valid & found.within_limits & (True if free is None else free)

@@ -7,8 +7,8 @@ commands.py             what it does with a frame; host_settings.py: its configu
 sim_motors.py           what moves its motors: queue.py, homing.py, jogging.py; cruise.py is for the last two
 axis_counts.py          its counts; digital_inputs.py: its switches
 
-clock.py      the time of the others
-grbl.py       GRBL; grbl_modes.py: what its lines mean
-klipper.py    Klipper
-servo_bus.py  bus servos
+clock.py                the time of the others
+grbl.py                 GRBL; grbl_modes.py: what its lines mean
+klipper.py              Klipper
+servo_bus.py            bus servos
 """

@@ -1,37 +1,12 @@
 """The JSON of every command: keys, types and what they mean.
 
-arm.py          answers about an arm, and errors; branches.py: those of ik; calibration.py: of calibrate
-moving.py       answers about an arm that moves, and about its board
+kinematics.py  answers about an arm, and errors; branches.py: those of ik; calibration.py: of calibrate
+moving.py      answers about an arm that moves, and about its board
 
 `docs/json.md` is written from these types (scripts/json_docs.py); a test holds the two equal, and the
 commands' real answers to the types. Millimetres and degrees throughout; no NaN and no infinity.
 """
 
-from armkin.cli.answers.arm import BestPlace as BestPlace
-from armkin.cli.answers.arm import Error as Error
-from armkin.cli.answers.arm import Export as Export
-from armkin.cli.answers.arm import Fk as Fk
-from armkin.cli.answers.arm import Flash as Flash
-from armkin.cli.answers.arm import Found as Found
-from armkin.cli.answers.arm import Frame as Frame
-from armkin.cli.answers.arm import Head as Head
-from armkin.cli.answers.arm import Info as Info
-from armkin.cli.answers.arm import KeepOuts as KeepOuts
-from armkin.cli.answers.arm import Near as Near
-from armkin.cli.answers.arm import Place as Place
-from armkin.cli.answers.arm import PlacedRobot as PlacedRobot
-from armkin.cli.answers.arm import PlannedPlace as PlannedPlace
-from armkin.cli.answers.arm import Ports as Ports
-from armkin.cli.answers.arm import PulsePositions as PulsePositions
-from armkin.cli.answers.arm import Pulses as Pulses
-from armkin.cli.answers.arm import Reach as Reach
-from armkin.cli.answers.arm import Robots as Robots
-from armkin.cli.answers.arm import Rounded as Rounded
-from armkin.cli.answers.arm import ShippedRobot as ShippedRobot
-from armkin.cli.answers.arm import Solver as Solver
-from armkin.cli.answers.arm import Solving as Solving
-from armkin.cli.answers.arm import Violation as Violation
-from armkin.cli.answers.arm import Workspace as Workspace
 from armkin.cli.answers.branches import Branch as Branch
 from armkin.cli.answers.branches import Closest as Closest
 from armkin.cli.answers.branches import Family as Family
@@ -41,6 +16,31 @@ from armkin.cli.answers.calibration import Correction as Correction
 from armkin.cli.answers.calibration import Errors as Errors
 from armkin.cli.answers.calibration import Flagged as Flagged
 from armkin.cli.answers.calibration import Suggested as Suggested
+from armkin.cli.answers.kinematics import BestPlace as BestPlace
+from armkin.cli.answers.kinematics import Error as Error
+from armkin.cli.answers.kinematics import Export as Export
+from armkin.cli.answers.kinematics import Fk as Fk
+from armkin.cli.answers.kinematics import Flash as Flash
+from armkin.cli.answers.kinematics import Found as Found
+from armkin.cli.answers.kinematics import Frame as Frame
+from armkin.cli.answers.kinematics import Head as Head
+from armkin.cli.answers.kinematics import Info as Info
+from armkin.cli.answers.kinematics import KeepOuts as KeepOuts
+from armkin.cli.answers.kinematics import Near as Near
+from armkin.cli.answers.kinematics import Place as Place
+from armkin.cli.answers.kinematics import PlacedRobot as PlacedRobot
+from armkin.cli.answers.kinematics import PlannedPlace as PlannedPlace
+from armkin.cli.answers.kinematics import Ports as Ports
+from armkin.cli.answers.kinematics import PulsePositions as PulsePositions
+from armkin.cli.answers.kinematics import Pulses as Pulses
+from armkin.cli.answers.kinematics import Reach as Reach
+from armkin.cli.answers.kinematics import Robots as Robots
+from armkin.cli.answers.kinematics import Rounded as Rounded
+from armkin.cli.answers.kinematics import ShippedRobot as ShippedRobot
+from armkin.cli.answers.kinematics import Solver as Solver
+from armkin.cli.answers.kinematics import Solving as Solving
+from armkin.cli.answers.kinematics import Violation as Violation
+from armkin.cli.answers.kinematics import Workspace as Workspace
 from armkin.cli.answers.moving import BranchAt as BranchAt
 from armkin.cli.answers.moving import Difference as Difference
 from armkin.cli.answers.moving import DryRun as DryRun

@@ -4,7 +4,7 @@
 from typing import Annotated, Literal, NotRequired, TypedDict
 
 from armkin.board.summaries import Summary, Where
-from armkin.cli.answers.arm import Head, Tooled
+from armkin.cli.answers.kinematics import Head, Tooled
 from armkin.model.units import JointUnits
 
 Port = Annotated[str, "the port that was used; sim: a simulated board"]

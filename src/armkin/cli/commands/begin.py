@@ -6,7 +6,7 @@ import difflib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armkin.cli import board_link, inputs, keep_outs, output
+from armkin.cli import arguments, board_link, keep_outs, output
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import NoScene
@@ -69,7 +69,7 @@ class _Session:
 
     def __init__(self, robot: str, path: str, scene: str | None, link: board_link.Link) -> None:
         self.path, self.scene, self.link, self.port = path, scene, link, link.port
-        inputs.load(robot, scene)  # what is wrong with the files is told first
+        arguments.load(robot, scene)  # what is wrong with the files is told first
         self.text = _read(path)
         self.told = False
 

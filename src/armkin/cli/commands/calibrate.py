@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, output, render
+from armkin.cli import arguments, output, render
 from armkin.cli.csv_rows import batch_rows
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
@@ -64,7 +64,7 @@ def calibrate(
         output.check(out, "a robot file is", ".yaml", ".yml")
     else:
         output.check(out, "poses to measure are", ".json" if json else ".csv")
-    arm = inputs.load(robot)
+    arm = arguments.load(robot)
     kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
     names = [*arm.joint_names, "x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
     numbers: list[int] = []

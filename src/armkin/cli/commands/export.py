@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import inputs, output, render
+from armkin.cli import arguments, output, render
 from armkin.cli.options import Meshes, Out, Robot, Scene, TaskName
 from armkin.errors import RedundantArmError, UsageError
 
@@ -86,7 +86,7 @@ def export(
         raise UsageError("--meshes goes with --html alone")
     if not c:
         output.check(out, f"export {asked[0]} is", *_ENDINGS[asked[0]])
-    kinds[asked[0]][1](inputs.load(robot, scene))
+    kinds[asked[0]][1](arguments.load(robot, scene))
 
 
 def _urdf(arm: Arm, out: str | None) -> None:

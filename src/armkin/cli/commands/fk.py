@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, output, render
+from armkin.cli import arguments, output, render
 from armkin.cli.options import (
     Batch,
     BatchOut,
@@ -48,12 +48,12 @@ def fk(
 ) -> None:
     """Where the tool is for given joint values."""
     if batch is not None:
-        inputs.no_numbers(q)
-        arm, values = inputs.load(inputs.named(robot), scene, tool), list[list[float]]()
+        arguments.no_numbers(q)
+        arm, values = arguments.load(arguments.named(robot), scene, tool), list[list[float]]()
     else:
         arm, values = _poses(robot, q, scene, tool)
         if len(values) == 1:
-            inputs.one_alone(workers, cluster, resume)
+            arguments.one_alone(workers, cluster, resume)
             [answer] = _answers(arm, one_row(values[0]), frames, compiled)
             with output.destination(out, "one answer is", output.TEXT) as write:
                 write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
@@ -103,8 +103,8 @@ def _poses(
 ) -> tuple[Arm, list[list[float]]]:
     """As `piped_answers.poses`; that module is imported for an answer on standard input alone, so fk starts sooner."""
     if q:
-        arm = inputs.load(inputs.named(robot), scene, tool)
-        return arm, [inputs.joints(arm, q)]
+        arm = arguments.load(arguments.named(robot), scene, tool)
+        return arm, [arguments.joints(arm, q)]
     from armkin.cli import piped_answers
 
     return piped_answers.poses(robot, q, scene, tool)

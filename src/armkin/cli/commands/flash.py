@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import completion, inputs, output, render
+from armkin.cli import arguments, completion, output, render
 from armkin.cli.board_link import SIM
 from armkin.cli.default_port import only, port_option
 from armkin.cli.options import Json
@@ -65,7 +65,7 @@ def _kind(robot: str | None, board: str | None) -> str:
 
     named = board
     if robot is not None:
-        arm = inputs.load(robot)
+        arm = arguments.load(robot)
         own = arm.board.kind if arm.board is not None else None
         if board is not None and own is not None and own != board:
             raise UsageError(f"{arm.name}'s board is {own}, and --board says {board}: leave one of them out")

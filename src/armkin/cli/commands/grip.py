@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, inputs, output, render
+from armkin.cli import arguments, board_link, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
-from armkin.cli.numbers import is_number, number
+from armkin.cli.number_parsing import is_number, number
 from armkin.cli.options import Json, Robot
 from armkin.errors import LinkError, UsageError
 
@@ -38,7 +38,7 @@ def grip(
     json: Json = False,
 ) -> None:
     """Open or close the gripper."""
-    arm = inputs.load(robot)
+    arm = arguments.load(robot)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     target = _value(board, value, "VALUE")
     start = None if assume is None else _value(board, assume, "--assume")

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import compiled_ik, ik_text, inputs, lock_and_sweep, output, piped_answers, render
+from armkin.cli import arguments, compiled_ik, ik_text, lock_and_sweep, output, piped_answers, render
 from armkin.cli.ik_answer import answer_of, nearest_to
-from armkin.cli.numbers import decimals
+from armkin.cli.number_parsing import decimals
 from armkin.cli.options import (
     AllBranches,
     Batch,
@@ -89,14 +89,14 @@ def ik(
 
     _check_together(batch, sweep, position_first=position_first, compiled=compiled, continuous=continuous)
     given = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
-    arm = inputs.load(inputs.named(robot), scene, tool) if given is None else given[0]
+    arm = arguments.load(arguments.named(robot), scene, tool) if given is None else given[0]
     what = task_for(arm, task)
     reached = None if given is None else _reached(arm, what, given[1])
     held = lock_and_sweep.locks(arm, lock)
     request = choose_branch.Request(
         arm=arm,
         task=what.name,
-        near=None if near is None else inputs.joint_list(arm, near, "--near"),
+        near=None if near is None else arguments.joint_list(arm, near, "--near"),
         branch=branch,
         held=held,
         swept=lock_and_sweep.sweeps(arm, sweep, held),
@@ -112,13 +112,13 @@ def ik(
         from armkin.cli.batch import Batch as Run
         from armkin.cli.batch_pieces import Rows
 
-        inputs.no_numbers(target)
+        arguments.no_numbers(target)
         rows = Rows(batch, what.labels, f"task {what.name}", None, reached or [])
         engine = (1, None) if continuous else (workers, cluster)  # each row waits for the one before
         Run(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
         return
-    inputs.one_alone(workers, cluster, resume)
-    values = one_row(inputs.target(arm, what, target) if reached is None else reached[0]).values
+    arguments.one_alone(workers, cluster, resume)
+    values = one_row(arguments.target(arm, what, target) if reached is None else reached[0]).values
     words = None if reached is not None else [[decimals(word) for word in target or ()]]
     _one(questions, values, words, out, json=json)
 

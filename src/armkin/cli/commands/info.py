@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import inputs, output, render
+from armkin.cli import arguments, output, render
 from armkin.cli.options import Json, Robot, Scene, TaskName, TextOut
 from armkin.errors import UsageError
 from armkin.model import units
@@ -22,7 +22,7 @@ def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = 
     DH table or screws, limits and home, the step chain with pulses per turn and degrees per pulse, the
     task of `armkin ik` with its target's numbers, how it is solved, and what pulses, send and home still need.
     """
-    arm = inputs.load(robot, scene)
+    arm = arguments.load(robot, scene)
     answer = _answer(arm, task)
     with output.destination(out) as write:
         if json:

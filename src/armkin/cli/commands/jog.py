@@ -10,7 +10,7 @@ from armkin.cli import board_link, completion, keep_outs, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import Ignore, NoScene
-from armkin.cli.numbers import number
+from armkin.cli.number_parsing import number
 from armkin.cli.options import Json, Robot, Scene
 from armkin.errors import UsageError
 from armkin.model import units

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import inputs, output
-from armkin.cli.numbers import number, of_pi, whole
+from armkin.cli import arguments, output
+from armkin.cli.number_parsing import number, of_pi, whole
 from armkin.cli.options import RobotOut
 from armkin.errors import FileError, RobotFileError, UsageError
 
@@ -137,7 +137,7 @@ def _options(words: Sequence[str]) -> list[dict[str, str]]:
 def _csv(source: str) -> list[dict[str, str]]:
     try:
         if source == "-":
-            text = inputs.standard_input(_LARGEST_FILE).decode("utf-8-sig")
+            text = arguments.standard_input(_LARGEST_FILE).decode("utf-8-sig")
         else:
             with open(source, encoding="utf-8-sig") as file:
                 text = file.read(_LARGEST_FILE)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin import files
-from armkin.cli import board_link, drawing_path, inputs, keep_outs, lock_and_sweep, output, path_text, render
+from armkin.cli import arguments, board_link, drawing_path, keep_outs, lock_and_sweep, output, path_text, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.drawing_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
-from armkin.cli.numbers import comma_separated, number, whole
+from armkin.cli.number_parsing import comma_separated, number, whole
 from armkin.cli.options import BranchName, Json, Lock, Near, Picture, Robot, Scene, Speed, TaskName, Tool
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -130,11 +130,11 @@ def path(
         "tolerance": None if tolerance is None else _positive(tolerance, "--tolerance", 1e-6),
         "corners": corners,
         "blend": None if blend is None else _positive(blend, "--blend", 0),
-        "speed": inputs.percent(speed, "--speed"),
-        "accel": inputs.percent(accel, "--accel"),
+        "speed": arguments.percent(speed, "--speed"),
+        "accel": arguments.percent(accel, "--accel"),
         "tool_speed": None if tool_speed is None else _positive(tool_speed, "--tool-speed", 1e-3),
         "jerk": None if jerk is None else units.joints_in(arm, [_positive(jerk, "--jerk", 1e-3)] * arm.n),
-        "near": None if near is None else units.joints_in(arm, inputs.joint_list(arm, near, "--near")),
+        "near": None if near is None else units.joints_in(arm, arguments.joint_list(arm, near, "--near")),
         "split": split,
         "samples": None if samples is None else whole(samples, "--samples", 10, 1_000_000),
     }
@@ -166,7 +166,7 @@ def sent(
     """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
     moves = _moves(arm, file, None, None)
     output.check(trace, "a plan is", ".csv")
-    options: dict[str, Any] = {"speed": inputs.percent(speed, "--speed")}
+    options: dict[str, Any] = {"speed": arguments.percent(speed, "--speed")}
     if not dry_run:
         _carried_out(arm, moves, {}, options, link, trace, None, json=json)
         return
@@ -256,7 +256,7 @@ def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) 
         return path_file.validated({"moves": [{"point": first}, *({"line": corner} for corner in rest)]})
     assert file is not None
     if file == "-":
-        return path_file.parse(inputs.standard_input(path_file.LARGEST), "standard input")
+        return path_file.parse(arguments.standard_input(path_file.LARGEST), "standard input")
     files.keep(file)
     return path_file.read(file)
 
@@ -323,7 +323,7 @@ def _files(plan: PathPlan, out: str | None, plot: str | None) -> None:
     if out is not None:
         _write(plan, out)
     if plot is not None:
-        from armkin.plot.path import plot_path
+        from armkin.plot.path_picture import plot_path
 
         plot_path(plan, plot)
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from armkin.cli import compiled_ik, inputs, output, render
-from armkin.cli.numbers import comma_separated, number
+from armkin.cli import arguments, compiled_ik, output, render
+from armkin.cli.number_parsing import comma_separated, number
 from armkin.cli.options import Cluster, Compiled, Json, Picture, Scene, Workers
 from armkin.errors import NoSolutionError, UsageError
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from armkin.cli.answers import Place as Answer
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.reachability.place import Place
     from armkin.reachability.place_path import Planned
+    from armkin.reachability.place_search import Place
 
 RobotsAndFile = Annotated[
     list[str], typer.Argument(metavar="ROBOT... FILE", help="Robots, then a CSV of targets or a path (YAML).")
@@ -58,7 +58,7 @@ def place(
     """
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")
-    arms = [inputs.load(word) for word in words[:-1]]
+    arms = [arguments.load(word) for word in words[:-1]]
     settings: dict[str, Any] = {"step": number(step, "--step"), "z": number(z, "--z")}
     turn = number(yaw, "--yaw")
     if settings["step"] <= 0 or turn <= 0:
@@ -67,8 +67,8 @@ def place(
     from armkin.engines.run import Engine
     from armkin.inverse.solve import ik
     from armkin.model.units import DEGREE
-    from armkin.reachability.place import each
     from armkin.reachability.place_file import write
+    from armkin.reachability.place_search import each
 
     settings |= {"area": bounds, "yaw": turn * DEGREE}
     targets = [_targets(arm, words[-1]) for arm in arms] if not _is_path(words[-1]) else [words[-1]] * len(arms)
@@ -81,7 +81,7 @@ def place(
     if out is not None:
         write(found, out)
     if plot is not None:
-        from armkin.plot.place import plot_place
+        from armkin.plot.place_picture import plot_place
 
         plot_place(found, plot)
     answer: Answer = {"robots": [_answer(one) for one in found]}

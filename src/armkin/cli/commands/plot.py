@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, lock_and_sweep, piped_answers, render
+from armkin.cli import arguments, lock_and_sweep, piped_answers, render
 from armkin.cli.csv_rows import batch_rows
-from armkin.cli.numbers import comma_separated
+from armkin.cli.number_parsing import comma_separated
 from armkin.cli.options import Joints, Lock, RobotOrPipe, Scene, TaskName
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -77,9 +77,9 @@ def plot(
     if target is None and batch is None and not q:
         _piped(robot, scene, out, **style)
         return
-    arm = inputs.load(inputs.named(robot), scene)
+    arm = arguments.load(arguments.named(robot), scene)
     if target is not None and q:
-        inputs.check_commas(arm, task, target, q)
+        arguments.check_commas(arm, task, target, q)
     if sum((bool(q), target is not None, batch is not None)) > 1:
         raise UsageError("joint values, --target and --batch: give one of the three")
     if target is not None:
@@ -87,7 +87,7 @@ def plot(
     elif batch is not None:
         _path(arm, _poses(arm, batch), out, **style)
     else:
-        _pose(arm, inputs.joints(arm, q), out, **style)
+        _pose(arm, arguments.joints(arm, q), out, **style)
 
 
 def _pose(arm: Arm, values: list[float], out: str | None, **style: Any) -> None:
@@ -115,7 +115,7 @@ def _piped(robot: str | None, scene: str | None, out: str | None, **style: Any) 
 
     found = piped_answers.answers(robot, scene)
     if found is None:
-        arm = inputs.load(inputs.named(robot), scene)
+        arm = arguments.load(arguments.named(robot), scene)
         names = " ".join(arm.joint_names)
         raise UsageError(f"nothing to draw: give joint values ({names}), a pose's name, --target or --batch")
     arm, answers = found
@@ -150,7 +150,7 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
     from armkin.plot import plot_poses
 
     what = task_for(arm, task)
-    values = inputs.target_list(arm, what, text)
+    values = arguments.target_list(arm, what, text)
     request = choose_branch.Request(arm=arm, task=what.name, held=lock_and_sweep.locks(arm, lock))
     [answer] = choose_branch.solve(request, targets_in(what.labels, [values]))
     goal = render.labelled(what.labels, values, label_units(what.labels))
@@ -166,7 +166,7 @@ def _poses(arm: Arm, path: str) -> Any:
     """The rows of a file (K, n) [deg | mm]."""
     import numpy as np
 
-    from armkin.plot.poses import MOST
+    from armkin.plot.pose_picture import MOST
 
     parts: list[Any] = []
     for chunk in batch_rows(path, arm.joint_names, arm.name, units.poses_out(arm)):

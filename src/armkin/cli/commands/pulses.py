@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, output, piped_answers, render
+from armkin.cli import arguments, output, piped_answers, render
 from armkin.cli.options import Batch, BatchOut, Cluster, Joints, JsonLines, Resume, RobotOrPipe, Scene, Workers
 from armkin.cli.render import fixed
 from armkin.cli.row_chunks import Chunk, one_row
@@ -45,13 +45,13 @@ def pulses(
     the count. Also where these pulses put the joints and the tip.
     """
     if batch is not None:
-        inputs.no_numbers(q)
-        arm, values = inputs.load(inputs.named(robot), scene), list[list[float]]()
+        arguments.no_numbers(q)
+        arm, values = arguments.load(arguments.named(robot), scene), list[list[float]]()
     else:
         arm, values = piped_answers.poses(robot, q, scene)
-    origin = units.home_out(arm) if start is None else inputs.joint_list(arm, start, "--from")
+    origin = units.home_out(arm) if start is None else arguments.joint_list(arm, start, "--from")
     if batch is None and len(values) == 1:
-        inputs.one_alone(workers, cluster, resume)
+        arguments.one_alone(workers, cluster, resume)
         [answer] = _answers(arm, one_row(values[0]), origin, best)
         with output.destination(out, "one answer is", output.TEXT) as write:
             write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))

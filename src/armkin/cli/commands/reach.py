@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import inputs, output, render
-from armkin.cli.numbers import number, whole
+from armkin.cli import arguments, output, render
+from armkin.cli.number_parsing import number, whole
 from armkin.cli.options import Cluster, Json, Picture, Robot, Scene, Workers
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def reach(
     import armkin
     from armkin.reachability.cells import MOST, Grid
 
-    arm = inputs.load(robot, scene)
+    arm = arguments.load(robot, scene)
     step, ring = number(grid, "--grid"), whole(azimuths, "--azimuths", 1, MOST)
     many, turns = whole(directions, "--directions", 1, MOST), whole(rolls, "--rolls", 1, MOST)
     cells = len(Grid(arm, step, ring, many, turns, tool_down).rings) * ring
@@ -60,7 +60,7 @@ def reach(
             progress=tick,
         )
     if plot is not None:
-        from armkin.plot.reach import plot_reach
+        from armkin.plot.reach_picture import plot_reach
 
         plot_reach(found, plot)
     answer = _answer(found)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import board_link, inputs, output
+from armkin.cli import arguments, board_link, output
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
-from armkin.cli.numbers import number
+from armkin.cli.number_parsing import number
 from armkin.cli.options import Robot, RowsOut
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import UsageError
@@ -38,7 +38,7 @@ def relax(
     Hold the arm: without its motors it falls. Prints joint values as CSV with a header, one row, or ten a second
     for --seconds; `armkin send ROBOT --batch FILE` plays them back.
     """
-    arm = inputs.load(robot)
+    arm = arguments.load(robot)
     board = _with_servos(arm)
     time = number(seconds, "--seconds")
     if not 0 <= time <= _LONGEST:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, inputs, keep_outs, output, render
+from armkin.cli import arguments, board_link, keep_outs, output, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import Ignore, NoScene
-from armkin.cli.numbers import number
+from armkin.cli.number_parsing import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
 from armkin.cli.send_goals import goals as read_goals
 from armkin.columns.csv_cells import csv_line
@@ -107,7 +107,7 @@ def send(
     """
     from armkin.board.planner import Planner
 
-    fraction = inputs.percent(speed, "--speed")
+    fraction = arguments.percent(speed, "--speed")
     rehearsal = dry_run or port == SIM
     _check_together(start, accel, trace, batch, dry_run=dry_run, rehearsal=rehearsal)
     if resume:

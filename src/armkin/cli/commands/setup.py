@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, inputs, output, render
+from armkin.cli import arguments, board_link, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
@@ -29,7 +29,7 @@ def setup(
     the sections that printer.cfg needs. armkin's own firmware takes its settings from the robot file at every command,
     and bus servos have none that matter here.
     """
-    arm = inputs.load(robot)
+    arm = arguments.load(robot)
     board = board_link.board_of(arm, rehearsal=True)
     if not board.can("settings"):
         raise UsageError(

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, inputs, output, render
+from armkin.cli import arguments, board_link, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
@@ -34,7 +34,7 @@ def status(
     """
     from armkin.board.planner import where_arm_stands
 
-    arm = inputs.load(robot)
+    arm = arguments.load(robot)
     new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     with board_link.backend(board, port, baud, simulated=new, reset=not no_reset) as machine:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import inputs, output, render
-from armkin.cli.numbers import is_number, whole
+from armkin.cli import arguments, output, render
+from armkin.cli.number_parsing import is_number, whole
 from armkin.cli.options import Cluster, Compiled, Json, Picture, Robot, Scene, Tool, Workers
 from armkin.errors import UsageError
 
@@ -73,12 +73,12 @@ def workspace(
     half a pulse off, in the worst combination.
     """
     import armkin
-    from armkin.reachability import cloud
+    from armkin.reachability import cloud_file
     from armkin.reachability.sampling import MOST
 
-    arm = inputs.load(robot, scene, tool)
+    arm = arguments.load(robot, scene, tool)
     if out is not None:
-        cloud.check(out)
+        cloud_file.check(out)
     if plot is None and color is not None:
         raise UsageError("--color is for the picture; add --plot FILE")
     shade = color or "manipulability"
@@ -114,7 +114,7 @@ def _measures(asked: list[str] | None, shade: str | None) -> tuple[list[str], in
     measures = list(dict.fromkeys(asked or ()))
     if shade is None:
         return measures, 0
-    from armkin.plot.cloud import KEEP
+    from armkin.plot.workspace_picture import KEEP
     from armkin.reachability.measures import MEASURES
 
     return measures + [shade] * (shade in MEASURES and shade not in measures), KEEP

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, inputs, lerobot_zero, output, render
+from armkin.cli import arguments, board_link, lerobot_zero, output, render
 from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
-from armkin.cli.numbers import number
+from armkin.cli.number_parsing import number
 from armkin.cli.options import Json, Robot, RobotOut
 from armkin.errors import UsageError
 from armkin.model import units
@@ -60,7 +60,7 @@ def zero(
     """
     import numpy as np
 
-    arm = inputs.load(robot)
+    arm = arguments.load(robot)
     board = board_link.board_of(arm, rehearsal=True)
     if not board.can("zero") or np.count_nonzero(arm.motor_gain) != arm.n:
         raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
@@ -77,7 +77,7 @@ def zero(
 
         lerobot_zero.record(board, robot, source, pose, out, json, check)
         return
-    q = units.joints_in(arm, inputs.joint_list(arm, pose or "home", "--pose"))
+    q = units.joints_in(arm, arguments.joint_list(arm, pose or "home", "--pose"))
     jaw = None if gripper is None else board.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
     with board_link.backend(board, port, baud, reset=not no_reset) as machine:
         name = machine.port.name

@@ -2,7 +2,7 @@
 
 path_numbers.py  the moves of a path file, in degrees, as joint values and targets
 placing.py       where a drawing stands, and how the tool is held on it
-geometry.py      lines, arcs, helices, splines and blends
+path_pieces.py   lines, arcs, helices, splines and blends
 dense_points.py  targets on lines, gathered; fit_points.py: one smooth curve of them; chords.py: what lies between them
 least_knots.py   splines of few knots; b_spline.py: their least squares
 route.py         one piece after another, with rests at corners

@@ -16,7 +16,7 @@ from armkin.motion.tool_path import path_numbers
 from armkin.motion.tool_path.b_spline import Int
 from armkin.motion.tool_path.chords import distinct, turns
 from armkin.motion.tool_path.fit_points import REVERSAL, Fitted, fitted
-from armkin.motion.tool_path.geometry import Dense, Piece, Spot, between, line, unit_speed, vector, weights
+from armkin.motion.tool_path.path_pieces import Dense, Piece, Spot, between, line, unit_speed, vector, weights
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

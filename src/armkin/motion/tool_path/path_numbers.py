@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
 from armkin.model.targets import label_scale, targets_in
-from armkin.motion.tool_path.geometry import Spot, spot
+from armkin.motion.tool_path.path_pieces import Spot, spot
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

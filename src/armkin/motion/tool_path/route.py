@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.motion.timing.trajectory import grouped
 from armkin.motion.tool_path.fit_points import REVERSAL
-from armkin.motion.tool_path.geometry import SMALL, Dense, Piece, blend
+from armkin.motion.tool_path.path_pieces import SMALL, Dense, Piece, blend
 
 _SAME = 1e-6  # [mm] breaks that are nearer are one
 _SMOOTH = 1e-3  # [rad] between two directions that count as one

@@ -12,7 +12,7 @@ from armkin.reachability.place_arm import Around, standing
 from armkin.view.skeleton import skeleton
 
 if TYPE_CHECKING:
-    from armkin.reachability.place import Place
+    from armkin.reachability.place_search import Place
 
 TARGETS = "#e2572b"
 

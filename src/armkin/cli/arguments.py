@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from armkin import files
 from armkin.cli import output, unit_notes
-from armkin.cli.numbers import NOT_FINITE, comma_separated, is_number, number, numbers, place
+from armkin.cli.number_parsing import NOT_FINITE, comma_separated, is_number, number, numbers, place
 from armkin.errors import FileError, UsageError
 from armkin.model import units
 
