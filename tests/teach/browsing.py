@@ -41,12 +41,14 @@ _OPTIONS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
+# For tests that do not look at the picture: WebGL does everything but the pixels, which take half of a test's time.
+NO_PIXELS = "--disable-gl-drawing-for-tests"
 
 
 @contextmanager
-def chromium() -> Iterator[Browser]:
+def chromium(*options: str) -> Iterator[Browser]:
     """The browser; there is no other in this process meanwhile, unless it is `launched`."""
-    with sync_playwright() as playwright, launched(playwright.chromium) as browser:
+    with sync_playwright() as playwright, launched(playwright.chromium, *options) as browser:
         yield browser
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from browsing import chromium, opened
+from browsing import NO_PIXELS, chromium, launched, opened
 from playwright.sync_api import Browser
 from playwright.sync_api import Page as Tab
 from served import Page, served
@@ -35,10 +35,17 @@ def _needs_browser(module: ModuleType) -> bool:
 
 @pytest.fixture(scope="module")
 def browser() -> Browser:
-    """One for all tests in a row that need one, each page with a profile of its own."""
+    """One for all tests in a row that need one, each page with a profile of its own. It draws no 3-D view."""
     if not _browsers:
-        _browsers.append(_running.enter_context(chromium()))
+        _browsers.append(_running.enter_context(chromium(NO_PIXELS)))
     return _browsers[0]
+
+
+@pytest.fixture
+def drawing_browser(browser: Browser) -> Iterator[Browser]:
+    """For tests that look at the picture."""
+    with launched(browser.browser_type) as one:
+        yield one
 
 
 @pytest.hookimpl(wrapper=True)

@@ -33,6 +33,13 @@ def ur5e(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         yield page
 
 
+@pytest.fixture
+def drawn(drawing_browser: Browser, tmp_path: Path) -> Iterator[Page]:
+    """The same, with its picture."""
+    with opened(drawing_browser, written(tmp_path, "ur5e") + POSTURE) as page:
+        yield page
+
+
 def written(folder: Path, name: str, plan: Any = None) -> str:
     """The address of an arm's file."""
     file = folder / "arm.html"
@@ -97,8 +104,8 @@ def test_the_branches_are_those_of_python(ur5e: Page) -> None:
     expect(page.locator("#box-1")).to_have_value("-90.0000")
 
 
-def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(ur5e: Page) -> None:
-    page = at_posture(ur5e)
+def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(drawn: Page) -> None:
+    page = drawn
     before = page.locator("#canvas").screenshot()
     page.get_by_role("button", name="Reach").press("Enter")
     expect(page.locator("#legend")).to_contain_text("8000 poses")
@@ -126,8 +133,8 @@ def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(ur5e: Page) 
     page.wait_for_function("(before) => location.hash !== before", arg=posture)
 
 
-def test_it_is_printed_on_one_page_with_its_picture(ur5e: Page) -> None:
-    page = at_posture(ur5e)
+def test_it_is_printed_on_one_page_with_its_picture(drawn: Page) -> None:
+    page = drawn
     paper = page.pdf(format="A4")  # as by hand, it says beforeprint
     assert len(re.findall(rb"/Type\s*/Page\b", paper)) == 1
     assert len(re.findall(rb"/Subtype\s*/Image\b", paper)) >= 1

@@ -207,10 +207,13 @@ def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser) ->
             page.click("#theme")
 
 
-def test_the_manual_s_picture_is_the_page(browser: Browser, tmp_path: Path) -> None:
+def test_the_manual_s_picture_is_the_page(drawing_browser: Browser, tmp_path: Path) -> None:
     """ARMKIN_UPDATE_SNAPSHOTS=1 takes it anew."""
     picture, now = ROOT / "docs/teach.png", tmp_path / "teach.png"
-    with served("ur5e") as server, opened(browser, server.address, viewport={"width": 1280, "height": 800}) as page:
+    with (
+        served("ur5e") as server,
+        opened(drawing_browser, server.address, viewport={"width": 1280, "height": 800}) as page,
+    ):
         for k, angle in enumerate((20, -70, 80, -60, 70, 10)):
             page.fill(f"#box-{k}", str(angle))
         page.keyboard.press("Tab")

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from browsing import COUNTS, aim, idle, launched, until
+from browsing import COUNTS, NO_PIXELS, aim, idle, launched, until
 from emulator import EmulatedBoard
 from pins import net, rests_within
 from playwright.sync_api import Browser
@@ -23,7 +23,7 @@ def test_a_page_that_is_gone_holds_the_arm(browser: Browser, how: str) -> None:
     mark = f"--armkin-test={uuid.uuid4()}"
     # at 0.2 of real time: a busy computer notices the page's end late, and that is no time of the arm's
     with EmulatedBoard(speed=0.2) as board, teaching("three_dof", "--port", board.port) as url:
-        with launched(browser.browser_type, mark) as another:
+        with launched(browser.browser_type, NO_PIXELS, mark) as another:
             page = another.new_page()
             page.set_default_timeout(120_000)
             page.goto(url)

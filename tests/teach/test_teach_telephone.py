@@ -62,10 +62,10 @@ def test_a_telephone_s_window(browser: Browser) -> None:
             assert slider.evaluate("one => one.valueAsNumber") == pytest.approx(value(page, "#box-1"), abs=0.02)
 
 
-def test_fit_fits_the_slice_of_reach_in(browser: Browser) -> None:
+def test_fit_fits_the_slice_of_reach_in(drawing_browser: Browser) -> None:
     """Its voxels change the picture, and nothing at the picture's sides and lower edge."""
     narrow = {"viewport": {"width": 390, "height": 800}, "has_touch": True}
-    with served() as server, opened(browser, server.address, **narrow) as page:
+    with served() as server, opened(drawing_browser, server.address, **narrow) as page:
         canvas = page.locator("#canvas")
 
         def picture() -> np.ndarray:
