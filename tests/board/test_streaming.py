@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.firmware import gripping, streaming
+from armkin.board.firmware import carry_out_plans, gripping, streaming
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.machine import Machine
 from armkin.board.firmware.wire import framing
@@ -158,7 +158,7 @@ def test_a_grip_goes_on_behind_a_stall(frame: int) -> None:
 def test_a_grip_is_held_after_a_second_and_behind_its_beginning(
     monkeypatch: pytest.MonkeyPatch, frame: int, seconds: float, beginning: float
 ) -> None:
-    monkeypatch.setattr(streaming, "_BEGINNING", beginning)
+    monkeypatch.setattr(carry_out_plans, "_BEGINNING", beginning)
     grip = gripping.gripper_of(ARM.name, configure(ARM))
     machine = machine_on(Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, seconds))
     gripping.prepare(machine, grip, None)

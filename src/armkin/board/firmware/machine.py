@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.starting import from_counts, unbelievable
-from armkin.board.firmware import resets_and_stops, streaming
+from armkin.board.firmware import resets_and_stops
 from armkin.board.firmware.board_status import as_json
+from armkin.board.firmware.carry_out_plans import carry_out, carry_out_axis
 from armkin.board.firmware.segments import trajectory_to_counts
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Flag, Status
@@ -190,7 +191,7 @@ class Machine(Backend):
         Returns the status at the end, where the last plan ends, or raises LinkError.
         """
         try:
-            self.status, end = streaming.carry_out(
+            self.status, end = carry_out(
                 self.session, from_counts(plans, self.counts), self.configuration.axes, progress, self.lay
             )
         except StoppedError as stopped:
@@ -216,7 +217,7 @@ class Machine(Backend):
     def run_axis(self, lay: Callable[[int], Move | None], axis: int, clock: int) -> Status:
         """Carry out the move of a single axis, the gripper, that `lay` makes from counts; None: it is there."""
         try:
-            self.status = streaming.carry_out_axis(self.session, lay, axis, self.status.counts[axis], clock)
+            self.status = carry_out_axis(self.session, lay, axis, self.status.counts[axis], clock)
         except DeviceError as error:
             raise resets_and_stops.explain(self, error) from None
         return self.status

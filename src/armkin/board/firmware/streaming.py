@@ -1,35 +1,27 @@
-"""Plans to the board while it moves: segments in frames, frames as the queue takes them."""
+"""A motion to the board while it moves: segments in frames, frames as the queue takes them."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain, islice
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armkin.board.firmware.segments.rest_of_plan import left_of
 from armkin.board.firmware.segments.straight_lines import UNHEARD, Pieces
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.go_back_n import QUESTION
 from armkin.board.firmware.wire.motion_frame import Batch, motion_size
-from armkin.board.firmware.wire.protocol import Error, Segment, State, Status
-from armkin.board.firmware.wire.reply_checks import DeviceError
+from armkin.board.firmware.wire.protocol import Segment, State, Status
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Progress
-    from armkin.board.firmware.segments.counts_to_segments import Counts, Move
-    from armkin.board.firmware.segments.trajectory_to_counts import Cut
+    from armkin.board.firmware.segments.counts_to_segments import Move
     from armkin.board.firmware.wire.session import Session
-    from armkin.motion.timing.trajectory import Trajectory
-
-    Lay = Callable[[Trajectory, Counts], Cut]
 
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
-_LEAD, _LEAD_MOST, _LEAD_BAD = 0.0015, 0.6, 0.05
+_LEAD, LEAD_MOST, LEAD_BAD = 0.0015, 0.6, 0.05
 _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
 _TICK = 20_000  # [cycles] of that pause, at most
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
@@ -45,143 +37,6 @@ _FAR = 0.005  # [s] of the slowest answer, from where on the queue is too short 
 _BUSY = 0.0003, 0.0005  # [s] that a board is busy with a frame, and with a segment of it,
 _BETWEEN = 2.2  # times that between ticks
 _ACK = 16  # [bytes] of an answer
-_BEGINNING, _STOOD = 0.7, 1.0  # [s] of a motion, in which it goes on by itself if the arm stood no longer than this
-
-
-class _UnderWay:
-    """The moves of which the board may still do a part, in order."""
-
-    def __init__(self) -> None:
-        self._moves: deque[tuple[int, float, Cut, int]] = deque()  # frames before each, seconds, its plan, its number
-
-    def add(self, frames: int, seconds: float, plan: Cut, number: int, taken: int) -> None:
-        """Add a move of a plan behind so many frames, the plan behind so many seconds.
-
-        taken: frames that the board took; of moves before the last such frame's nothing is left.
-        """
-        self._moves.append((frames, seconds, plan, number))
-        self._forget(taken)
-
-    def _forget(self, taken: int) -> None:
-        while len(self._moves) > 1 and self._moves[1][0] < taken:
-            self._moves.popleft()
-
-    def left(
-        self, session: Session, axes: Sequence[int], lay: Lay, *, first: bool
-    ) -> tuple[Sequence[Cut], float] | None:
-        """What is left for an arm whose queue ran dry, and the seconds done; None unless in a move's beginning.
-
-        first: whether it may be the first move of all. None, too, if somebody may have come near the arm since.
-        """
-        if not self._moves:
-            return None
-        began, status = session.port.now(), _at_rest(session)
-        self._forget(session.taken)
-        frames, seconds, plan, number = self._moves[0]
-        if not all(status.known >> axis & 1 for axis in axes) or (frames == 0 and not first):
-            return None
-        plans = [plan, *(plan for *_, plan, k in islice(self._moves, 1, None) if k == 0)]
-        found = left_of(plans, number, [status.counts[axis] for axis in axes], lay)
-        stood = session.deaf + session.port.now() - began
-        if found is None or found[1].seconds > _BEGINNING or stood > _STOOD:
-            return None
-        return found[0], seconds + found[1].done
-
-
-def carry_out(
-    session: Session, plans: Iterable[Cut | None], axes: Sequence[int], progress: Progress, lay: Lay
-) -> tuple[Status, Counts | None]:
-    """Carry out plans, one after another; None in between: nothing to do yet.
-
-    axes: the motors' on the board. lay: a trajectory from counts as a plan for this board.
-    Returns the status at rest, and where the last plan ends. Raises DeviceError if the board ends the session. If the
-    queue runs dry in a move's beginning, as a busy computer or a bad line did not fill it in time, what is left
-    follows, with more time to fill the queue: unless the arm stood for so long that somebody may be near.
-    """
-    end: Counts | None = None
-    total = begun = done = 0.0
-    under_way = _UnderWay()
-
-    def frames(plans: Iterable[Cut | None], least: float) -> Iterator[Batch | None]:
-        nonlocal end, total, begun
-        given = 0
-        for plan in plans:
-            if plan is None:
-                yield None
-                continue
-            before, total = total, total + plan.duration
-            for k, move in enumerate(plan.moves(lambda: _pieces(session))):
-                under_way.add(given, before, plan, k, session.taken)
-                for batch in batches(session, move, axes, plan.clock, least):
-                    given += 1
-                    begun += batch.seconds
-                    yield batch
-            end = plan.end
-
-    def tell(left: float) -> None:
-        nonlocal done
-        done = max(done, min(begun - left, total))  # what is left is an estimate: never backwards
-        progress(done, total)
-
-    least, todo = 0.0, iter(plans)
-    while True:
-        session.attend()
-        try:
-            return stream(session, frames(todo, least), tell), end
-        except DeviceError as error:
-            dry = error.error == Error.DRY
-            left = under_way.left(session, axes, lay, first=least < _LEAD_MOST) if dry else None
-            if left is None:
-                raise
-        session.reopen()
-        begun = total = left[1]
-        # a line of which it is known by now is given a bad one's lead, then four times that, and then the longest
-        least = min(max(_LEAD_BAD, 4 * least), _LEAD_MOST) if session.line.damaged else _LEAD_MOST
-        under_way, todo = _UnderWay(), chain(left[0], todo)
-
-
-def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: int, at: int, clock: int) -> Status:
-    """Carry out the move of one axis that `lay` makes from the counts `at`; None: it stands at its end.
-
-    If its queue runs dry in its beginning, what is left follows once, as of `carry_out`.
-    """
-    least = 0.0
-    while (move := lay(at)) is not None:
-        session.attend()
-        try:
-            return stream(session, batches(session, move, (axis,), clock, least), lambda left: None)
-        except DeviceError as error:
-            if error.error != Error.DRY or least:
-                raise
-            began, status = session.port.now(), _at_rest(session)
-            stood, at = session.deaf + session.port.now() - began, status.counts[axis]
-            if not status.known >> axis & 1 or stood > _STOOD or _seconds_to(move, at, clock) > _BEGINNING:
-                raise
-        session.reopen()
-        least = _LEAD_MOST
-    return session.status()
-
-
-def _seconds_to(move: Move, count: int, clock: int) -> float:
-    """Seconds of the move of one axis until it is at a count."""
-    left, seconds = abs(count - int(move.start[0])) * protocol.STEP, 0.0
-    for segment in move.segments:
-        way = segment.ticks * abs(segment.rates[0])
-        seconds += _seconds([segment], clock) * min(1.0, left / max(way, 1))
-        left -= way
-        if left <= 0:
-            break
-    return seconds
-
-
-def _at_rest(session: Session) -> Status:
-    """The status of an arm whose queue ran dry, and what it tells of the line."""
-    status = session.rest()
-    if status.bad and not session.line.damaged:  # the board alone knows of it yet
-        session.line.resent += 1
-    if session.line.damaged and not session.line.noisy:  # one frame that is lost, and sent again, holds nothing
-        session.line.resent += 1
-    return status
 
 
 def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
@@ -234,7 +89,7 @@ def _soonest(seconds: float) -> float:
     return _MARGIN * (seconds - _SPARE)
 
 
-def _pieces(session: Session) -> Pieces:
+def pieces(session: Session) -> Pieces:
     """How finely ramps are cut."""
     if session.line.noisy:
         return Pieces.ROUGH
@@ -263,8 +118,8 @@ def lead(session: Session, frames: Sequence[tuple[float, int, int]], least: floa
     the first step.
     """
     busy = next((seconds for load, seconds in _LEAD_BUSY if _load(session) > load), 0.0)
-    bad = _LEAD_BAD if session.line.damaged else 0.0
-    return max(least, busy, bad, min(_LEAD + _behind(session, frames, unheard), _LEAD_MOST))
+    bad = LEAD_BAD if session.line.damaged else 0.0
+    return max(least, busy, bad, min(_LEAD + _behind(session, frames, unheard), LEAD_MOST))
 
 
 def _there(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> list[float]:
@@ -322,7 +177,7 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
     todo: list[Segment] = list(islice(source, _SEEN))
     pause, sizes = _start(session, todo, room, clock, least) if todo else (0.0, list[int]())
     # Behind a rest, for which it may wait until less is left there: the queue is filled while that lasts.
-    waits = _soonest(_seconds(todo[: _fit(todo, _BATCH[1], room)], clock)) if todo else 0.0
+    waits = _soonest(seconds_of(todo[: _fit(todo, _BATCH[1], room)], clock)) if todo else 0.0
     begins = not line.damaged and min(_left(session), waits) >= pause
     if begins:
         sizes = []
@@ -346,7 +201,7 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
         at = end
 
 
-def _seconds(segments: Sequence[Segment], clock: int) -> float:
+def seconds_of(segments: Sequence[Segment], clock: int) -> float:
     return sum(s.units() for s in segments) * 256 / clock
 
 
@@ -377,7 +232,7 @@ def later(first: Segment, pause: float, clock: int) -> Segment | None:
 def _start(session: Session, todo: Sequence[Segment], room: int, clock: int, least: float) -> tuple[float, list[int]]:
     """How long the arm stands before a motion from rest, and the segments of its first frames: it begins soonest so."""
     ways = list[tuple[float, float, list[int]]]()
-    unheard = _seconds(todo[:1], clock) if _unheard(todo[0]) else 0.0
+    unheard = seconds_of(todo[:1], clock) if _unheard(todo[0]) else 0.0
     for sizes in [(_BATCH[0] - 1,)] if session.line.noisy else _STARTING:
         frames = _first_frames(todo, sizes, room, clock, paused=not unheard)
         pause = lead(session, frames, least, unheard)
@@ -395,6 +250,6 @@ def _first_frames(
         n = max(1, _fit(todo[at:], most, room))
         part, more = todo[at : at + n], paused and at == 0
         size = motion_size(len(part[0].rates), part) + 6 + more * 17
-        frames.append((_seconds(part, clock), n + more, size))
+        frames.append((seconds_of(part, clock), n + more, size))
         at += n
     return frames

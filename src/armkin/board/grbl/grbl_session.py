@@ -265,15 +265,18 @@ class Session:
             self.was_reset = True
             self._sent.clear()
         elif (found := replies.report(line)) is not None:
-            if self.state != found.state:
-                LOG.info("GRBL: %s", found.state)
-                self.state = found.state
-            self.report = self._unseen = found
-            self.feed = self.feed if found.feed is None else found.feed
-            self._heard += found.state in ("Run", "Jog", "Home")  # else it only repeats itself
+            self._take_report(found)
         elif line:
             self._other.append(line)
             del self._other[:-400]
+
+    def _take_report(self, found: replies.Report) -> None:
+        if self.state != found.state:
+            LOG.info("GRBL: %s", found.state)
+            self.state = found.state
+        self.report = self._unseen = found
+        self.feed = self.feed if found.feed is None else found.feed
+        self._heard += found.state in ("Run", "Jog", "Home")  # else it only repeats itself
 
 
 def _agreed(read: Callable[[], T], port: str, enough: Callable[[T], bool]) -> T:

@@ -12,8 +12,9 @@ from __future__ import annotations
 import math
 import re
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 
 from armkin.board.grbl.replies import RX_BUFFER
 from armkin.board.sim.clock import SimulatedTime
@@ -116,27 +117,44 @@ class Grbl(SimulatedTime):
         self._out += text.encode() + b"\r\n"
 
     def _receive(self, byte: int) -> None:
-        if byte == 0x18:
-            if moving := not self._standing():
-                self.alarm(3)
-            self.boot(power=False)
-            self.state = "Alarm" if moving else "Idle"
-        elif byte == ord("?"):
-            self._say(self._report())
-        elif byte == ord("!"):
-            self._holding = self._holding or self.state != "Alarm"
-        elif byte == ord("~"):
-            self._holding = False
-        elif byte == 0x85:
-            self._blocks = deque(block for block in self._blocks if not block.jog)
-            if self.hal:
-                self._rx.clear()
-                self._line = self._comment = ""
-        elif byte in _FEED:
-            self.override = 100 if byte == 0x90 else min(max(self.override + _FEED[byte], 10), 200)
-            self._reports = 0
+        if (act := self._realtime.get(byte)) is not None:
+            act()
         elif byte < 0x80 and len(self._rx) < RX_BUFFER - 1:
             self._rx.append(byte)
+
+    @cached_property
+    def _realtime(self) -> dict[int, Callable[[], None]]:
+        """Commands of one byte, which act at once."""
+        return {
+            0x18: self._soft_reset,
+            ord("?"): lambda: self._say(self._report()),
+            ord("!"): self._hold,
+            ord("~"): self._resume,
+            0x85: self._cancel_jog,
+            **{byte: partial(self._change_feed, byte) for byte in _FEED},
+        }
+
+    def _soft_reset(self) -> None:
+        if moving := not self._standing():
+            self.alarm(3)
+        self.boot(power=False)
+        self.state = "Alarm" if moving else "Idle"
+
+    def _hold(self) -> None:
+        self._holding = self._holding or self.state != "Alarm"
+
+    def _resume(self) -> None:
+        self._holding = False
+
+    def _cancel_jog(self) -> None:
+        self._blocks = deque(block for block in self._blocks if not block.jog)
+        if self.hal:
+            self._rx.clear()
+            self._line = self._comment = ""
+
+    def _change_feed(self, byte: int) -> None:
+        self.override = 100 if byte == 0x90 else min(max(self.override + _FEED[byte], 10), 200)
+        self._reports = 0
 
     # Motion
 
@@ -186,18 +204,24 @@ class Grbl(SimulatedTime):
     def _take(self) -> bool:
         """Go on with the line that is being put together, or carry out a whole one; False: nothing to do now."""
         if self._whole is not None:
-            line = self._whole
-            words = self.modes.read(line)
-            if isinstance(words, Words) and self._blocks and (words.waits() or len(self._blocks) >= BLOCKS):
-                return False
-            if any(not block.line for block in self._blocks):
-                return False
-            self._whole = None
-            self._obey(line)
-            return True
+            return self._carry_out(self._whole)
         if not self._rx:
             return False
-        char = chr(self._rx.popleft())
+        self._put_together(chr(self._rx.popleft()))
+        return True
+
+    def _carry_out(self, line: str) -> bool:
+        """Obey a whole line; False while it has to wait for the blocks before it."""
+        words = self.modes.read(line)
+        waits = isinstance(words, Words) and self._blocks and (words.waits() or len(self._blocks) >= BLOCKS)
+        if waits or any(not block.line for block in self._blocks):
+            return False
+        self._whole = None
+        self._obey(line)
+        return True
+
+    def _put_together(self, char: str) -> None:
+        """One more character of a line, in capitals, without blanks and comments."""
         if char in "\r\n":
             if self._line or char == "\n":
                 self._whole = self._line
@@ -208,7 +232,6 @@ class Grbl(SimulatedTime):
             self._comment = char
         elif char > " " and char != "/":
             self._line += char.upper()
-        return True
 
     def _obey(self, line: str) -> None:
         error = 11 if len(line) >= _LINE and not self.hal else self._system(line[1:]) if line[:1] == "$" else -2
@@ -218,30 +241,33 @@ class Grbl(SimulatedTime):
             self._say("ok" if error == 0 else f"error:{error}")
 
     def _system(self, line: str) -> int:
-        if line == "G":
-            self._say(self.modes.said(self.spindle))
-        elif line == "X":
+        """Carry out what follows a $; the number of its error, 0 for none, -1 where an alarm was the answer."""
+        if line == "X":
             self.state = "Idle"
-        elif line.startswith("J="):
+            return 0
+        if line.startswith("J="):
             return 9 if self.state != "Idle" else self._code(line[2:], jog=True)
-        elif self._blocks:
+        if self._blocks and line != "G":
             return 8  # the rest is for a machine at rest
-        elif match := re.fullmatch(r"(\d+)=(-?\d+\.?\d*)", line):
+        if match := re.fullmatch(r"(\d+)=(-?\d+\.?\d*)", line):
             return self._set(int(match[1]), match[2])
-        elif line == "$":
-            values = (f"${n}={value:.3f}".rstrip("0").rstrip(".") for n, value in sorted(self.settings.items()))
-            self._say("\r\n".join(values))
-        elif line == "I":
-            version = "[VER:1.1f.20260817:]" if self.hal else "[VER:1.1h.20190825:]"
-            named = ["[FIRMWARE:grblHAL]"] if self.hal else []
-            self._say("\r\n".join([version, f"[OPT:V,{BLOCKS},{RX_BUFFER}]", *named]))
-        elif line == "#":
-            self._say("\r\n".join(self.modes.parameters()))
-        elif line == "H":
+        if line == "H":
             return self._home()
-        else:
+        lines = {"G": self._modes_said, "$": self._settings_said, "I": self._version_said, "#": self.modes.parameters}
+        if line not in lines:
             return 3
+        self._say("\r\n".join(lines[line]()))
         return 0
+
+    def _modes_said(self) -> list[str]:
+        return [self.modes.said(self.spindle)]
+
+    def _settings_said(self) -> list[str]:
+        return [f"${n}={value:.3f}".rstrip("0").rstrip(".") for n, value in sorted(self.settings.items())]
+
+    def _version_said(self) -> list[str]:
+        version = "[VER:1.1f.20260817:]" if self.hal else "[VER:1.1h.20190825:]"
+        return [version, f"[OPT:V,{BLOCKS},{RX_BUFFER}]", *(["[FIRMWARE:grblHAL]"] if self.hal else [])]
 
     def _set(self, number: int, text: str) -> int:
         if number not in self.settings:

@@ -27,6 +27,8 @@ _GROUPS = (  # modal groups: one word of each in a line
     {4.0, 10.0, 28.0, 92.0, 92.1},
     {40.0},
 )
+_OFFSETS = frozenset({10.0, 43.1, 92.0, 92.1})
+_USES_AXES = {10.0, 28.0, 43.1, 92.0}  # codes whose axis words are no move
 _KNOWN = set().union(_OTHER, *_GROUPS)
 INCH = 25.4
 
@@ -113,60 +115,60 @@ class Modes:
 
     def _fitting(self, codes: Sequence[float], values: dict[str, float]) -> int:
         """The error of words that do not fit together, 0 if they do."""
-        if set(codes) - _KNOWN:
+        asked = set(codes)
+        if asked - _KNOWN:
             return 20
         if any(sum(code in group for code in codes) > 1 for group in _GROUPS):
             return 21
         given = any(letter in values for letter in LETTERS[: self.axes])
-        if {92.0, 43.1} & set(codes) and not given:
+        if {92.0, 43.1} & asked and not given:
             return 26
-        if 10.0 in codes and (values.get("L") not in (2.0, 20.0) or "P" not in values or not given):
+        if ({4.0, 10.0} & asked and "P" not in values) or (
+            10.0 in asked and not (given and values.get("L") in (2.0, 20.0))
+        ):
             return 28
-        if 4.0 in codes and "P" not in values:
-            return 28
-        uses = bool({10.0, 28.0, 43.1, 92.0} & set(codes))
-        motion = next((code for code in codes if code in _MOTION), self.motion)
-        if given and not uses:
-            if motion == 80.0:
-                return 31
-            feed = values.get("F", 0.0 if (93.0 in codes or self.inverse) and 94.0 not in codes else self.feed)
-            if motion == 1.0 and feed == 0.0:
-                return 22
-        return 0
+        return self._unmovable(asked, values) if given and not asked & _USES_AXES else 0
+
+    def _unmovable(self, asked: set[float], values: dict[str, float]) -> int:
+        """The error of axis words that are a move, 0 if it can be made."""
+        motion = next(iter(asked & _MOTION), self.motion)
+        if motion == 80.0:
+            return 31
+        feed = values.get("F", 0.0 if (93.0 in asked or self.inverse) and 94.0 not in asked else self.feed)
+        return 22 if motion == 1.0 and feed == 0.0 else 0
 
     def obey(self, words: Words, here: Sequence[float]) -> list[float] | None:
         """Take over a line's modes and offsets; where it moves to, in machine units, from `here`; None: nowhere."""
         for code in sorted(words.codes):
             self._mode(code)
         values, unit = words.values, self.unit
-        if "F" in values:
-            self.feed = values["F"] * (1.0 if self.inverse else unit)
-        elif self.inverse:
-            self.feed = 0.0
+        if "F" in values or self.inverse:
+            self.feed = values.get("F", 0.0) * (1.0 if self.inverse else unit)
         given = {k: values[letter] * unit for k, letter in enumerate(LETTERS[: self.axes]) if letter in values}
+        if words.codes & _OFFSETS:
+            self._offset(words, given, here)
+        elif 28.0 in words.codes:
+            return list(self.offsets["G28"])
+        elif given and self.motion != 80.0:
+            return self._goal(given, here, absolute=53.0 in words.codes)
+        return None
+
+    def _goal(self, given: dict[int, float], here: Sequence[float], *, absolute: bool) -> list[float]:
+        """Where the given axes go, in machine units; absolute: they are in these."""
+        zero = [0.0] * self.axes if absolute else here if self.relative else self.work()
+        return [given[k] + zero[k] if k in given else here[k] for k in range(self.axes)]
+
+    def _offset(self, words: Words, given: dict[int, float], here: Sequence[float]) -> None:
+        """G92, G92.1, G10 and G43.1."""
         if 92.1 in words.codes:
             self.g92 = [0.0] * self.axes
         elif 92.0 in words.codes:
             base = [a + b for a, b in zip(self.offsets[self.system], self.tool, strict=True)]
             self.g92 = [here[k] - base[k] - given[k] if k in given else v for k, v in enumerate(self.g92)]
         elif 10.0 in words.codes:
-            self._write(values, given, here)
-        elif 43.1 in words.codes:
+            self._write(words.values, given, here)
+        else:
             self.tool = [given.get(k, v) for k, v in enumerate(self.tool)]
-        elif 28.0 in words.codes:
-            return list(self.offsets["G28"])
-        elif given and self.motion != 80.0:
-            shift = self.work()
-            absolute = 53.0 in words.codes
-            return [
-                here[k]
-                if k not in given
-                else given[k]
-                if absolute
-                else given[k] + (here[k] if self.relative else shift[k])
-                for k in range(self.axes)
-            ]
-        return None
 
     def _mode(self, code: float) -> None:
         if code in _MOTION:

@@ -11,7 +11,7 @@ import json
 import math
 import re
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -109,34 +109,39 @@ class Klipper(SimulatedTime):
 
     def _serve(self, request: dict[str, Any]) -> bool:
         """Answer a request; False while it has to wait."""
+        methods = {"gcode/script": self._script, "objects/query": self._query, "info": self._info}
         try:
-            if request["method"] == "gcode/script":
-                if self._lines is None:
-                    self._lines = deque(request["params"]["script"].splitlines())
-                while self._lines:
-                    if self.state != "ready":
-                        raise Refused("Printer is shutdown" if self.state == "shutdown" else "Printer is not ready")
-                    if not self._room(self._lines[0]):
-                        return False
-                    self._obey(self._lines.popleft())
-                self._lines = None
-                result: dict[str, Any] = {}
-            elif request["method"] == "objects/query":
-                status = self._status()
-                result = {
-                    "eventtime": self._now,
-                    "status": {k: status.get(k, {}) for k in request["params"]["objects"]},
-                }
-            elif request["method"] == "info":
-                result = {"state": self.state, "state_message": f"Printer is {self.state}", "software_version": "sim"}
-            else:
+            if request["method"] not in methods:
                 raise Refused("webhooks: No registered callback")
+            result = methods[request["method"]](request.get("params", {}))
         except Refused as error:
             self._lines = None
             self._say({"id": request["id"], "error": {"error": "CommandError", "message": str(error)}})
             return True
+        if result is None:
+            return False
         self._say({"id": request["id"], "result": result})
         return True
+
+    def _script(self, params: dict[str, Any]) -> dict[str, Any] | None:
+        """Run a script as far as its lines have room; None while one has to wait."""
+        if self._lines is None:
+            self._lines = deque(params["script"].splitlines())
+        while self._lines:
+            if self.state != "ready":
+                raise Refused("Printer is shutdown" if self.state == "shutdown" else "Printer is not ready")
+            if not self._room(self._lines[0]):
+                return None
+            self._obey(self._lines.popleft())
+        self._lines = None
+        return {}
+
+    def _query(self, params: dict[str, Any]) -> dict[str, Any]:
+        status = self._status()
+        return {"eventtime": self._now, "status": {name: status.get(name, {}) for name in params["objects"]}}
+
+    def _info(self, params: dict[str, Any]) -> dict[str, Any]:
+        return {"state": self.state, "state_message": f"Printer is {self.state}", "software_version": "sim"}
 
     def _say(self, message: dict[str, Any]) -> None:
         self._out += json.dumps(message).encode() + END
@@ -161,45 +166,18 @@ class Klipper(SimulatedTime):
 
     def _obey(self, line: str) -> None:
         head, *words = line.split()
-        if head == "MANUAL_STEPPER":
-            self._manual({key: value for key, _, value in (word.partition("=") for word in words)})
-        elif head == "G92":
-            if words != ["X0"]:
-                raise Refused(f"the stand-in knows no {line}")
-            self.x_base = self.x
-        elif head == "M84":
-            for one in self.steppers.values():
-                one.on = False
-        elif head in ("G1", "G0"):
-            self._move({word[0]: float(word[1:]) for word in words})
-        elif head in ("G90", "G91"):
-            self.relative = head == "G91"
-        elif head == "M220":
-            self.factor = float(words[0][1:]) / 100
-        elif head != "M400":
+        if head not in _COMMANDS:
             raise Refused(f'Unknown command:"{head}"')
+        _COMMANDS[head](self, words)
 
-    def _manual(self, given: dict[str, str]) -> None:
-        if given.get("STEPPER") not in self.steppers:
+    def _manual_stepper(self, words: list[str]) -> None:
+        given = {key: value for key, _, value in (word.partition("=") for word in words)}
+        name = given.get("STEPPER", "")
+        if name not in self.steppers:
             raise Refused(f"The value '{given.get('STEPPER')}' is not valid for STEPPER")
-        name = given["STEPPER"]
         one = self.steppers[name]
         if "GCODE_AXIS" in given:
-            letter = given["GCODE_AXIS"]
-            if not letter:
-                self.axes = [other for other in self.axes if other != name]
-                one.letter = ""
-                return
-            if one.letter:
-                raise Refused("Must unregister axis first")
-            if not re.fullmatch("[A-Z]", letter) or letter in "XYZEFN":
-                raise Refused("Not a valid GCODE_AXIS")
-            if letter in (self.steppers[other].letter for other in self.axes):
-                raise Refused(f"Axis '{letter}' already registered")
-            one.letter = letter
-            one.velocity = float(given.get("LIMIT_VELOCITY", 999_999.9))
-            one.corner = float(given.get("INSTANTANEOUS_CORNER_VELOCITY", 1.0))
-            self.axes.append(name)
+            self._register(name, given)
             return
         if one.letter:
             raise Refused("Must unregister from gcode axis first")
@@ -207,6 +185,48 @@ class Klipper(SimulatedTime):
             one.on = given["ENABLE"] == "1"
         if "SET_POSITION" in given:
             one.place = self.at[name] = float(given["SET_POSITION"])
+
+    def _register(self, name: str, given: dict[str, str]) -> None:
+        """A stepper as a G-code axis by its letter; without a letter: no longer."""
+        letter, one = given["GCODE_AXIS"], self.steppers[name]
+        if not letter:
+            self.axes = [other for other in self.axes if other != name]
+            one.letter = ""
+            return
+        if one.letter:
+            raise Refused("Must unregister axis first")
+        if not re.fullmatch("[A-Z]", letter) or letter in "XYZEFN":
+            raise Refused("Not a valid GCODE_AXIS")
+        if letter in (self.steppers[other].letter for other in self.axes):
+            raise Refused(f"Axis '{letter}' already registered")
+        one.letter = letter
+        one.velocity = float(given.get("LIMIT_VELOCITY", 999_999.9))
+        one.corner = float(given.get("INSTANTANEOUS_CORNER_VELOCITY", 1.0))
+        self.axes.append(name)
+
+    def _zero_x(self, words: list[str]) -> None:
+        if words != ["X0"]:
+            raise Refused(f"the stand-in knows no {' '.join(['G92', *words])}")
+        self.x_base = self.x
+
+    def _motors_off(self, words: list[str]) -> None:
+        for one in self.steppers.values():
+            one.on = False
+
+    def _use_absolute(self, words: list[str]) -> None:
+        self.relative = False
+
+    def _use_relative(self, words: list[str]) -> None:
+        self.relative = True
+
+    def _scale_feed(self, words: list[str]) -> None:
+        self.factor = float(words[0][1:]) / 100
+
+    def _go(self, words: list[str]) -> None:
+        self._move({word[0]: float(word[1:]) for word in words})
+
+    def _wait(self, words: list[str]) -> None:
+        """M400 is reached when the queue is empty (`_room`)."""
 
     def _move(self, words: dict[str, float]) -> None:
         self.feed = words.pop("F") * self.factor if "F" in words else self.feed
@@ -248,3 +268,16 @@ class Klipper(SimulatedTime):
             if move.done >= move.seconds - 1e-12:
                 self.at |= move.end
                 self._moves.popleft()
+
+
+_COMMANDS: dict[str, Callable[[Klipper, list[str]], None]] = {
+    "G0": Klipper._go,
+    "G1": Klipper._go,
+    "G90": Klipper._use_absolute,
+    "G91": Klipper._use_relative,
+    "G92": Klipper._zero_x,
+    "M84": Klipper._motors_off,
+    "M220": Klipper._scale_feed,
+    "M400": Klipper._wait,
+    "MANUAL_STEPPER": Klipper._manual_stepper,
+}

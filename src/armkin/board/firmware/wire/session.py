@@ -173,14 +173,7 @@ class Session:
         before, now = self._turn, self.port.now()
         self._turn = now
         self._window.send()
-        # There is room for one question beside the frames; on a bad line the one before may be lost.
-        late = self._window.late and (self.line.damaged or not self.line.unanswered)
-        often = _POLL_NOISY if self.line.damaged else _POLL
-        quick = _POLL_SOON if ends or self._window.out_of_credit or late else often
-        quick = quick / 2 if self.line.noisy else quick
-        if self.line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
-            quick = _POLL
-        if now - self._asked >= quick:
+        if now - self._asked >= self._between_questions(ends):
             self._ask()
         self._hear(timeout)
         self.deaf = max(self.deaf, now - before, self.port.now() - now)
@@ -195,6 +188,16 @@ class Session:
             raise _silent(self.port)
         if self._window:
             self._stalled()
+
+    def _between_questions(self, ends: bool) -> float:
+        """Seconds from one question for the status to the next; ends: the queue does."""
+        if self.line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
+            return _POLL
+        # There is room for one question beside the frames; on a bad line the one before may be lost.
+        late = self._window.late and (self.line.damaged or not self.line.unanswered)
+        often = _POLL_NOISY if self.line.damaged else _POLL
+        quick = _POLL_SOON if ends or self._window.out_of_credit or late else often
+        return quick / 2 if self.line.noisy else quick
 
     def _ask(self, page: int = 0, copies: int = 1) -> int:
         self._asked, self._tag = self.port.now(), (self._tag + 1) & 255
