@@ -88,20 +88,9 @@ def mul(a: Entry, b: Entry) -> Entry:
     >>> mul(0.0, np.array([1.0, 2.0])), mul(-1.0, 3.0)
     (0.0, -3.0)
     """
-    if isinstance(a, float):
-        if a == 0.0:
-            return 0.0
-        if a == 1.0:
-            return b
-        if a == -1.0:
-            return -b
-    if isinstance(b, float):
-        if b == 0.0:
-            return 0.0
-        if b == 1.0:
-            return a
-        if b == -1.0:
-            return -a
+    for one, other in ((a, b), (b, a)):
+        if isinstance(one, float) and one in (0.0, 1.0, -1.0):
+            return 0.0 if one == 0.0 else other if one == 1.0 else -other
     return a * b
 
 

@@ -99,18 +99,27 @@ def _unrolled(recording: Recording) -> tuple[list[Step], list[list[Value | str]]
             if node.op in FLIPS:
                 same[result] = value(node.args[0], flipped(node.op, index, node.axes))
                 continue
-            op, args = node.op, [value(x, index) for x in node.args]
-            if op == "multiply" and "1.0" in args:  # a sign of branches
-                same[result] = args[1 - args.index("1.0")]
+            op, args = _shorter(node.op, [value(x, index) for x in node.args], minus)
+            if op == "same":
+                same[result] = args[0]
                 continue
-            if op == "multiply" and "-1.0" in args:
-                op, args = "negative", [args[1 - args.index("-1.0")]]
             if op == "negative":
                 minus[result] = args[0]
-            if op == "add" and (negated := next((k for k in (0, 1) if args[k] in minus), None)) is not None:
-                op, args = "subtract", [args[1 - negated], minus[args[negated]]]
             steps.append((result, op, args))
     return steps, [[value(x, index) for index in np.ndindex(*axes_of(x))] for x in recording.outputs]
+
+
+def _shorter(op: str, args: list[Value | str], minus: dict[Value | str, Value | str]) -> tuple[str, list[Value | str]]:
+    """An operation without signs of branches; "same": it is its argument. minus: negated values, before that."""
+    if op == "multiply":
+        for sign, shorter in (("1.0", "same"), ("-1.0", "negative")):
+            if sign in args:
+                return shorter, [args[1 - args.index(sign)]]
+    if op == "add":
+        for one, other in (args, args[::-1]):
+            if one in minus:
+                return "subtract", [other, minus[one]]
+    return op, args
 
 
 def function_of(

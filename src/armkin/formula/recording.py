@@ -81,6 +81,10 @@ class Trace:
             return self.simplify("multiply", (inputs[0], inputs[0]))
         if op not in ODD and op not in ("negative", "absolute", "multiply", "divide", "add", "subtract"):
             return self.record(op, inputs)
+        return self._signs_outwards(op, inputs)
+
+    def _signs_outwards(self, op: str, inputs: Sequence[Any]) -> Any:
+        """Record an operation on what its arguments are without their signs."""
         (s, a), (t, b) = _split(inputs[0]), _split(inputs[-1])
         if op == "negative":
             return self._signed(a, -s)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     from armkin.model.arm import Arm
 
+    _Segment = tuple[int, Array, Array, bool]  # its body, where it begins and ends, whether it slides out
+
 BASE = "base"
 ASSUMED = 0.02  # of the reach: the radius of a body that the file does not state
 
@@ -62,33 +64,7 @@ def bodies(arm: Arm) -> Bodies:
     """
     said = np.full(arm.n + 1, np.nan) if arm.body_radius is None else arm.body_radius
     assumed = np.isnan(said)
-    form, least = shape(arm), 1e-9 * arm.reach
-    owner, begin, end, slide = [], [], [], []
-
-    def add(body: int, a: Array, b: Array, slides: bool = False) -> None:
-        owner.append(body)
-        begin.append(a)
-        end.append(b)
-        slide.append(slides)
-
-    still = list(_segments(form.bodies[0], least))
-    first = form.bodies[1]
-    if not arm.prismatic[0]:  # what lies on joint 1's own axis does not turn
-        on_axis = [s for s in _segments(first, least) if _on_axis(s, least)]
-        still += [(_placed(arm.link[0], a), _placed(arm.link[0], b)) for a, b in on_axis]
-    for a, b in still or [(form.bodies[0][-1],) * 2]:
-        add(0, a, b)
-    for i in range(arm.n):
-        corners = form.bodies[i + 1]
-        own = list(_segments(corners, least))
-        if i == 0 and not arm.prismatic[0]:
-            own = [s for s in own if not _on_axis(s, least)]
-        elif arm.prismatic[i]:
-            add(i + 1, corners[0], corners[0], True)
-        elif not own:
-            own = [(corners[-1], corners[-1])]  # a body without length is a sphere
-        for a, b in own:
-            add(i + 1, a, b)
+    owner, begin, end, slide = zip(*_of_base(arm), *(s for i in range(arm.n) for s in _of_link(arm, i)), strict=True)
     return Bodies(
         (BASE, *arm.joint_names),
         np.where(assumed, ASSUMED * arm.reach, said),
@@ -98,6 +74,29 @@ def bodies(arm: Arm) -> Bodies:
         np.array(end),
         np.array(slide),
     )
+
+
+def _of_base(arm: Arm) -> list[_Segment]:
+    """The base's segments, with those of link 1 that lie on joint 1's own axis: they do not turn."""
+    form, least = shape(arm), 1e-9 * arm.reach
+    still = list(_segments(form.bodies[0], least))
+    if not arm.prismatic[0]:
+        on_axis = [s for s in _segments(form.bodies[1], least) if _on_axis(s, least)]
+        still += [(_placed(arm.link[0], a), _placed(arm.link[0], b)) for a, b in on_axis]
+    return [(0, a, b, False) for a, b in still or [(form.bodies[0][-1],) * 2]]
+
+
+def _of_link(arm: Arm, i: int) -> list[_Segment]:
+    """The segments that move with joint i; of a slide the first one, which grows, as well."""
+    corners, least = shape(arm).bodies[i + 1], 1e-9 * arm.reach
+    own = list(_segments(corners, least))
+    if arm.prismatic[i]:
+        return [(i + 1, corners[0], corners[0], True), *((i + 1, a, b, False) for a, b in own)]
+    if i == 0:
+        own = [s for s in own if not _on_axis(s, least)]
+    elif not own:
+        own = [(corners[-1], corners[-1])]  # a body without length is a sphere
+    return [(i + 1, a, b, False) for a, b in own]
 
 
 def _segments(corners: Array, least: float) -> list[tuple[Array, Array]]:

@@ -34,6 +34,7 @@ _PLACES = frozenset("XYZIJKR")
 _ZERO: Point = (0.0, 0.0, 0.0)
 _NO_AXES = [None] * 3
 _KNOWN_G = {*_GROUP, *_IGNORED_G, 53.0}
+_PAUSES, _ENDS = (0.0, 1.0), (2.0, 30.0)  # M codes
 
 
 def parse(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> PathFile:
@@ -106,14 +107,10 @@ class _Program:
     def _line(self) -> bool:
         """One line, in RS-274's order of execution; True: the program ends."""
         codes, m_codes, values = self._sorted()
-        if "F" in values:
-            self.feed = values.pop("F") * self._unit_after(codes)
-            if self.feed < 0:
-                raise self._wrong("F below 0 is no feed")
+        self._take_feed(codes, values)
         gripped = values.pop("S", None)
-        for code in m_codes:
-            if code not in (0.0, 1.0, 2.0, 30.0):
-                self._switch(code, gripped)
+        for switch in (code for code in m_codes if code not in _PAUSES + _ENDS):
+            self._switch(switch, gripped)
         waits = 4.0 in codes and "P" not in values
         if gripped is not None and not waits and not (self.options.grip_by == "M106" and 106.0 in m_codes):
             self._ignore("S")
@@ -125,10 +122,15 @@ class _Program:
         if values:
             letter = next(iter(values))
             raise self._wrong(f"{letter} belongs to no word of this line")
-        for code in m_codes:
-            if code in (0.0, 1.0):
-                self.pen.pause(self.line)
-        return 2.0 in m_codes or 30.0 in m_codes
+        for _ in (code for code in m_codes if code in _PAUSES):
+            self.pen.pause(self.line)
+        return not set(m_codes).isdisjoint(_ENDS)
+
+    def _take_feed(self, codes: list[float], values: dict[str, float]) -> None:
+        if "F" in values:
+            self.feed = values.pop("F") * self._unit_after(codes)
+            if self.feed < 0:
+                raise self._wrong("F below 0 is no feed")
 
     def _passed_over(self, codes: list[float], values: dict[str, float]) -> None:
         """G codes without a meaning for an arm, and the words that belong to them."""
@@ -151,11 +153,10 @@ class _Program:
                 code = round(number, 2)
                 if code not in _KNOWN_G:
                     raise self._wrong(f"{word} is not known")
-                group = _GROUP.get(code)
-                if group is not None and group in groups:
+                group = _GROUP.get(code, word)
+                if group in groups and code in _GROUP:
                     raise self._wrong(f"{groups[group]} and {word} stand on one line")
-                if group is not None:
-                    groups[group] = word
+                groups[group] = word
                 codes.append(code)
             elif letter == "M":
                 m_codes.append(number)

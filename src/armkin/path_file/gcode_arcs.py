@@ -22,43 +22,62 @@ def arc(
     plane: its two axes, and the one across; unit: [mm]. Raises ArcError.
     """
     x, y, across = plane
-    normal = [0.0, 0.0, 0.0]
-    normal[across] = 1.0
     sense = -1.0 if word == "G2" else 1.0
     turns = values.pop("P", 1.0)
     if turns != int(turns) or not 1 <= turns <= 1000:
         raise ArcError(f"{word} P{turns:g}: turns are whole, 1 to 1000")
-    offsets = {k: values.pop(letter) * unit for k, letter in enumerate("IJK") if letter in values}
-    if across in offsets:
-        raise ArcError(f"{word} has {'IJK'[across]} in the plane of {AXES[x]} and {AXES[y]}")
-    if "R" in values:
-        if offsets:
-            raise ArcError(f"{word} has R and {'IJK'[next(iter(offsets))]}: one of them")
-        centre = _centre_by_radius(word, plane, values.pop("R") * unit, a, b, sense)
-    elif not offsets:
-        raise ArcError(f"{word} needs {'IJK'[x]}, {'IJK'[y]} or R")
-    else:
-        moved = list(a)
-        for k, value in offsets.items():
-            moved[k] += value
-        centre = moved[0], moved[1], moved[2]
-    u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
-    radius, off = math.hypot(*u), abs(math.hypot(*v) - math.hypot(*u))
+    centre = _centre(word, plane, values, unit, a, b, sense)
+    radius, off = _radius(plane, centre, a, b)
     if off > _OFF[2] or (off > _OFF[0] and off > _OFF[1] * radius):
         raise ArcError(f"{word} ends {off:.4g} mm off its circle of {radius:.6g} mm")
-    chord = b[x] - a[x], b[y] - a[y]
-    size = math.hypot(*chord)
-    along = ((u[0] + v[0]) * chord[0] + (u[1] + v[1]) * chord[1]) / (2 * size) if size else 0.0
-    if abs(along) <= 2 * off:  # the centre as far from both ends: misses of arcs one after another would add up
-        moved = list(centre)
-        moved[x] += along * chord[0] / size if size else 0.0
-        moved[y] += along * chord[1] / size if size else 0.0
-        centre = moved[0], moved[1], moved[2]
-        u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
+    centre = _evened(plane, centre, a, b, off)
+    u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
     angle = sense * (math.atan2(v[1], v[0]) - math.atan2(u[1], u[0])) % (2 * math.pi)
     same = math.hypot(a[x] - b[x], a[y] - b[y]) < 1e-9 * max(radius, 1.0)
     angle = 2 * math.pi if same or angle < 1e-12 else angle
-    return centre, (normal[0], normal[1], normal[2]), sense * (angle + 2 * math.pi * (turns - 1))
+    normal = (float(across == 0), float(across == 1), float(across == 2))
+    return centre, normal, sense * (angle + 2 * math.pi * (turns - 1))
+
+
+def _centre(
+    word: str, plane: tuple[int, int, int], values: dict[str, float], unit: float, a: Point, b: Point, sense: float
+) -> Point:
+    """The centre by I, J and K, which count from a, or by R."""
+    x, y, across = plane
+    offsets = {k: values.pop(letter) * unit for k, letter in enumerate("IJK") if letter in values}
+    if across in offsets:
+        raise ArcError(f"{word} has {'IJK'[across]} in the plane of {AXES[x]} and {AXES[y]}")
+    if "R" not in values:
+        if not offsets:
+            raise ArcError(f"{word} needs {'IJK'[x]}, {'IJK'[y]} or R")
+        return a[0] + offsets.get(0, 0.0), a[1] + offsets.get(1, 0.0), a[2] + offsets.get(2, 0.0)
+    if offsets:
+        raise ArcError(f"{word} has R and {'IJK'[next(iter(offsets))]}: one of them")
+    return _centre_by_radius(word, plane, values.pop("R") * unit, a, b, sense)
+
+
+def _radius(plane: tuple[int, int, int], centre: Point, a: Point, b: Point) -> tuple[float, float]:
+    """The distance of a from the centre, and by how much b's is another one."""
+    x, y, _ = plane
+    radius = math.hypot(a[x] - centre[x], a[y] - centre[y])
+    return radius, abs(math.hypot(b[x] - centre[x], b[y] - centre[y]) - radius)
+
+
+def _evened(plane: tuple[int, int, int], centre: Point, a: Point, b: Point, off: float) -> Point:
+    """The centre as far from both ends: what arcs miss, one after another, would add up. off: see `_radius`."""
+    x, y, _ = plane
+    chord = b[x] - a[x], b[y] - a[y]
+    size = math.hypot(*chord)
+    if size == 0.0:
+        return centre
+    u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
+    along = ((u[0] + v[0]) * chord[0] + (u[1] + v[1]) * chord[1]) / (2 * size)
+    if abs(along) > 2 * off:
+        return centre
+    moved = list(centre)
+    moved[x] += along * chord[0] / size
+    moved[y] += along * chord[1] / size
+    return moved[0], moved[1], moved[2]
 
 
 def _centre_by_radius(word: str, plane: tuple[int, int, int], r: float, a: Point, b: Point, sense: float) -> Point:

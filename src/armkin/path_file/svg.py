@@ -10,6 +10,7 @@ from armkin.errors import PathFileError
 from armkin.path_file.drawing import LARGEST, DrawingOptions, Pen, Placing
 from armkin.path_file.path_keys import MOST_POINTS, PathFile
 from armkin.path_file.svg_shapes import (
+    SHAPES,
     Matrix,
     Point,
     ShapeError,
@@ -22,7 +23,6 @@ from armkin.path_file.svg_shapes import (
 )
 
 _MM = 25.4 / 96  # of a px
-_SHAPES = {"path", "line", "polyline", "polygon", "rect", "circle", "ellipse"}
 _GROUPS = {"svg", "g", "a", "symbol"}
 _REFUSED = {"text", "tspan", "textPath", "image", "foreignObject", "switch"}
 _DEEPEST, _MOST = 64, 200_000  # elements in each other, and in all
@@ -62,45 +62,54 @@ def parse(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> P
     for child in root.children:
         pen.draw(child, frame, named, 0)
     pen.lift()
-    return pen.pen.file(name, (), raw, f"it needs an outline of {', '.join(sorted(_SHAPES))}")
+    return pen.pen.file(name, (), raw, f"it needs an outline of {', '.join(sorted(SHAPES))}")
 
 
 def _tree(raw: bytes, name: str) -> _Element:
     """The document's elements, their names without prefixes."""
-    parser = expat.ParserCreate()
-    top = _Element("", {}, 0)
-    stack = [top]
     text = raw.lstrip()
-    skipped = raw[: len(raw) - len(text)].count(b"\n")
-
-    def begin(tag: str, attributes: dict[str, str]) -> None:
-        made = _Element(tag.rpartition(":")[2], attributes, skipped + parser.CurrentLineNumber)
-        if tag.partition(":")[0] in ("sodipodi", "inkscape"):
-            made.tag = "metadata"
-        stack[-1].children.append(made)
-        stack.append(made)
-        if len(stack) > 4 * _DEEPEST:
-            raise PathFileError(f"{name}:{made.line}: elements in each other deeper than {4 * _DEEPEST}", file=name)
-
-    def end(_: str) -> None:
-        stack.pop()
-
-    def entity(*_: object) -> None:
-        line = skipped + parser.CurrentLineNumber
-        raise PathFileError(f"{name}:{line}: has entities, which are not read", file=name, line=line)
-
-    parser.StartElementHandler, parser.EndElementHandler, parser.EntityDeclHandler = begin, end, entity
+    reader = _Reader(name, raw[: len(raw) - len(text)].count(b"\n"))
     try:
-        parser.Parse(text, True)
+        reader.parser.Parse(text, True)
     except PathFileError:
         raise
     except expat.ExpatError as error:
-        line = skipped + error.lineno
+        line = reader.skipped + error.lineno
         why = expat.ErrorString(error.code)
         raise PathFileError(f"{name}:{line}: is not XML: {why}", file=name, line=line) from None
     except (LookupError, ValueError) as error:
         raise PathFileError(f"{name}:1: is not XML: {error}", file=name, line=1) from None
-    return top.children[0]
+    return reader.top.children[0]
+
+
+class _Reader:
+    """Puts elements together as expat reads them; skipped: lines before the text that it reads."""
+
+    def __init__(self, name: str, skipped: int) -> None:
+        self.name, self.skipped = name, skipped
+        self.top = _Element("", {}, 0)
+        self._open = [self.top]
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self._begin
+        self.parser.EndElementHandler = self._end
+        self.parser.EntityDeclHandler = self._entity
+
+    def _begin(self, tag: str, attributes: dict[str, str]) -> None:
+        made = _Element(tag.rpartition(":")[2], attributes, self.skipped + self.parser.CurrentLineNumber)
+        if tag.partition(":")[0] in ("sodipodi", "inkscape"):
+            made.tag = "metadata"
+        self._open[-1].children.append(made)
+        self._open.append(made)
+        if len(self._open) > 4 * _DEEPEST:
+            where = f"{self.name}:{made.line}"
+            raise PathFileError(f"{where}: elements in each other deeper than {4 * _DEEPEST}", file=self.name)
+
+    def _end(self, tag: str) -> None:
+        self._open.pop()
+
+    def _entity(self, *_: object) -> None:
+        line = self.skipped + self.parser.CurrentLineNumber
+        raise PathFileError(f"{self.name}:{line}: has entities, which are not read", file=self.name, line=line)
 
 
 def _all(element: _Element) -> Iterator[_Element]:
@@ -149,7 +158,7 @@ class _Drawer:
             if element.tag == "use":
                 shift = (length(element.attributes.get("x")), length(element.attributes.get("y")))
                 self._use(element, times(m, (1.0, 0.0, 0.0, 1.0, *shift)), named, depth)
-            elif element.tag in _SHAPES:
+            elif element.tag in SHAPES:
                 for stroke in outlines(element.tag, element.attributes, m):
                     self._stroke(element, stroke)
         except ShapeError as error:
@@ -167,7 +176,7 @@ class _Drawer:
             raise self._wrong(element, f"stands in others deeper than {_DEEPEST}, or uses itself")
         if element.tag in _REFUSED:
             raise self._wrong(element, "is not drawn: make its outlines a path first")
-        known = element.tag in _SHAPES or element.tag in _GROUPS or element.tag == "use"
+        known = element.tag in SHAPES or element.tag in _GROUPS or element.tag == "use"
         if not known or element.style("display") == "none" or element.style("visibility") == "hidden":
             return False
         for key in ("clip-path", "mask"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 Point = tuple[float, float]
 Matrix = tuple[float, float, float, float, float, float]  # x' = a x + c y + e, y' = b x + d y + f
@@ -98,41 +98,51 @@ def _one_transform(kind: str, v: list[float]) -> Matrix:
 
 
 def outlines(tag: str, attributes: Mapping[str, str], m: Matrix) -> list[list[Point]]:
-    """The strokes of an element, transformed to millimetres: points."""
-
-    def size(key: str) -> float:
-        return length(attributes.get(key))
-
+    """The strokes of one of `SHAPES`, transformed to millimetres: points."""
     pen = _Outline(m)
-    if tag == "path":
-        _path(pen, attributes.get("d", ""))
-    elif tag == "line":
-        pen.move((size("x1"), size("y1")))
-        pen.line((size("x2"), size("y2")))
-    elif tag in ("polyline", "polygon"):
-        values = numbers(attributes.get("points", ""))
-        if len(values) % 2:
-            raise ShapeError("points has an odd count of numbers")
-        for k in range(0, len(values), 2):
-            (pen.line if k else pen.move)((values[k], values[k + 1]))
-        if tag == "polygon" and values:
-            pen.close()
-    elif tag in ("circle", "ellipse"):
-        one, other = above_zero(attributes, *(("r", "r") if tag == "circle" else ("rx", "ry")))
-        _ellipse(pen, size("cx"), size("cy"), other if one is None else one, one if other is None else other)
-    elif tag == "rect":
-        _rectangle(pen, size("x"), size("y"), attributes)
+    SHAPES[tag](pen, attributes)
     return [stroke for stroke in pen.strokes if len(stroke) > 1]
 
 
-def _ellipse(pen: _Outline, x: float, y: float, rx: float | None, ry: float | None) -> None:
+def _line(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    x1, y1, x2, y2 = (length(attributes.get(key)) for key in ("x1", "y1", "x2", "y2"))
+    pen.move((x1, y1))
+    pen.line((x2, y2))
+
+
+def _polyline(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    values = numbers(attributes.get("points", ""))
+    if len(values) % 2:
+        raise ShapeError("points has an odd count of numbers")
+    for k in range(0, len(values), 2):
+        (pen.line if k else pen.move)((values[k], values[k + 1]))
+
+
+def _polygon(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    _polyline(pen, attributes)
+    pen.close()
+
+
+def _circle(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    (radius,) = above_zero(attributes, "r")
+    _round(pen, attributes, radius, radius)
+
+
+def _ellipse(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    rx, ry = above_zero(attributes, "rx", "ry")
+    _round(pen, attributes, ry if rx is None else rx, rx if ry is None else ry)
+
+
+def _round(pen: _Outline, attributes: Mapping[str, str], rx: float | None, ry: float | None) -> None:
+    x, y = length(attributes.get("cx")), length(attributes.get("cy"))
     if rx and ry:
         pen.move((x + rx, y))
         pen.ellipse((x, y), rx, ry, 0.0, 0.0, 2 * math.pi)
         pen.close()
 
 
-def _rectangle(pen: _Outline, x: float, y: float, attributes: Mapping[str, str]) -> None:
+def _rectangle(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    x, y = length(attributes.get("x")), length(attributes.get("y"))
     wide, high, round_x, round_y = above_zero(attributes, "width", "height", "rx", "ry")
     w, h = wide or 0.0, high or 0.0
     if w == 0 or h == 0:
@@ -320,3 +330,14 @@ def _arc(pen: _Outline, v: list[float]) -> None:
     angle = angle if sweep else angle - 2 * math.pi
     centre = cos * cx - sin * cy + (x1 + x2) / 2, sin * cx + cos * cy + (y1 + y2) / 2
     pen.ellipse(centre, rx, ry, turned, begin, angle)
+
+
+SHAPES: dict[str, Callable[[_Outline, Mapping[str, str]], None]] = {  # element -> how it is drawn
+    "path": lambda pen, attributes: _path(pen, attributes.get("d", "")),
+    "line": _line,
+    "polyline": _polyline,
+    "polygon": _polygon,
+    "rect": _rectangle,
+    "circle": _circle,
+    "ellipse": _ellipse,
+}

@@ -17,7 +17,7 @@ from armkin.robot_file.robot_keys import Triple, dot
 
 if TYPE_CHECKING:
     from armkin.board_kinds import ForeignBoard
-    from armkin.robot_file.robot_keys import Board, Drive, Joint, Motor, RobotKeys
+    from armkin.robot_file.robot_keys import Board, Drive, Gripper, Joint, Motor, RobotKeys, Screw
 
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
 _LEAST_WEIGHT = 1e-6  # of a joint on a motor: less would divide by nothing
@@ -109,23 +109,30 @@ def _range(joint: Joint) -> Iterator[Problem]:
 
 def _screw(joint: Joint) -> Iterator[Problem]:
     assert joint.screw is not None
-    w, v, q = joint.screw.w, joint.screw.v, joint.screw.q
+    return (_direction if joint.type == "prismatic" else _axis)(joint.screw)
+
+
+def _direction(screw: Screw) -> Iterator[Problem]:
+    """A prismatic joint's screw."""
+    if math.hypot(*screw.w) != 0:
+        yield ("screw", "w"), "must be [0, 0, 0] for a prismatic joint; its direction is v"
+    if screw.q is not None:
+        yield ("screw", "q"), "a prismatic joint has no axis point; its direction is v"
+    if screw.v is None:
+        yield ("screw",), "has no v; for a prismatic joint v is its direction, for example [0, 0, 1]"
+    else:
+        yield from _unit("v", screw.v)
+
+
+def _axis(screw: Screw) -> Iterator[Problem]:
+    """A revolute joint's screw."""
+    w, v = screw.w, screw.v
     length = math.hypot(*w)
-    if joint.type == "prismatic":
-        if length != 0:
-            yield ("screw", "w"), "must be [0, 0, 0] for a prismatic joint; its direction is v"
-        if q is not None:
-            yield ("screw", "q"), "a prismatic joint has no axis point; its direction is v"
-        if v is None:
-            yield ("screw",), "has no v; for a prismatic joint v is its direction, for example [0, 0, 1]"
-        else:
-            yield from _unit("v", v)
-        return
     if length == 0:
         yield ("screw", "w"), "is zero; give the axis direction, or type: prismatic"
         return
     yield from _unit("w", w)
-    if (v is None) == (q is None):
+    if (v is None) == (screw.q is None):
         has = "neither v nor q" if v is None else "both v and q"
         yield ("screw",), f"has {has}; give v, or a point q on the axis"
     elif v is not None:
@@ -225,48 +232,59 @@ def _gripper(robot: RobotKeys) -> Iterator[Problem]:
     if gripper.open == gripper.closed:
         yield ("gripper", "closed"), f"is the same as open, {gripper.open:g}"
     if gripper.kind == "spindle":
-        if robot.board is not None and robot.board.kind != "grbl":
-            yield ("gripper", "kind"), f"a spindle is GRBL's M3 output, which {robot.board.kind} has not"
-        for key in ("open", "closed"):
-            if not 0 <= getattr(gripper, key) <= 1e5:
-                yield ("gripper", key), f"is an S word of M3, from 0 to GRBL's $30; {getattr(gripper, key):g} is none"
+        yield from _spindle(gripper, robot.board)
     if gripper.kind == "servo" and gripper.travel is not None:
-        turn = -1.0 if gripper.invert else 1.0
-        for key in ("open", "closed"):
-            angle = gripper.zero + turn * getattr(gripper, key)
-            if not gripper.travel[0] <= angle <= gripper.travel[1]:
-                low, high = gripper.travel
-                yield ("gripper", key), f"needs servo angle {angle:g}, outside the travel {low:g} to {high:g}"
+        yield from _servo_travel(gripper, *gripper.travel)
+
+
+def _spindle(gripper: Gripper, board: Board | None) -> Iterator[Problem]:
+    if board is not None and board.kind != "grbl":
+        yield ("gripper", "kind"), f"a spindle is GRBL's M3 output, which {board.kind} has not"
+    for key in ("open", "closed"):
+        if not 0 <= getattr(gripper, key) <= 1e5:
+            yield ("gripper", key), f"is an S word of M3, from 0 to GRBL's $30; {getattr(gripper, key):g} is none"
+
+
+def _servo_travel(gripper: Gripper, low: float, high: float) -> Iterator[Problem]:
+    turn = -1.0 if gripper.invert else 1.0
+    for key in ("open", "closed"):
+        angle = gripper.zero + turn * getattr(gripper, key)
+        if not low <= angle <= high:
+            yield ("gripper", key), f"needs servo angle {angle:g}, outside the travel {low:g} to {high:g}"
 
 
 def _axes(robot: RobotKeys) -> Iterator[Problem]:
     """Each axis is used once, and the board has it."""
     board = robot.board
     foreign = None if board is None else installed_kinds.foreign(board.kind)
-    drives: list[tuple[Path, Drive]] = [
-        (("joints", i, "drive"), joint.drive) for i, joint in enumerate(robot.joints) if joint.drive is not None
-    ]
-    drives += [(("motors", i), motor) for i, motor in enumerate(robot.motors or ())]
-    if robot.gripper is not None and (foreign is None or robot.gripper.kind == foreign.motors):
-        drives.append((("gripper",), robot.gripper))  # one of another kind is not the board's: `armkin grip` refuses
-    used: set[str] = set()
-    numbers: set[int] = set()
-    for path, drive in drives:
+    used: set[tuple[str, object]] = set()
+    for path, drive in _drives(robot, foreign):
         if board is not None and drive.kind == "bus" and board.kind in BOARDS:
             yield (*path, "kind"), f"{board.kind} has no bus; leave board out, or name one that has"
         if foreign is not None and drive.kind != foreign.motors:
             yield (*path, "kind"), f"{foreign.kind} takes drives of kind {foreign.motors} alone, not {drive.kind}"
-        if drive.id is not None:
-            if drive.id in numbers:
-                yield (*path, "id"), f"{drive.id} is used already; each servo has its own number on the bus"
-            numbers.add(drive.id)
+        for key in _USED_ONCE:
+            if (key, getattr(drive, key)) in used:
+                yield (*path, key), f"{getattr(drive, key)} is used already; {_USED_ONCE[key]}"
+        used |= {(key, getattr(drive, key)) for key in _USED_ONCE if getattr(drive, key) is not None}
         if drive.axis is not None:
-            if drive.axis in used:
-                yield (*path, "axis"), f"{drive.axis} is used already; each motor has its own axis"
-            used.add(drive.axis)
             yield from _lacks_axis(board, foreign, drive, path)
     if board is not None:
         yield from _board(robot, board)
+
+
+_USED_ONCE = {"id": "each servo has its own number on the bus", "axis": "each motor has its own axis"}
+
+
+def _drives(robot: RobotKeys, foreign: ForeignBoard | None) -> Iterator[tuple[Path, Drive]]:
+    """The drives that the board turns, each with its place in the file; foreign: what kind of board it is."""
+    for i, joint in enumerate(robot.joints):
+        if joint.drive is not None:
+            yield ("joints", i, "drive"), joint.drive
+    for i, motor in enumerate(robot.motors or ()):
+        yield ("motors", i), motor
+    if robot.gripper is not None and (foreign is None or robot.gripper.kind == foreign.motors):
+        yield ("gripper",), robot.gripper  # one of another kind is not the board's: `armkin grip` refuses
 
 
 def _lacks_axis(board: Board | None, foreign: ForeignBoard | None, drive: Drive, path: Path) -> Iterator[Problem]:

@@ -179,25 +179,26 @@ def _not_a_number(what: str, path: Path, value: Any) -> str:
     if whole and isinstance(value, float) and value.is_integer():
         return f"must be {what}, not {value}; write {value:.0f}"
     text = f"must be {what}, not {shown(value)}"
-    if not isinstance(value, str):
-        return text
+    return f"{text}{_instead(path[-1], value)}" if isinstance(value, str) else text
+
+
+def _instead(key: str | int, value: str) -> str:
+    """What to write instead of text that is meant as a number; empty where that cannot be known."""
     bare = value.strip().lower()
-    if path[-1] in ("theta", "d") and re.fullmatch(r"[+-]?(?:q|theta|th|d)_?[0-9]{0,2}\*?(?: *[+-].*)?", bare):
+    if key in ("theta", "d") and re.fullmatch(r"[+-]?(?:q|theta|th|d)_?[0-9]{0,2}\*?(?: *[+-].*)?", bare):
         return (
-            f"{text}; leave the variable out: {path[-1]} is the constant part, and the joint's value is added "
+            f"; leave the variable out: {key} is the constant part, and the joint's value is added "
             "to theta (of a prismatic joint: to d)"
         )
     for unit in ("mm", "deg", "degrees", "°", "us"):
         bare = bare.removesuffix(unit).strip()
     if bare != value.strip().lower():
-        return f"{text}; units are fixed (mm, degrees), write {bare}" if _is_number(bare) else text
+        return f"; units are fixed (mm, degrees), write {bare}" if _is_number(bare) else ""
     if _is_number(bare):
-        return f"{text}; write {bare} without quotes"
+        return f"; write {bare} without quotes"
     if _is_number(bare.replace(",", ".")):
-        return f"{text}; write {bare.replace(',', '.')} with a point"
-    if "pi" in bare:
-        return f"{text}; angles are in degrees, so pi/2 is 90"
-    return text
+        return f"; write {bare.replace(',', '.')} with a point"
+    return "; angles are in degrees, so pi/2 is 90" if "pi" in bare else ""
 
 
 def _is_number(text: str) -> bool:

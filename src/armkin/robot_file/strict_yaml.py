@@ -201,8 +201,8 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
     root: Any = None
     for event in events:
         line = event.start_mark.line + 1
-        if isinstance(event, yaml.DocumentStartEvent) and root is not None:
-            raise StrictYamlError(line, f"a second document begins here; a {kind.name} is one document")
+        if root is not None:
+            _refuse_another_document(event, line, kind)
         _refuse_what_unfolds(event, line)
         parent = stack[-1] if stack else None
         awaits_key = parent is not None and parent.mapping and parent.key is None
@@ -213,10 +213,10 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
             continue
         if isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
             value = stack.pop().value()
+        elif isinstance(event, yaml.ScalarEvent) and parent is not None and awaits_key:
+            parent.key = _key(event, parent, lines, line)
+            continue
         elif isinstance(event, yaml.ScalarEvent):
-            if awaits_key and parent is not None:
-                parent.key = _key(event, parent, lines, line)
-                continue
             value = _scalar(event, parent, line, kind)
             lines.setdefault(_path(parent), line)
         else:
@@ -238,6 +238,11 @@ def _check_place(awaits_key: bool, depth: int, line: int, kind: Kind) -> None:
         raise StrictYamlError(line, "a key must be a word, not a list or mapping")
     if depth >= MAX_DEPTH:
         raise StrictYamlError(line, _too_deep(kind))
+
+
+def _refuse_another_document(event: Any, line: int, kind: Kind) -> None:
+    if isinstance(event, yaml.DocumentStartEvent):
+        raise StrictYamlError(line, f"a second document begins here; a {kind.name} is one document")
 
 
 def _refuse_what_unfolds(event: Any, line: int) -> None:

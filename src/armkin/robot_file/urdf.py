@@ -127,12 +127,8 @@ def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap:
         joints.append(_joint(joint, names[joint.name], T[:3, 3], direction, where, notes))
         if np.abs(T[:3, 3]).max() > FARTHEST:
             raise RobotFileError(f"{where}: stands more than 10 km from {base}; a URDF is in metres")
-    if not joints:
-        raise RobotFileError(f"{path}: no joint moves between {base} and {tip}; choose another base or tip")
-    if len(joints) > 12:
-        raise RobotFileError(f"{path}: {len(joints)} joints between {base} and {tip}; a robot file has at most 12")
-    if (reach := float(np.abs(T[:3, 3]).max())) > FARTHEST:
-        raise RobotFileError(f"{path}: {tip} is more than 10 km from {base}; a URDF is in metres")
+    reach = float(np.abs(T[:3, 3]).max())
+    _check_chain(path, base, tip, len(joints), reach)
     if reach > LARGE:
         notes.append(f"{tip} is {reach:.4g} m from {base}: a URDF is in metres, are these millimetres?")
     T[:3, 3] *= METRE
@@ -146,6 +142,16 @@ def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap:
         "joints": joints,
     }
     return Imported(data, tuple(notes), base, tip)
+
+
+def _check_chain(path: str, base: str, tip: str, joints: int, reach: float) -> None:
+    """reach: [m] of the tip from the base, along the farthest axis."""
+    if not joints:
+        raise RobotFileError(f"{path}: no joint moves between {base} and {tip}; choose another base or tip")
+    if joints > 12:
+        raise RobotFileError(f"{path}: {joints} joints between {base} and {tip}; a robot file has at most 12")
+    if reach > FARTHEST:
+        raise RobotFileError(f"{path}: {tip} is more than 10 km from {base}; a URDF is in metres")
 
 
 def _check_moving(joint: Joint, where: str) -> None:

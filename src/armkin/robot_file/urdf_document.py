@@ -44,13 +44,7 @@ class _Reader:
 
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
         self.depth += 1
-        if "xacro" in tag:
-            raise is_xacro(self.name)
-        if self.depth > MAX_DEPTH:
-            raise RobotFileError(f"{self.name}: elements nested deeper than {MAX_DEPTH}; a URDF has about 5")
-        if self.depth == 1 and tag != "robot":
-            what = _FORMATS.get(tag, f"its outermost element is <{tag[:40]}>")
-            raise RobotFileError(f"{self.name}: is not a URDF but {what}; a URDF begins with <robot name=...>")
+        self._check(tag)
         if self.depth == 1:
             self.robot = attributes.get("name", "")
         elif self.depth == 2 and tag in ("link", "joint"):
@@ -64,6 +58,15 @@ class _Reader:
         elif (self.within[1:], tag) in _SEEN:
             self.visuals[next(reversed(self.links))][-1][tag] = dict(attributes)
         self.within.append(tag)
+
+    def _check(self, tag: str) -> None:
+        if "xacro" in tag:
+            raise is_xacro(self.name)
+        if self.depth > MAX_DEPTH:
+            raise RobotFileError(f"{self.name}: elements nested deeper than {MAX_DEPTH}; a URDF has about 5")
+        if self.depth == 1 and tag != "robot":
+            what = _FORMATS.get(tag, f"its outermost element is <{tag[:40]}>")
+            raise RobotFileError(f"{self.name}: is not a URDF but {what}; a URDF begins with <robot name=...>")
 
     def _named(self, tag: str, attributes: Mapping[str, str]) -> None:
         name = attributes.get("name")
@@ -133,33 +136,42 @@ class Tree:
         self.parent: dict[str, Joint] = {}  # link -> the joint that it hangs on
         self.children: dict[str, list[Joint]] = {link: [] for link in links}
         for joint in joints:
-            parent, child = joint.text("parent", "link"), joint.text("child", "link")
-            for what, link in (("parent", parent), ("child", child)):
-                if link is None:
-                    raise RobotFileError(f"{name}: joint {joint.name}: has no <{what} link=...>")
-                if link not in self.children:
-                    raise RobotFileError(f"{name}: joint {joint.name}: there is no {what} link {link}")
-            assert parent is not None
-            assert child is not None
-            if child in self.parent:
-                first = self.parent[child].name
-                raise RobotFileError(
-                    f"{name}: link {child} hangs on two joints, {first} and {joint.name}; a URDF is a tree, "
-                    "a closed linkage cannot be read"
-                )
-            self.parent[child] = joint
-            self.children[parent].append(joint)
+            self._hang(joint)
         for link in links:
-            seen = {link}
-            while link in self.parent:
-                link = str(self.parent[link].text("parent", "link"))
-                if link in seen:
-                    raise RobotFileError(
-                        f"{name}: link {link} hangs on itself by way of others: the joints are a circle"
-                    )
-                seen.add(link)
-                if len(seen) > 200:
-                    raise RobotFileError(f"{name}: a chain of more than 200 links")
+            self._check_way_down(link)
+
+    def _hang(self, joint: Joint) -> None:
+        parent, child = self._link(joint, "parent"), self._link(joint, "child")
+        if child in self.parent:
+            first = self.parent[child].name
+            raise RobotFileError(
+                f"{self.name}: link {child} hangs on two joints, {first} and {joint.name}; a URDF is a tree, "
+                "a closed linkage cannot be read"
+            )
+        self.parent[child] = joint
+        self.children[parent].append(joint)
+
+    def _link(self, joint: Joint, what: str) -> str:
+        """A joint's parent or child."""
+        link = joint.text(what, "link")
+        if link is None:
+            raise RobotFileError(f"{self.name}: joint {joint.name}: has no <{what} link=...>")
+        if link not in self.children:
+            raise RobotFileError(f"{self.name}: joint {joint.name}: there is no {what} link {link}")
+        return link
+
+    def _check_way_down(self, link: str) -> None:
+        """From a link to its parent, and on to one that has none."""
+        seen = {link}
+        while link in self.parent:
+            link = str(self.parent[link].text("parent", "link"))
+            if link in seen:
+                raise RobotFileError(
+                    f"{self.name}: link {link} hangs on itself by way of others: the joints are a circle"
+                )
+            seen.add(link)
+            if len(seen) > 200:
+                raise RobotFileError(f"{self.name}: a chain of more than 200 links")
 
     def base(self, wanted: str | None) -> str:
         """The link that the chain begins with."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from armkin.errors import UsageError
@@ -36,6 +37,13 @@ class Actions:
         self._shown: dict[str, Any] = {}
         self._quick: QuickIk | None = None
         self.program_actions = ProgramActions(arm, self.stands, lambda state: self.tabs.tell("program", state))
+        # by name; whoever holds the key may stop the arm
+        self.for_everyone: dict[str, Callable[[], dict[str, Any]]] = {
+            "open": self._open,
+            "solver": self._solver,
+            "reach": self._reach,
+            "stop": self._stop,
+        }
         self.for_control: dict[str, Action] = {"look": self._look, **self.program_actions.actions()}  # by name
         if port is not None:
             from armkin.teach.board_actions import BoardActions
@@ -52,30 +60,36 @@ class Actions:
 
     def act(self, name: str, tab_id: str, fields: Fields) -> dict[str, Any]:
         """Carry out an action for a page. Raises RefusedError, or an ArmkinError that says what is wrong."""
-        if name == "open":
-            return self._open()
-        if name == "solver":
-            from armkin.teach.browser_solver import own_solver
-
-            return own_solver(self.arm)
-        if name == "reach":
-            from armkin.teach.reach_slice import reach_slice
-
-            return reach_slice(self.arm)
-        if name == "stop":  # whoever holds the key may stop the arm
-            if self.board is not None:
-                self.board.stop()
-            return {}
+        if name in self.for_everyone:
+            return self.for_everyone[name]()
         tab = self.tabs.find(tab_id)
         if name == "take":
-            self.tabs.take(tab)
-            if self.board is not None:
-                self.board.end_follow()
-            return {}
+            return self._take(tab)
         if name not in self.for_control:
             raise RefusedError(404, f"there is no action {name[:40]!r}")
         self.tabs.check_control(tab)
         return self.for_control[name](tab, fields)
+
+    def _solver(self) -> dict[str, Any]:
+        from armkin.teach.browser_solver import own_solver
+
+        return own_solver(self.arm)
+
+    def _reach(self) -> dict[str, Any]:
+        from armkin.teach.reach_slice import reach_slice
+
+        return reach_slice(self.arm)
+
+    def _stop(self) -> dict[str, Any]:
+        if self.board is not None:
+            self.board.stop()
+        return {}
+
+    def _take(self, tab: Tab) -> dict[str, Any]:
+        self.tabs.take(tab)
+        if self.board is not None:
+            self.board.end_follow()
+        return {}
 
     def warm(self) -> None:
         """Have the first page's answer ready, while its browser still loads the files."""

@@ -20,6 +20,7 @@ from armkin.formula.arrays import Array
 MAX_BYTES = 64 * 2**20  # of one file
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 _DEEPEST = 40  # nodes within nodes
+_Index = NDArray[np.int64]
 
 
 def triangles(path: Path) -> Array:
@@ -106,15 +107,9 @@ def _motion(tag: str, values: list[float]) -> Array:
 
 def _polygons(mesh: Any) -> Iterator[Array]:
     """The triangles of a geometry's triangles, polylists and polygons: polygons are taken to be convex."""
-    sources = {}
-    for source in mesh.findall("source"):
-        numbers, accessor = source.find("float_array"), source.find("technique_common/accessor")
-        if numbers is not None and accessor is not None:
-            values = np.array((numbers.text or "").split(), dtype=float)
-            stride = int(accessor.get("stride", 1))
-            sources[source.get("id")] = values[: len(values) // stride * stride].reshape(-1, stride)
+    sources = dict(_sources(mesh))
     vertices = {one.get("id"): one for one in mesh.findall("vertices")}
-    for kind in ("triangles", "polylist", "polygons"):
+    for kind, index_of in _INDEX_OF.items():
         for group in mesh.findall(kind):
             inputs = group.findall("input")
             width = 1 + max(int(one.get("offset", 0)) for one in inputs)
@@ -124,20 +119,39 @@ def _polygons(mesh: Any) -> Iterator[Array]:
             points = sources[place.get("source", "").removeprefix("#")][:, :3]
             lists = [np.array((one.text or "").split(), dtype=np.int64) for one in group.findall("p")]
             corners = [one.reshape(-1, width)[:, int(vertex.get("offset", 0))] for one in lists]
-            if kind == "triangles":
-                index = [one[: len(one) // 3 * 3].reshape(-1, 3) for one in corners]
-            elif kind == "polygons":
-                index = [_fan(one) for one in corners]
-            else:
-                counts = np.array(group.findtext("vcount", "").split(), dtype=np.int64)
-                index = [_fan(one) for one in np.split(np.concatenate(corners), np.cumsum(counts)[:-1])]
-            for one in index:
+            for one in index_of(group, corners):
                 if len(one) and (one.min() < 0 or one.max() >= len(points)):
                     raise ValueError("a triangle names a vertex that is not there")
                 yield points[one]
 
 
-def _fan(corners: NDArray[np.int64]) -> NDArray[np.int64]:
+def _sources(mesh: Any) -> Iterator[tuple[str, Array]]:
+    """Arrays of numbers by their ids, a row for each vertex."""
+    for source in mesh.findall("source"):
+        numbers, accessor = source.find("float_array"), source.find("technique_common/accessor")
+        if numbers is not None and accessor is not None:
+            values = np.array((numbers.text or "").split(), dtype=float)
+            stride = int(accessor.get("stride", 1))
+            yield source.get("id"), values[: len(values) // stride * stride].reshape(-1, stride)
+
+
+def _of_triangles(group: Any, corners: list[_Index]) -> list[_Index]:
+    return [one[: len(one) // 3 * 3].reshape(-1, 3) for one in corners]
+
+
+def _of_polygons(group: Any, corners: list[_Index]) -> list[_Index]:
+    return [_fan(one) for one in corners]
+
+
+def _of_polylist(group: Any, corners: list[_Index]) -> list[_Index]:
+    counts = np.array(group.findtext("vcount", "").split(), dtype=np.int64)
+    return [_fan(one) for one in np.split(np.concatenate(corners), np.cumsum(counts)[:-1])]
+
+
+_INDEX_OF = {"triangles": _of_triangles, "polylist": _of_polylist, "polygons": _of_polygons}
+
+
+def _fan(corners: _Index) -> _Index:
     """A polygon's triangles."""
     fan = [[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)]
     return np.array(fan, dtype=np.int64).reshape(-1, 3)

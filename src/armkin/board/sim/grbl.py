@@ -55,6 +55,28 @@ class Block:
 
 
 @dataclass
+class _Line:
+    """A line as it is put together, in capitals, without blanks and comments."""
+
+    text: str = ""
+    comment: str = ""  # what it began with, inside of one
+
+    def take(self, char: str) -> str | None:
+        """One more character; the line, if that ends it."""
+        if char in "\r\n":
+            whole = self.text if self.text or char == "\n" else None
+            self.text = self.comment = ""
+            return whole
+        if self.comment:
+            self.comment = "" if char == ")" and self.comment == "(" else self.comment
+        elif char in "(;":
+            self.comment = char
+        elif char > " " and char != "/":
+            self.text += char.upper()
+        return None
+
+
+@dataclass
 class Grbl(SimulatedTime):
     """The port of a simulated GRBL board."""
 
@@ -83,7 +105,7 @@ class Grbl(SimulatedTime):
             self.steps = [0] * self.axes
         self.modes.reset(power=power, keep=self.hal and not self.settings[384])
         self.state = "Idle"
-        self._rx, self._line, self._comment = deque[int](), "", ""
+        self._rx, self._begun = deque[int](), _Line()
         self._whole: str | None = None  # a line that waits to be carried out
         self._blocks, self._holding = deque[Block](), False
         self.override, self._reports = 100, 0
@@ -110,7 +132,7 @@ class Grbl(SimulatedTime):
         """Go into an alarm: in motion the steps that were lost are not known."""
         self._blocks.clear()
         self._rx.clear()
-        self._whole, self._line, self.state = None, "", "Alarm"
+        self._whole, self._begun.text, self.state = None, "", "Alarm"
         self._say(f"ALARM:{number}")
 
     def _say(self, text: str) -> None:
@@ -150,7 +172,7 @@ class Grbl(SimulatedTime):
         self._blocks = deque(block for block in self._blocks if not block.jog)
         if self.hal:
             self._rx.clear()
-            self._line = self._comment = ""
+            self._begun = _Line()
 
     def _change_feed(self, byte: int) -> None:
         self.override = 100 if byte == 0x90 else min(max(self.override + _FEED[byte], 10), 200)
@@ -207,7 +229,7 @@ class Grbl(SimulatedTime):
             return self._carry_out(self._whole)
         if not self._rx:
             return False
-        self._put_together(chr(self._rx.popleft()))
+        self._whole = self._begun.take(chr(self._rx.popleft()))
         return True
 
     def _carry_out(self, line: str) -> bool:
@@ -219,19 +241,6 @@ class Grbl(SimulatedTime):
         self._whole = None
         self._obey(line)
         return True
-
-    def _put_together(self, char: str) -> None:
-        """One more character of a line, in capitals, without blanks and comments."""
-        if char in "\r\n":
-            if self._line or char == "\n":
-                self._whole = self._line
-            self._line = self._comment = ""
-        elif self._comment:
-            self._comment = "" if char == ")" and self._comment == "(" else self._comment
-        elif char in "(;":
-            self._comment = char
-        elif char > " " and char != "/":
-            self._line += char.upper()
 
     def _obey(self, line: str) -> None:
         error = 11 if len(line) >= _LINE and not self.hal else self._system(line[1:]) if line[:1] == "$" else -2
@@ -253,21 +262,16 @@ class Grbl(SimulatedTime):
             return self._set(int(match[1]), match[2])
         if line == "H":
             return self._home()
-        lines = {"G": self._modes_said, "$": self._settings_said, "I": self._version_said, "#": self.modes.parameters}
-        if line not in lines:
+        said = {
+            "G": [self.modes.said(self.spindle)],
+            "$": [f"${n}={value:.3f}".rstrip("0").rstrip(".") for n, value in sorted(self.settings.items())],
+            "I": _version(self.hal),
+            "#": self.modes.parameters(),
+        }
+        if line not in said:
             return 3
-        self._say("\r\n".join(lines[line]()))
+        self._say("\r\n".join(said[line]))
         return 0
-
-    def _modes_said(self) -> list[str]:
-        return [self.modes.said(self.spindle)]
-
-    def _settings_said(self) -> list[str]:
-        return [f"${n}={value:.3f}".rstrip("0").rstrip(".") for n, value in sorted(self.settings.items())]
-
-    def _version_said(self) -> list[str]:
-        version = "[VER:1.1f.20260817:]" if self.hal else "[VER:1.1h.20190825:]"
-        return [version, f"[OPT:V,{BLOCKS},{RX_BUFFER}]", *(["[FIRMWARE:grblHAL]"] if self.hal else [])]
 
     def _set(self, number: int, text: str) -> int:
         if number not in self.settings:
@@ -344,6 +348,12 @@ def _block(
     most = min(settings[110 + k] / 60 / s for k, s in enumerate(share) if s)
     accel = min(settings[120 + k] / s for k, s in enumerate(share) if s)
     return Block(tuple(start), tuple(end), length, feed, most, accel, jog)
+
+
+def _version(hal: bool) -> list[str]:
+    """The answer to ``$I``."""
+    version = "[VER:1.1f.20260817:]" if hal else "[VER:1.1h.20190825:]"
+    return [version, f"[OPT:V,{BLOCKS},{RX_BUFFER}]", *["[FIRMWARE:grblHAL]"] * hal]
 
 
 def _machine(settings: Mapping[int, float], steps: Sequence[int]) -> list[float]:

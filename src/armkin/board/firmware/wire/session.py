@@ -173,7 +173,7 @@ class Session:
         before, now = self._turn, self.port.now()
         self._turn = now
         self._window.send()
-        if now - self._asked >= self._between_questions(ends):
+        if now - self._asked >= _between_questions(self.line, self._window, ends):
             self._ask()
         self._hear(timeout)
         self.deaf = max(self.deaf, now - before, self.port.now() - now)
@@ -188,16 +188,6 @@ class Session:
             raise _silent(self.port)
         if self._window:
             self._stalled()
-
-    def _between_questions(self, ends: bool) -> float:
-        """Seconds from one question for the status to the next; ends: the queue does."""
-        if self.line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
-            return _POLL
-        # There is room for one question beside the frames; on a bad line the one before may be lost.
-        late = self._window.late and (self.line.damaged or not self.line.unanswered)
-        often = _POLL_NOISY if self.line.damaged else _POLL
-        quick = _POLL_SOON if ends or self._window.out_of_credit or late else often
-        return quick / 2 if self.line.noisy else quick
 
     def _ask(self, page: int = 0, copies: int = 1) -> int:
         self._asked, self._tag = self.port.now(), (self._tag + 1) & 255
@@ -286,6 +276,17 @@ class Session:
             left = self.queued - 1000 * (self.port.now() - self.heard)  # what is queued goes on unheard
             self.pump(ends=not self._window and left < _ENDS)
             yield self.under_way + self.queued / 1000
+
+
+def _between_questions(line: Line, window: Window, ends: bool) -> float:
+    """Seconds from one question for the status to the next; ends: the queue does."""
+    if line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
+        return _POLL
+    # There is room for one question beside the frames; on a bad line the one before may be lost.
+    late = window.late and (line.damaged or not line.unanswered)
+    often = _POLL_NOISY if line.damaged else _POLL
+    quick = _POLL_SOON if ends or window.out_of_credit or late else often
+    return quick / 2 if line.noisy else quick
 
 
 def probe(session: Session) -> None:
