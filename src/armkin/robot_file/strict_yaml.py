@@ -196,40 +196,51 @@ def _path(parent: _Node | None) -> Path:
 
 
 def _build(events: Iterator[Any], kind: Kind) -> Document:
-    lines: dict[Path, int] = {}
-    stack: list[_Node] = []
-    root: Any = None
+    builder = _Builder(kind)
     for event in events:
+        builder.take(event)
+    if builder.root is None:
+        raise StrictYamlError(0, kind.empty)
+    return Document(builder.root, builder.lines)
+
+
+class _Builder:
+    """Puts a document together, event by event."""
+
+    def __init__(self, kind: Kind) -> None:
+        self.kind = kind
+        self.lines: dict[Path, int] = {}
+        self.root: Any = None
+        self._stack: list[_Node] = []
+
+    def take(self, event: Any) -> None:
         line = event.start_mark.line + 1
-        if root is not None:
-            _refuse_another_document(event, line, kind)
+        if isinstance(event, yaml.DocumentStartEvent) and self.root is not None:
+            raise StrictYamlError(line, f"a second document begins here; a {self.kind.name} is one document")
         _refuse_what_unfolds(event, line)
-        parent = stack[-1] if stack else None
+        parent = self._stack[-1] if self._stack else None
         awaits_key = parent is not None and parent.mapping and parent.key is None
         if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
-            _check_place(awaits_key, len(stack), line, kind)
-            stack.append(_Node(_path(parent), isinstance(event, yaml.MappingStartEvent)))
-            lines.setdefault(stack[-1].path, line)
-            continue
-        if isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
-            value = stack.pop().value()
+            _check_place(awaits_key, len(self._stack), line, self.kind)
+            self._stack.append(_Node(_path(parent), isinstance(event, yaml.MappingStartEvent)))
+            self.lines.setdefault(self._stack[-1].path, line)
+        elif isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
+            self._put(self._stack.pop().value(), line)
         elif isinstance(event, yaml.ScalarEvent) and parent is not None and awaits_key:
-            parent.key = _key(event, parent, lines, line)
-            continue
+            parent.key = _key(event, parent, self.lines, line)
         elif isinstance(event, yaml.ScalarEvent):
-            value = _scalar(event, parent, line, kind)
-            lines.setdefault(_path(parent), line)
+            value = _scalar(event, parent, line, self.kind)
+            self.lines.setdefault(_path(parent), line)
+            self._put(value, line)
+
+    def _put(self, value: Any, line: int) -> None:
+        """A value that is complete, where it belongs."""
+        if len(self.lines) > self.kind.values:
+            raise StrictYamlError(line, f"more than {self.kind.values} values; no {self.kind.name} has so many")
+        if self._stack:
+            self._stack[-1].add(value)
         else:
-            continue  # stream and document marks
-        if len(lines) > kind.values:
-            raise StrictYamlError(line, f"more than {kind.values} values; no {kind.name} has so many")
-        if stack:
-            stack[-1].add(value)
-        else:
-            root = _mapping(value, lines, kind)
-    if root is None:
-        raise StrictYamlError(0, kind.empty)
-    return Document(root, lines)
+            self.root = _mapping(value, self.lines, self.kind)
 
 
 def _check_place(awaits_key: bool, depth: int, line: int, kind: Kind) -> None:
@@ -238,11 +249,6 @@ def _check_place(awaits_key: bool, depth: int, line: int, kind: Kind) -> None:
         raise StrictYamlError(line, "a key must be a word, not a list or mapping")
     if depth >= MAX_DEPTH:
         raise StrictYamlError(line, _too_deep(kind))
-
-
-def _refuse_another_document(event: Any, line: int, kind: Kind) -> None:
-    if isinstance(event, yaml.DocumentStartEvent):
-        raise StrictYamlError(line, f"a second document begins here; a {kind.name} is one document")
 
 
 def _refuse_what_unfolds(event: Any, line: int) -> None:

@@ -14,7 +14,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 
 from armkin.board.grbl.replies import RX_BUFFER
 from armkin.board.sim.clock import SimulatedTime
@@ -139,28 +139,19 @@ class Grbl(SimulatedTime):
         self._out += text.encode() + b"\r\n"
 
     def _receive(self, byte: int) -> None:
-        if (act := self._realtime.get(byte)) is not None:
-            act()
+        if (act := _REALTIME.get(byte)) is not None:
+            act(self)
         elif byte < 0x80 and len(self._rx) < RX_BUFFER - 1:
             self._rx.append(byte)
-
-    @cached_property
-    def _realtime(self) -> dict[int, Callable[[], None]]:
-        """Commands of one byte, which act at once."""
-        return {
-            0x18: self._soft_reset,
-            ord("?"): lambda: self._say(self._report()),
-            ord("!"): self._hold,
-            ord("~"): self._resume,
-            0x85: self._cancel_jog,
-            **{byte: partial(self._change_feed, byte) for byte in _FEED},
-        }
 
     def _soft_reset(self) -> None:
         if moving := not self._standing():
             self.alarm(3)
         self.boot(power=False)
         self.state = "Alarm" if moving else "Idle"
+
+    def _tell_state(self) -> None:
+        self._say(self._report())
 
     def _hold(self) -> None:
         self._holding = self._holding or self.state != "Alarm"
@@ -362,3 +353,13 @@ def _machine(settings: Mapping[int, float], steps: Sequence[int]) -> list[float]
 
 def _three(values: Sequence[float]) -> str:
     return ",".join(f"{value:.3f}" for value in values)
+
+
+_REALTIME: dict[int, Callable[[Grbl], None]] = {  # commands of one byte, which act at once
+    0x18: Grbl._soft_reset,
+    ord("?"): Grbl._tell_state,
+    ord("!"): Grbl._hold,
+    ord("~"): Grbl._resume,
+    0x85: Grbl._cancel_jog,
+    **{byte: partial(Grbl._change_feed, byte=byte) for byte in _FEED},
+}

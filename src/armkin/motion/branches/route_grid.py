@@ -78,17 +78,10 @@ def fine_enough(
             every, steps = interval_deviations(arm, route, path, before), _steps(arm, path)
             before = path, every
             off, steps, h = (np.delete(each, path.rests) for each in (every, steps, path.h))
-            coarse = np.sqrt(steps / max(tolerance, _COARSE))  # of second order in h
-            if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
-                coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
-            needed = np.maximum(np.cbrt(off / tolerance), coarse)  # of third order in h
+            needed = _too_long(off, steps, h, tolerance, exact)
             if needed.max() <= 1.0 or len(where) > most:
                 break
-            parts = np.ceil(np.clip(1.15 * needed, 1.0, 6.0)).astype(int)
-            if not exact:  # slopes that neighbours tell want even steps
-                beside = np.maximum(np.append(parts[1:], 1), np.append(1, parts[:-1])) > 2
-                parts = np.maximum(parts, 1 + beside)
-            where, breaks = _divided(where, breaks, parts)
+            where, breaks = _divided(where, breaks, _parts(needed, exact))
         if off.max() <= tolerance:
             break
     return path, every
@@ -135,6 +128,23 @@ def _places(
     fine = route.spans
     inside = np.diff(np.searchsorted(fine, where))
     return _divided(where, begin[1:], np.where(inside > 1, inside + 1, 1))
+
+
+def _too_long(off: Array, steps: Array, h: Array, tolerance: float, exact: bool) -> Array:
+    """How many times too long intervals are, by their distance from the route and the way from their chord (M,)."""
+    coarse = np.sqrt(steps / max(tolerance, _COARSE))  # of second order in h
+    if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
+        coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
+    return np.maximum(np.cbrt(off / tolerance), coarse)  # of third order in h
+
+
+def _parts(needed: Array, exact: bool) -> Int:
+    """Into how many parts each interval is divided, which is `needed` times too long (M,)."""
+    parts: Int = np.ceil(np.clip(1.15 * needed, 1.0, 6.0)).astype(int)
+    if exact:
+        return parts
+    beside = np.maximum(np.append(parts[1:], 1), np.append(1, parts[:-1])) > 2
+    return np.asarray(np.maximum(parts, 1 + beside))  # slopes that neighbours tell want even steps
 
 
 def _graded(where: Array, breaks: Int) -> tuple[Array, Int]:

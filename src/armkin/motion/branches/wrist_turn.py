@@ -8,9 +8,9 @@ the singularity lies within the tolerance, the tip goes there: straight through 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -123,6 +123,25 @@ def _spans(route: Route, s: Array, c: Chain, other: Chain, j: int) -> Iterator[t
             yield a, b
 
 
+def _passed(
+    arm: Arm, route: Route, window: Callable[[int], Window], numbers: range, allowed: tuple[float, float]
+) -> tuple[int, Window] | None:
+    """The widest window that turns the tool by little enough, else one about which the tip goes, and its number.
+
+    window: by its number, the higher the wider; allowed: how far the tool may turn [rad], and its tip go aside [mm].
+    """
+    turn, aside = allowed
+    if turn and (turning := [k for k in numbers if window(k).turned <= turn]):
+        return turning[-1], window(turning[-1])
+    for k in reversed(numbers) if aside else ():
+        around = _around(arm, route, window(k))
+        if around is None or around.aside > aside:  # of a narrower one as well
+            return None
+        if _passes(arm, route, around):
+            return k, around
+    return None
+
+
 def _joined(
     arm: Arm, route: Route, s: Array, c: Chain, other: Chain, j: int, allowed: tuple[float, float]
 ) -> Chain | None:
@@ -133,24 +152,17 @@ def _joined(
     step = change(arm, c.q[j - c.first], other.q[on - other.first])
     if np.abs(step[:3]).max() > _ARM:
         return None
-    turn, aside = allowed
-    best: tuple[int, int, Window] | None = None
     spans = list(_spans(route, s, c, other, j))
-    for a, b in spans if turn else ():
-        one = _window(arm, route, s[[a, b]], c.q[a - c.first], other.q[b - other.first])
-        if one.turned <= turn:
-            best = a, b, one
-    for a, b in reversed(spans) if aside and best is None else ():
-        one = _window(arm, route, s[[a, b]], c.q[a - c.first], other.q[b - other.first])
-        around = _around(arm, route, one)
-        if around is None or around.aside > aside:  # of a narrower one as well
-            break
-        if _passes(arm, route, around):
-            best = a, b, around
-            break
+
+    @cache
+    def window(k: int) -> Window:
+        a, b = spans[k]
+        return _window(arm, route, s[[a, b]], c.q[a - c.first], other.q[b - other.first])
+
+    best = _passed(arm, route, window, range(len(spans)), allowed)
     if best is None:
         return None
-    a, b, one = best
+    (a, b), one = spans[best[0]], best[1]
     inside = _within(arm, route, one, s[a + 1 : b])
     offset = one.q[1] - other.q[b - other.first]
     q = np.concatenate([c.q[: a + 1 - c.first], inside, other.q[b - other.first :] + offset])

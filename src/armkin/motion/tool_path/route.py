@@ -133,7 +133,9 @@ class Reduced:
     became: float = np.inf
 
     def note(self, wished: float, became: float) -> None:
-        """Count one."""
+        """Count a blend, if it became smaller."""
+        if became >= wished * (1 - 1e-9):
+            return
         self.count += 1
         if became < self.became:
             self.wished, self.became = wished, became
@@ -153,6 +155,7 @@ def joined(
     the arm has to stand in any case. Returns the route, and for each of them the number of the piece in it; blends
     that do not fit are made smaller, and noted in `reduced`.
     """
+    reduced = Reduced() if reduced is None else reduced
     made: list[Piece] = []
     side = 0.0  # of the last piece, before it was cut
     stops, order = {0}, {}
@@ -163,32 +166,42 @@ def joined(
             rests.add(len(made))
         if piece.length < SMALL:
             continue
-        if not made or order.get(k) == len(made) or len(made) in rests:
+        if not made or len(made) in rests:
             stops.add(len(made))
             made.append(piece)
             side = piece.length
             continue
-        before = made[-1]
-        a, b = before.direction(before.length), piece.direction(0.0)
-        angle = float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1, 1)))
-        wish = blends[k - 1]
-        # a cubic blend passes its corner at r |a - b| / 4
-        radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wish is None else wish
+        before, wish = made[-1], blends[k - 1]
+        angle = _angle(before, piece)
         if angle < _SMOOTH:
             made.append(piece)
-        elif radius <= 0 or angle > (REVERSAL if wish is None else np.pi - _SMOOTH) or not both_move(before, piece):
+        elif (radius := _blend_radius(before, piece, angle, wish, tolerance)) <= 0:
             stops.add(len(made))
             made.append(piece)
         else:
-            first, middle, last, radius = blend(task, before, piece, radius, side)
-            if reduced is not None and wish is not None and radius < wish * (1 - 1e-9):
-                reduced.note(wish, radius)
+            first, middle, last, found = blend(task, before, piece, radius, side)
             if wish is None:
                 middle = replace(middle, dense=_passing(middle, piece.first.p))
+            else:
+                reduced.note(wish, found)
             made[-1:] = [p for p in (first, middle, last) if p is last or p.length > SMALL]
         side = piece.length
     stops.add(len(made))
     return Route(task, tuple(made), frozenset(stops)), order
+
+
+def _angle(before: Piece, piece: Piece) -> float:
+    """The angle of the corner between two pieces [rad], 0 for none."""
+    a, b = before.direction(before.length), piece.direction(0.0)
+    return float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1, 1)))
+
+
+def _blend_radius(before: Piece, piece: Piece, angle: float, wish: float | None, tolerance: float) -> float:
+    """The radius of a corner's blend [mm]; 0: none, and the arm rests there. wish: see `joined`'s blends."""
+    # a cubic blend passes its corner at r |a - b| / 4
+    radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wish is None else wish
+    sharpest = REVERSAL if wish is None else np.pi - _SMOOTH
+    return radius if radius > 0 and angle <= sharpest and both_move(before, piece) else 0.0
 
 
 def _passing(piece: Piece, corner: Array) -> Dense:
