@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 import armkin
+from armkin.inverse.numeric import newton
+from armkin.inverse.tasks.choose_task import task_for
 
 FOLDED = [
     ([60, 60, -120, 180, -150, 180, 0], 2),
@@ -62,3 +64,43 @@ def test_an_arm_that_stands_on_a_surface_stays() -> None:
     assert s.valid.sum() == 1
     assert s.best == 0
     assert (s.q[0] == posture[:6]).all()
+
+
+def _rounded(target: np.ndarray, seed: int, digit: float) -> np.ndarray:
+    """A target with other last digits."""
+    target[:3] += np.random.default_rng(seed).uniform(-1, 1, (3, 4)) * [digit, digit, digit, 2e-13]
+    return target
+
+
+@pytest.mark.parametrize("seed", [24, 39, 72])
+def test_where_surfaces_meet_rounding_does_not_choose_how_many_are_listed(seed: int) -> None:
+    """All axes in two lines at right angles: three directions are lost; one row, and complete, of these roundings."""
+    rest = armkin.lock(armkin.load("iiwa7"), {"J7": 0.0})
+    s = armkin.ik(rest, _rounded(armkin.fk(rest, np.deg2rad([-90, -180, 180, 180, -90, 180])), seed, 2e-16))
+    z1, z2, z3, _, _, z6 = np.moveaxis(armkin.jacobian(rest, s.q[s.valid])[:, 3:], 2, 0)
+    along = np.stack([(z3 * z1).sum(axis=1), -(z3 * z1).sum(axis=1), (z2 * z6).sum(axis=1), -(z2 * z6).sum(axis=1)])
+    assert sorted(along.argmax(axis=0)) == [0, 1, 2, 3]
+    assert not s.complete
+
+
+def test_a_surface_that_goes_through_limits_is_listed_within() -> None:
+    """Many starts come to postures of it outside limits, all but as exact; nearer ones are within."""
+    arm, posture = armkin.load("iiwa7"), np.deg2rad([90.0, 0, 90, 0, 90, 0, -129.50000000000003])
+    rest = armkin.lock(arm, {"J7": posture[6]})
+    s = armkin.ik(rest, armkin.fk(rest, posture[:6]))
+    assert s.valid.sum() == 1
+    assert s.best == 0
+    np.testing.assert_allclose(np.abs(s.q[0]).sum(), np.pi / 2, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", [56, 59, 143])
+def test_a_joint_that_rests_on_a_surface_at_a_double_root_is_not_free(seed: int) -> None:
+    """A Thor stretched along joint 1: from 4,000 random starts joints 1, 4 and 6 alone come to different values."""
+    arm = armkin.load("thor")
+    target = armkin.fk(arm, np.deg2rad([90.0, 0, -180, 135, 0, 135]))
+    s = armkin.ik(arm, _rounded(target, seed, 3e-16))
+    starts = np.random.default_rng(1).uniform(-np.pi, np.pi, (4000, 6))
+    found, size = newton.correct(arm, task_for(arm, None), starts, np.tile(target, (4000, 1, 1)), steps=60)
+    solved = newton.difference(arm, found[size < 1e-12], np.deg2rad([0.0, 0, -180, 0, 0, 0]))
+    assert len(solved) > 500
+    assert s.free.tolist() == (np.abs(solved).max(axis=0) > 0.1).tolist() == [True, False, False, True, False, True]

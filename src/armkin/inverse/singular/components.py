@@ -311,7 +311,7 @@ class _Groups:
         while self.open.any():
             k = np.flatnonzero(self.open.any(axis=1))
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
-        arm, task, target, _ = self.goals
+        arm, task, target, near = self.goals
         q, sigma, chosen, each = self.at.q, self.lost.sigma, self.chosen, np.arange(len(self.open))[:, None]
         # also beside a self-motion: a root of high order
         moving = np.asarray(self.curve.any(axis=2))
@@ -320,7 +320,8 @@ class _Groups:
         if len(rows):
             at, kept, curve = q[rows], chosen[rows], self.curve[rows]
             self_motions.drop_contained(arm, task, at, sigma[rows], self.resting[rows], kept, curve, target[rows])
-            self_motions.drop_twins(arm, task, at, kept, curve, self.ended[rows], self.tube[rows], target[rows])
+            ended, tube = self.ended[rows], self.tube[rows]
+            self_motions.drop_twins(arm, task, at, near[rows], kept, curve, ended, tube, target[rows])
             chosen[rows] = kept
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
         there = chosen[each, order]
@@ -329,7 +330,8 @@ class _Groups:
         status[self.singular] = Status.SINGULAR
         surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity > 1) & self.curve.any(axis=2))
         if len(k):
-            surface[k[self_motions.on_surface(arm, task, q[k, b], self.lost.V[k, b], target[k])]] = True
+            lost = self.lost.V[k, b], self.lost.nullity[k, b]
+            surface[k[self_motions.on_surface(arm, task, q[k, b], *lost, target[k])]] = True
         return Examined(
             np.where(there[:, :, None], q[each, order], np.nan),
             there,

@@ -135,7 +135,7 @@ def _steps_out(
     """
     known, who, push = _tangents(arm, task, q, at, nullity, target)
     rests, open_ = known.copy(), np.flatnonzero(~known)
-    rests[open_] = ~on_surface(arm, task, q[open_], at.V[open_], target[open_])
+    rests[open_] = ~on_surface(arm, task, q[open_], at.V[open_], nullity[open_], target[open_])
     rows = open_[rests[open_]]
     if len(rows):
         others, further = null_directions(arm.n, at.V[rows], nullity[rows])

@@ -96,9 +96,10 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
 
 
 def drop_twins(
-    arm: Arm, task: Task, q: Array, chosen: Bool, curve: Bool, ended: Bool, tube: Array, target: Array
+    arm: Arm, task: Task, q: Array, near: Array, chosen: Bool, curve: Bool, ended: Bool, tube: Array, target: Array
 ) -> None:
-    """Keep one of chosen postures (K, M) of self-motions that turn out to be the same: change chosen.
+    """Of chosen postures (K, M) of self-motions that turn out to be the same keep that nearest to near (K, n): change
+    chosen.
 
     curve: (K, M, n) the joints that a posture's self-motion moves; ended: (K, M) those of which both ends are known,
     and all that is between; tube: (K, M) how far postures may be off their curve. One group's posture may be close to
@@ -129,8 +130,12 @@ def drop_twins(
         joints = curve[k[left], i[left]] | (size[left] > SAME)
         there, asked = (at[left] + apart[left] * unit)[:, None], np.ones((len(left), 1), bool)
         same[left] = circuits.on_one(arm, task, at[left], joints, there, asked, target[k[left]])[:, 0]
-    for row, one, other in zip(k[same], i[same], j[same], strict=True):
-        chosen[row, one] &= not chosen[row, other]
+    k, i, j = k[same], i[same], j[same]
+    motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
+    nearer = motion[k, i] < motion[k, j] - SAME
+    i, j = np.where(nearer, j, i), np.where(nearer, i, j)
+    for p in np.argsort(motion[k, i], kind="stable"):
+        chosen[k[p], i[p]] &= not chosen[k[p], j[p]]
 
 
 def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool:
@@ -162,9 +167,9 @@ def _both_ways(arm: Arm, way: Array) -> Array:
     return ways
 
 
-def follow(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
+def follow(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tuple[Array, Array]:
     """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
-    return newton.correct(arm, task, q, target, steps=6, least=WEAK, patience=1, stalled=STALLED)
+    return newton.correct(arm, task, q, target, steps=steps, least=WEAK, patience=1, stalled=STALLED)
 
 
 def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Array, Array, Array]:
@@ -214,10 +219,11 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     if not len(some):
         return moving, joints
     who, push, several = who[some], push[some], several[some]
-    # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n)
+    # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n); a joint that
+    # rests at a double root comes half the way back in each
     ways = np.multiply.outer(STEPS[:, 0], [[1.0, 0.6], [-1.0, -0.6]])[..., None, None]
     start = q[who] + ways * push * unit
-    there, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[who]] * 8))
+    there, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[who]] * 8), steps=20)
     away, size = (there.reshape(start.shape)[:, :, 0] - q[who]) / unit, size.reshape(start.shape[:4])
     grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[who]  # (2, m)
     short, long = (grown <= GROWTH * STEPS) & _apart(away, push)
@@ -229,16 +235,23 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     return moving, joints
 
 
-def on_surface(arm: Arm, task: Task, q: Array, V: Array, target: Array) -> Bool:
+def on_surface(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> Bool:
     """Which postures (M, n) that lose two directions still do a long step off, by both ways at once: (M,).
 
-    Those lie on a self-motion of two dimensions, or on one of double roots. V: (M, n, n) right singular vectors.
+    Those lie on a self-motion of two dimensions, or on one of double roots. V: (M, n, n) right singular vectors. Where
+    more directions are lost surfaces meet, and rounding chooses the vectors: there any of `null_directions` tells.
     """
-    push = (V[:, arm.n - 1] + 0.7 * V[:, arm.n - 2]) * 10 * STEP
-    there, size = follow(arm, task, q + push * radian_or_reach(arm), target)
-    nullity = newton.null_space(arm, task, there, target)[2]
-    away = np.abs(newton.difference(arm, there, q)).max(axis=1)
-    return np.asarray((size <= SOLUTION) & (nullity > 1) & (away > 3 * STEP))
+    two, more = np.flatnonzero(nullity < 3), np.flatnonzero(nullity > 2)
+    who, push = two, V[two, arm.n - 1] + 0.7 * V[two, arm.n - 2]
+    if len(more):
+        others, further = null_directions(arm.n, V[more], nullity[more])
+        who, push = np.concatenate([who, more[others]]), np.concatenate([push, further])
+    there, size = follow(arm, task, q[who] + 10 * STEP * push * radian_or_reach(arm), target[who])
+    lost = newton.null_space(arm, task, there, target[who])[2]
+    away = np.abs(newton.difference(arm, there, q[who])).max(axis=1)
+    out = np.zeros(len(q), bool)
+    np.logical_or.at(out, who, (size <= SOLUTION) & (lost > 1) & (away > 3 * STEP))
+    return out
 
 
 def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
