@@ -95,24 +95,29 @@ class Done(NamedTuple):
         return {"input": self.input, "heading": self.heading, "near": self.near, **asdict(self.tally)}
 
 
+def _well_formed(piece: Piece, malformed: list[UsageError]) -> Iterator[Chunk]:
+    """The rows of a piece up to a malformed one, what is wrong with which is appended."""
+    try:
+        yield from parsed(piece)
+    except UsageError as error:
+        malformed.append(error)
+
+
+def _encoder(job: Job) -> Callable[[Table], bytes]:
+    """What makes bytes of a table."""
+    format = format_of(f"x{job.format}")
+    if not (job.compiled and format.is_text):
+        return format.encoded
+    from armkin.compiled.table_lines import lines
+
+    return partial(format.encoded, lines=lines)
+
+
 def work(job: Job, piece: Piece) -> Done:
     """Answer one piece of the input: a pure function, wherever it runs."""
-    tally, data, heading, problem = Tally(), [], [], None
-    format = format_of(f"x{job.format}")
-    encoded = format.encoded
-    if job.compiled and format.is_text:
-        from armkin.compiled.table_lines import lines
-
-        encoded = partial(encoded, lines=lines)
-    rows = parsed(piece)
-    while True:
-        try:
-            chunk = next(rows, None)
-        except UsageError as error:
-            problem = error
-            break
-        if chunk is None:
-            break
+    tally, data, heading = Tally(), list[bytes](), list[str]()
+    encoded, malformed = _encoder(job), list[UsageError]()
+    for chunk in _well_formed(piece, malformed):
         if job.as_json:
             data.append(_lines(job.questions, chunk, tally))
         else:
@@ -120,6 +125,7 @@ def work(job: Job, piece: Piece) -> Done:
             heading = list(table)
             _count(tally, chunk, good)
             data.append(encoded(table))
+    problem = malformed[0] if malformed else None
     if piece.columns is not None:
         tally.skipped = piece.columns.skipped
     elif piece.values is not None and problem is None:

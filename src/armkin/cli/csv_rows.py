@@ -60,16 +60,20 @@ class Columns:
             if self._read_heading(cells):
                 return None
         if self.places is not None:
-            if len(cells) != len(self.heading):
-                have, want = len(cells), len(self.heading)
-                raise UsageError(f"has {have} cell{'s' * (have != 1)}, the heading has {want}")
-            cells = [cells[i] for i in self.places]
+            cells = self._chosen(cells, self.places)
             if not any(cells) and len(self.heading) > len(self.names):
                 self.skipped += 1
                 return None
         elif len(cells) == 1 and len(self.names) > 1:
             self._check_separator(text)
         return numbers(cells, self.names, self.what)
+
+    def _chosen(self, cells: list[str], places: list[int]) -> list[str]:
+        """The cells of the columns, of a row below a heading."""
+        if len(cells) != len(self.heading):
+            have, want = len(cells), len(self.heading)
+            raise UsageError(f"has {have} cell{'s' * (have != 1)}, the heading has {want}")
+        return [cells[i] for i in places]
 
     def _check_separator(self, text: str) -> None:
         """Raise UsageError for several numbers that something else than commas separates."""

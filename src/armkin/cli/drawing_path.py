@@ -8,7 +8,7 @@ import typer
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.number_parsing import number, place
+from armkin.cli.number_parsing import LARGEST, number, place
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -54,17 +54,19 @@ def moves(
     if grip_by not in (None, "M3", "M106"):
         raise UsageError(f"--grip-by: '{grip_by}' is neither M3 nor M106")
     zero = place(at, "--at")
-    factor = 1.0 if scale is None else number(scale, "--scale")
-    if not 1e-6 <= factor <= 1e6:
-        raise UsageError(f"--scale: '{scale}' must be from 1e-6 to 1e6")
-    speed = None if feed is None else number(feed, "--feed")
-    if speed is not None and speed < 1e-3:
-        raise UsageError(f"--feed: '{feed}' must be at least 0.001")
-    height = 5.0 if lift is None else number(lift, "--lift")
-    if height < 0:
-        raise UsageError(f"--lift: '{lift}' must be at least 0")
+    factor = 1.0 if scale is None else _bounded(scale, "--scale", (1e-6, 1e6), "from 1e-6 to 1e6")
+    speed = None if feed is None else _bounded(feed, "--feed", (1e-3, LARGEST), "at least 0.001")
+    height = 5.0 if lift is None else _bounded(lift, "--lift", (0.0, LARGEST), "at least 0")
     files.keep(file)
     made = drawing(arm, file, zero, task=task, scale=factor, feed=speed, lift=height, grip_by=grip_by)
     for text in made.notes:
         output.note(text)
     return made
+
+
+def _bounded(text: str, option: str, bounds: tuple[float, float], allowed: str) -> float:
+    """A number within bounds; allowed: these in words."""
+    value = number(text, option)
+    if not bounds[0] <= value <= bounds[1]:
+        raise UsageError(f"{option}: '{text}' must be {allowed}")
+    return value

@@ -102,11 +102,11 @@ def _why_not(plain: str, shown: str) -> str:
         return "a number is missing"
     if bare in NOT_FINITE:
         return f"'{shown}' is not finite; give a number"
-    if bare.endswith("%") and _NUMBER.fullmatch(bare.removesuffix("%").strip()):
-        return f"'{shown}': write {plain[:-1].strip()}, without a sign for its unit"
-    for unit in ("mm", "degrees", "deg", "\u00b0"):
+    for unit in ("mm", "degrees", "deg", "\u00b0", "%"):
         if bare.endswith(unit) and _NUMBER.fullmatch(bare.removesuffix(unit).strip()):
-            return f"'{shown}': units are fixed (mm, degrees); write {plain[: -len(unit)].strip()}"
+            value = plain[: -len(unit)].strip()
+            fixed = f"units are fixed (mm, degrees); write {value}"
+            return f"'{shown}': {f'write {value}, without a sign for its unit' if unit == '%' else fixed}"
     if (angle := of_pi(plain)) is not None:
         return f"'{shown}': angles are degrees; write {angle:.10g}"
     if _NUMBER.fullmatch(plain.rstrip(",")):

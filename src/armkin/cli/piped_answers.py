@@ -54,22 +54,28 @@ def read(robot: str | None) -> Piped:
         raise UsageError("nothing to send: standard input is empty (did the command before the pipe fail?)")
     answers = [_parsed(part) for part in _parts(text)]
     first = answers[0]
-    for answer in answers:
-        if (answer["robot_file"], answer["robot_sha256"]) != (first["robot_file"], first["robot_sha256"]):
-            raise UsageError("the answers on standard input are of different robot files: send one at a time")
+    _check_alike(answers, "robot files", "robot_file", "robot_sha256")
     if robot is not None and robot != first["robot_file"]:
         raise UsageError(f"{robot} is not {first['robot_file']}, the robot file of the answer on standard input")
-    scenes = {(answer.get("scene"), answer.get("scene_sha256")) for answer in answers}
-    if len(scenes) > 1:
-        raise UsageError("the answers on standard input are of different scenes: send one at a time")
-    tool = first.get("tool")
-    if any(answer.get("tool") != tool for answer in answers):
-        raise UsageError("the answers on standard input are of different tools: send one at a time")
+    _check_alike(answers, "scenes", "scene", "scene_sha256")
+    _check_alike(answers, "tools", "tool")
     poses = [_pose(answer) for answer in answers]
-    if tool is not None and not (isinstance(tool, dict) and all(isinstance(tool.get(key), list) for key in _TOOL)):
+    scene = first.get("scene"), first.get("scene_sha256")
+    return Piped(first["robot_file"], first["robot_sha256"], poses, *scene, _tool(first.get("tool")))
+
+
+def _check_alike(answers: Sequence[dict[str, Any]], what: str, *keys: str) -> None:
+    if any(answer.get(key) != answers[0].get(key) for answer in answers for key in keys):
+        raise UsageError(f"the answers on standard input are of different {what}: send one at a time")
+
+
+def _tool(tool: Any) -> list[float] | None:
+    """An answer's tool as six numbers [mm, deg]."""
+    if tool is None:
+        return None
+    if not (isinstance(tool, dict) and all(isinstance(tool.get(key), list) for key in _TOOL)):
         raise UsageError("the answer on standard input is damaged: its tool is no xyz and rpy")
-    tool = None if tool is None else [number for key in _TOOL for number in _numbers(tool[key])]
-    return Piped(first["robot_file"], first["robot_sha256"], poses, *scenes.pop(), tool)
+    return [number for key in _TOOL for number in _numbers(tool[key])]
 
 
 def poses(

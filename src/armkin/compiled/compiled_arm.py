@@ -191,10 +191,13 @@ class _CompiledTask:
         if not self.branches:
             return self._without_a_form(targets, near, said)
         alone = self._single is not None and said is None
-        if alone and type(targets) is np.ndarray and targets.shape == self.goal_shape:
-            found = self._alone(targets, near)
-            if found is not None:
-                return found
+        if (
+            alone
+            and type(targets) is np.ndarray
+            and targets.shape == self.goal_shape
+            and (found := self._alone(targets, near)) is not None
+        ):
+            return found
         if self.turned is not self.arm:
             return self._commanded(targets, near, workers, said)
         given = arrays.real(targets, "targets")

@@ -58,8 +58,6 @@ def calibrate(
     """
     import numpy as np
 
-    import armkin
-
     if suggest is None:
         output.check(out, "a robot file is", ".yaml", ".yml")
     else:
@@ -80,11 +78,7 @@ def calibrate(
         raise UsageError(
             f"a CSV file with columns {','.join(names)} is missing; --suggest 30 says which poses to measure"
         )
-    q, tips = units.joints_in(arm, rows[:, : arm.n]), rows[:, arm.n :]
-    if poses:
-        tips = targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)
-    with output.progress("fits") as tick:
-        found = armkin.calibrate(arm, q, tips, fix=kinds, tick=tick)
+    found = _fitted(arm, rows, kinds, poses)
     if out is not None:
         with output.destination(out) as write:
             write(_file(found, arm))
@@ -95,6 +89,17 @@ def calibrate(
         output.note(f"not corrected: {line}")
     if out is None:
         output.note("--out NEW.yaml writes the corrected robot file")
+
+
+def _fitted(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Calibration:
+    """What rows (N, n + 3) or, with `poses`, (N, n + 6) [deg | mm] tell of the arm; kinds: left as they are."""
+    import armkin
+
+    q, tips = units.joints_in(arm, rows[:, : arm.n]), rows[:, arm.n :]
+    if poses:
+        tips = targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)
+    with output.progress("fits") as tick:
+        return armkin.calibrate(arm, q, tips, fix=kinds, tick=tick)
 
 
 def _file(found: Calibration, arm: Arm) -> str:

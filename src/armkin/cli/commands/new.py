@@ -134,16 +134,19 @@ def _options(words: Sequence[str]) -> list[dict[str, str]]:
     return table
 
 
-def _csv(source: str) -> list[dict[str, str]]:
+def _text_of(source: str) -> str:
+    """The text of a file, or of standard input for "-"."""
     try:
         if source == "-":
-            text = arguments.standard_input(_LARGEST_FILE).decode("utf-8-sig")
-        else:
-            with open(source, encoding="utf-8-sig") as file:
-                text = file.read(_LARGEST_FILE)
+            return arguments.standard_input(_LARGEST_FILE).decode("utf-8-sig")
+        with open(source, encoding="utf-8-sig") as file:
+            return file.read(_LARGEST_FILE)
     except (OSError, ValueError) as error:
         raise FileError(f"{source}: cannot read: {getattr(error, 'strerror', None) or error}", file=source) from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+
+
+def _csv(source: str) -> list[dict[str, str]]:
+    lines = [line for line in _text_of(source).splitlines() if line.strip() and not line.lstrip().startswith("#")]
     try:
         rows = [[cell.strip() for cell in row] for row in csv.reader(lines, skipinitialspace=True)]
     except csv.Error as error:

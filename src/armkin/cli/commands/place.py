@@ -59,18 +59,12 @@ def place(
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")
     arms = [arguments.load(word) for word in words[:-1]]
-    settings: dict[str, Any] = {"step": number(step, "--step"), "z": number(z, "--z")}
-    turn = number(yaw, "--yaw")
-    if settings["step"] <= 0 or turn <= 0:
-        raise UsageError("--step and --yaw must be above 0")
-    bounds = None if area is None else comma_separated(area, ("xmin", "xmax", "ymin", "ymax"), "--area")
+    settings = _settings(step, z, yaw, area)
     from armkin.engines.run import Engine
     from armkin.inverse.solve import ik
-    from armkin.model.units import DEGREE
     from armkin.reachability.place_file import write
     from armkin.reachability.place_search import each
 
-    settings |= {"area": bounds, "yaw": turn * DEGREE}
     targets = [_targets(arm, words[-1]) for arm in arms] if not _is_path(words[-1]) else [words[-1]] * len(arms)
     for arm in arms if compiled else ():
         compiled_ik.prepare(arm)
@@ -92,6 +86,17 @@ def place(
             output.warn(f"the path is not planned from there: {one.unplanned}")
     if not any(one.reach_all for one in found):
         raise _no_place(found, "points of the path on one branch" if _is_path(words[-1]) else "targets")
+
+
+def _settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, Any]:
+    """The grid of places: mm, and radians of yaw."""
+    size, height, turn = number(step, "--step"), number(z, "--z"), number(yaw, "--yaw")
+    if size <= 0 or turn <= 0:
+        raise UsageError("--step and --yaw must be above 0")
+    bounds = None if area is None else comma_separated(area, ("xmin", "xmax", "ymin", "ymax"), "--area")
+    from armkin.model.units import DEGREE
+
+    return {"step": size, "z": height, "area": bounds, "yaw": turn * DEGREE}
 
 
 def _no_place(found: Sequence[Place], what: str) -> NoSolutionError:

@@ -61,16 +61,7 @@ def plot(
     In one pose, in all branches of a target, or along a path. Takes what fk, ik and pulses print with --json
     from a pipe, too.
     """
-    from armkin.plot import canvas
-
-    if out is not None:
-        canvas.check(out)
-    else:
-        try:
-            canvas.windows()  # says at once that there is no display
-        except UsageError as error:
-            raise UsageError(error.message, advice="for example -o arm.png") from None
-    canvas.require()
+    _check_canvas(out)
     if target is None and (task is not None or lock):
         raise UsageError("--task and --lock belong to --target")
     style: dict[str, Any] = {"frames": frames, "view": None if view is None else _eye(view)}
@@ -88,6 +79,20 @@ def plot(
         _path(arm, _poses(arm, batch), out, **style)
     else:
         _pose(arm, arguments.joints(arm, q), out, **style)
+
+
+def _check_canvas(out: str | None) -> None:
+    """Raise an error for a file that no picture is, or without one where no window can be opened."""
+    from armkin.plot import canvas
+
+    if out is not None:
+        canvas.check(out)
+    else:
+        try:
+            canvas.windows()
+        except UsageError as error:
+            raise UsageError(error.message, advice="for example -o arm.png") from None
+    canvas.require()
 
 
 def _pose(arm: Arm, values: list[float], out: str | None, **style: Any) -> None:
