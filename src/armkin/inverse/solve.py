@@ -98,7 +98,7 @@ def ik(
     return answered(arm, *solver(arm, task), values, near, single, examine, workers, rounding)
 
 
-def answered(
+def answered(  # noqa: C901 - what is looked at after the closed form, in its order
     arm: Arm,
     definition: Task,
     geometry: Geometry,

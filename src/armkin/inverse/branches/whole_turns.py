@@ -25,7 +25,7 @@ HALF = np.pi + SLACK  # how far above `near` a copy may be
 MOST = 50_000  # copies of one branch that `turns` gives
 
 
-def nearest_copy(
+def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in the cache
     value: Array, near: Array | float, lower: float, upper: float, slides: bool = False
 ) -> tuple[Array, Truth]:
     """The copy of a joint's values, modulo whole turns, that is legal and nearest; one that slides has no copies.

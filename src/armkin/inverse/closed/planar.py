@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Doubt]]
 
 
-def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+def recognise(  # noqa: C901 - the closed form is a function in it
+    arm: Arm, task: Task, tolerance: float = EXACT
+) -> Geometry | None:
     """Planar and SCARA arms with as many joints as constraints."""
     if task.name not in ("xy", "xy_theta", "xyz_yaw") or arm.n != task.constraints:
         return None

@@ -47,7 +47,7 @@ class Solved(NamedTuple):
     left: NDArray[np.intp]
 
 
-def solve(
+def solve(  # noqa: C901 - one pass over a batch's arrays
     arm: Arm,
     task: Task,
     geometry: Geometry,
@@ -109,7 +109,7 @@ def solve(
     return Solved(out, math.prod(runner.axes), target, rounding, edge)
 
 
-def _keep(
+def _keep(  # noqa: C901 - one pass over a chunk's arrays
     goals: Goals,
     axes: tuple[int, ...],
     part: Batch,
