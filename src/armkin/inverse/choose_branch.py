@@ -12,11 +12,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from armkin.errors import NoBranchError, NoSolutionError, UsageError
+from armkin.formula.arrays import Array
 from armkin.forward import fk
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.closest import closest_each as nearest_poses
@@ -31,11 +32,8 @@ from armkin.inverse.redundant.position_first import closest_each as nearest_posi
 from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits, hits_text
 from armkin.model import limits, units
+from armkin.model.arm import Arm
 from armkin.model.lock import unlock
-
-if TYPE_CHECKING:
-    from armkin.formula.arrays import Array
-    from armkin.model.arm import Arm
 
 MOST_SWEEPS = 10_000  # combinations of swept values that are tried
 _RANKS = Status.EXACT, Status.BOUNDARY, Status.SINGULAR, Status.POSITION, Status.UNREACHABLE  # the best first

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,10 +38,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task, around, distance, read_near, read_targets, shaped
-from armkin.model.arm import actual
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm, actual
 
 WORTH = 256  # poses of an elimination that are worth a thread, and of which its own chunks are
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,8 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.formula.rows import widened
 from armkin.inverse.branches.whole_turns import nearest_row
-
-if TYPE_CHECKING:
-    from armkin.inverse.tasks.task import Task
-    from armkin.model.arm import Arm
-
+from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 
 OWN = -1  # label of a posture that comes from `near`
 

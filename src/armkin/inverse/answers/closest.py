@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,10 +30,8 @@ from armkin.inverse.numeric.tolerances import (
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_targets, targets_of
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 POOL = 4000  # postures within limits of which each target starts from the nearest
 STARTS = 14  # of them

@@ -6,7 +6,7 @@ singular posture the exact answer to that one is far away: docs/solution.md, "Ro
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,13 +15,8 @@ from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, FLOAT32, SOLUTION
-from armkin.inverse.tasks.task import ROUNDED
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from armkin.inverse.tasks.task import Task
-    from armkin.model.arm import Arm
+from armkin.inverse.tasks.task import ROUNDED, Task
+from armkin.model.arm import Arm
 
 # A rotation's defect is the symmetric part of its error, what `near` misses the antisymmetric one, of the same size:
 # the defect of nine rounded entries is less than a quarter of it in one case of 100,000, of a turn about one of the

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,7 @@ from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.keep_out.clearance import clear
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 
 class Status(IntEnum):

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 from functools import lru_cache
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
@@ -25,17 +25,14 @@ from armkin.errors import UsageError
 from armkin.formula import pose
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
+from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import NAMED, NO_LENGTH, SOLUTION
-from armkin.inverse.tasks.task import targets_of
+from armkin.inverse.tasks.task import Task, targets_of
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain, axes
 from armkin.model.rotation import joint_motion
-
-if TYPE_CHECKING:
-    from armkin.inverse.closed.geometry import Geometry
-    from armkin.inverse.tasks.task import Task
-    from armkin.model.arm import Arm
 
 WORDS = {"shoulder": ("left", "right"), "elbow": ("elbow up", "elbow down"), "wrist": ("no flip", "flip")}
 # what people also say, for `find`

@@ -7,17 +7,13 @@ that has moved least, as long as the targets are so close that this is beyond do
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.task import Task
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 Int = NDArray[np.int64]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +13,8 @@ from armkin.formula.arrays import Array, Truth, wrapped
 from armkin.formula.shapes import Joints
 from armkin.forward import one_pose
 from armkin.inverse.numeric.tolerances import EQUAL
-from armkin.model.arm import actual
+from armkin.model.arm import Arm, actual
 from armkin.model.limits import SLACK
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 TURN = 2 * np.pi
 HALF = np.pi + SLACK  # how far above `near` a copy may be

@@ -20,7 +20,6 @@ the loop is a planar arm of three joints, or a wrist: 8 branches.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,11 +45,9 @@ from armkin.inverse.closed.three_link import ThreeLink
 from armkin.inverse.closed.wrist import Wrist, meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, LOOSE, LOOSE_DOUBLE, NEAR, NO_SIZE
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse, shrunk
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:

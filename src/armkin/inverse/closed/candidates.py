@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +19,7 @@ from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, ROUNDING, SEED, SHAKE, TURNED
 from armkin.inverse.tasks.task import Task, moved
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
+from armkin.model.arm import Arm
 
 FEW = 8  # targets that plain Python does sooner than arrays
 FREED = 24  # values tried for joints that a target leaves free

@@ -7,18 +7,14 @@ the Jacobian bordered by its null vectors (Keller, Numerical solution of bifurca
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import RATHER, SAME, SEED
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 MEETING = 0.1  # second smallest singular value, at the steps, from which on no two self-motions meet near there
 MOST = 12  # places looked at for each target

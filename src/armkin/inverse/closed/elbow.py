@@ -8,7 +8,6 @@ al., Robotics, 2.12.2 and 2.12.4).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,11 +17,9 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, distance2, linear, rotation_between, spin
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, PARALLEL, ROUNDING
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain, is_parallel
 from armkin.model.rotation import FLIP, inverse
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 
 class Elbow:

@@ -7,7 +7,7 @@ angle there keeps its sign on each (Grashof 1883; Chiang, Kinematics of Spherica
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,7 @@ from armkin.formula.arrays import Array, Bool, cross_rows
 from armkin.forward import jacobian
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import NEAR, NO_AREA, PARALLEL, SAME, SOLUTION, TINY
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
+from armkin.model.arm import Arm
 
 Int = NDArray[np.int64]
 

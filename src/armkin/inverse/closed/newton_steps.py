@@ -8,7 +8,7 @@ What the seeds leave open is a doubt, for which other ways are taken.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
@@ -19,13 +19,9 @@ from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, spin
 from armkin.inverse.numeric.tolerances import APART_ROOTS, LAST_ERROR, NO_DETERMINANT, NO_SIZE
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.rotation import joint_motion, rotation_about
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from armkin.model.arm import Arm
 
 MOST = 5  # steps
 SLOPE = 48.0  # error of the first step per distance from the class, where the arm is not near a singularity

@@ -9,7 +9,6 @@ two joints remain, which are a `Position` problem with a virtual slide along z f
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +20,9 @@ from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric.tolerances import EXACT, NO_AREA
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain, axes, reverse
 from armkin.model.rotation import FLIP, inverse
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Doubt]]
 

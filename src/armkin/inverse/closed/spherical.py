@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,12 +22,9 @@ from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.closed.wrist import Wrist, meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
 
 Place = Callable[..., tuple[list[Pair], Doubt]]
 

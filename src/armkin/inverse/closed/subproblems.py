@@ -180,13 +180,7 @@ def normalised(pair: Pair) -> Pair:
 
 
 def rotation_between(
-    ux: Entry,
-    uy: Entry,
-    vx: Entry,
-    vy: Entry,
-    scale: Entry,
-    prefer: Pair | None,
-    length2: Entry | None = None,
+    ux: Entry, uy: Entry, vx: Entry, vy: Entry, scale: Entry, prefer: Pair | None, length2: Entry | None = None
 ) -> tuple[Pair, Doubt]:
     """The planar rotation that turns u's direction into v's (IK-Geo subproblem 1).
 

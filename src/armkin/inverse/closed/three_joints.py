@@ -15,7 +15,7 @@ Prismatic joint 2: the same with ``g = y + d2 z``, linear in d2.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
@@ -51,11 +51,9 @@ from armkin.inverse.numeric.tolerances import (
 )
 from armkin.inverse.tasks.choose_task import rank
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain
 from armkin.model.rotation import inverse
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 
 class Position:

@@ -10,7 +10,6 @@ convention). The chain walked from the tool to the base covers axes 3, 4 and 5.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,11 +22,9 @@ from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, lin
 from armkin.inverse.closed.three_link import ThreeLink
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, PARALLEL
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CONVERGING, SEED
 from armkin.inverse.tasks.task import Task
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 STARTS = 64
 STEPS, PATIENCE = 25, 8

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,8 @@ from armkin.forward import fk, tip_and_jacobian
 from armkin.inverse.numeric.tolerances import CONVERGING, FOLDED, LEFT_OUT, NOISE, ROUNDING, TINY, WEAK
 from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 
 def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:

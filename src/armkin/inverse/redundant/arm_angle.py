@@ -12,7 +12,7 @@ values: eight curves.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +21,8 @@ from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.wrist import meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
 from armkin.inverse.redundant.interval_pieces import Int, Pieces, best_samples, holding_none, none, runs
+from armkin.model.arm import Arm
 from armkin.model.rotation import inverse, rotation_about
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 TURN = 2 * np.pi
 EVEN = 24  # samples of a turn besides the roots

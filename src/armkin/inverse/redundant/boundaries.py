@@ -11,7 +11,7 @@ trigonometric polynomial in t of degree 8 at most, whatever branches are real. B
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,9 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.closed.wrist import foot, meeting_point
 from armkin.inverse.numeric.tolerances import BESIDE_END, EXACT, NO_LENGTH, PARALLEL, SAME_END
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
+from armkin.model.arm import Arm
 from armkin.model.chain import is_parallel
 from armkin.model.rotation import inverse, rotation_about, shrunk
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 DEGREE = 8
 Z = np.array([0.0, 0.0, 1.0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,10 +10,8 @@ from armkin.formula.arrays import Array
 from armkin.formula.rows import rows_of
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, BESIDE_CROSSING, JOINED, NO_ROOM, SAME_END, TINY
 from armkin.inverse.redundant.interval_pieces import Int, golden_section, margin
+from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
-
-if TYPE_CHECKING:
-    from armkin.inverse.redundant.other_joints import Follower
 
 HALVINGS = 60  # steps to where a branch ends, at most
 SECANTS = 24  # of which the later ones halve

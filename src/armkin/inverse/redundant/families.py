@@ -10,7 +10,6 @@ axis, which alone is asked for, each branch of the others is one.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,11 +34,8 @@ from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
 from armkin.keep_out.clearance import clear
 from armkin.model import units
-from armkin.model.arm import actual
+from armkin.model.arm import Arm, actual
 from armkin.model.limits import outside
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 64  # targets whose arm angles are worked on together

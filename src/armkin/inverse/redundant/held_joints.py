@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armkin.formula.arrays import Array
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
+from armkin.model.arm import Arm
 from armkin.model.lock import lock
-
-if TYPE_CHECKING:
-    from armkin.formula.arrays import Array
-    from armkin.model.arm import Arm
 
 
 @lru_cache(maxsize=128)

@@ -7,17 +7,15 @@ and Wright, Numerical Optimization, 2006, 16.5 and 18.1), from many postures at 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.numeric.tolerances import LEVEL_CURVATURE, SAME, SOLUTION, STATIONARY, TINY, WEAK
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 STEPS = 80  # of one start
 

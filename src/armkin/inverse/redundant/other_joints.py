@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,7 @@ from armkin.inverse.redundant.interval_pieces import motion_of_joint, within_lim
 from armkin.inverse.redundant.refine_samples import values_between
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import Redundancy, moved, moved_entries
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 Ik = Callable[..., Solutions]
 AT_A_TIME = 2_000  # targets of a formula: they stay in the cache

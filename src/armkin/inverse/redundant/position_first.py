@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,25 +21,15 @@ from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import (
-    EQUAL,
-    ONE_MINIMUM,
-    SAME,
-    SOLUTION,
-    TINY,
-    WEAK,
-)
+from armkin.inverse.numeric.tolerances import EQUAL, ONE_MINIMUM, SAME, SOLUTION, TINY, WEAK
 from armkin.inverse.redundant.least_rotation import Box, box_of, descend, flat_minima
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_near, read_targets
 from armkin.keep_out.clearance import clear
-from armkin.model.arm import actual
+from armkin.model.arm import Arm, actual
 from armkin.model.limits import outside
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 POOL = 32_768  # postures within limits
 ON_LIMIT = 0.25  # share of their joints that are on a limit

@@ -7,7 +7,7 @@ without bound.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import ACCEPTED
 from armkin.inverse.redundant.interval_pieces import within_limits
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 SAFE = 4.0  # times the bend that the samples show
 NEAR = 0.3  # [rad] of a limit is what can come to it before the next sample

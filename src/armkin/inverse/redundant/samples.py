@@ -5,7 +5,7 @@ All that stands of every sample is asked for a few targets at a time, while it i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from armkin.formula.rows import stacked
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.redundant.boundaries import on_both_sides
 from armkin.inverse.redundant.interval_pieces import Int, best_samples, holding_none, runs, turning
-
-if TYPE_CHECKING:
-    from armkin.inverse.redundant.other_joints import Follower, Sampled
+from armkin.inverse.redundant.other_joints import Follower, Sampled
 
 AT_A_TIME = 8_000  # samples: they stay in the cache
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +25,8 @@ from armkin.inverse.run.folds import Doubted, tell
 from armkin.inverse.run.workers import shared
 from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
+from armkin.model.arm import Arm
 from armkin.model.limits import SLACK
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
 
 TURNED_AT_ONCE = 512  # poses whose columns become rows: both stay in a core's own cache
 
@@ -48,14 +45,7 @@ class Solved(NamedTuple):
 
 
 def solve(  # noqa: C901 - one pass over a batch's arrays
-    arm: Arm,
-    task: Task,
-    geometry: Geometry,
-    given: Array,
-    near: Array,
-    one: Array | None,
-    examine: bool,
-    workers: int,
+    arm: Arm, task: Task, geometry: Geometry, given: Array, near: Array, one: Array | None, examine: bool, workers: int
 ) -> Solved:
     """All branches of targets (N, m), or of poses (N, 4, 4) that have not been read yet.
 
@@ -110,12 +100,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
 
 
 def _keep(  # noqa: C901 - one pass over a chunk's arrays
-    goals: Goals,
-    axes: tuple[int, ...],
-    part: Batch,
-    found: list[Array],
-    near: Array,
-    there: NDArray[np.intp] | None,
+    goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], near: Array, there: NDArray[np.intp] | None
 ) -> Doubted:
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
     targets on an edge.

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from functools import lru_cache
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,12 +25,9 @@ from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, NO_SIZE, TH
 from armkin.inverse.singular.near_itself import COARSE, ROOM
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
-from armkin.model.arm import actual
+from armkin.model.arm import Arm, actual
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 
 @lru_cache(maxsize=64)

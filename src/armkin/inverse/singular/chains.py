@@ -6,8 +6,6 @@ it, and nothing else is.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
@@ -15,9 +13,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CLOSED, HIGH, MOVED
 from armkin.inverse.singular.local_structure import Structure, leaves, members, stretch
 from armkin.inverse.tasks.task import Task
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect, or half where that fails
 

@@ -7,8 +7,6 @@ The arm cannot go from one to the other without leaving its target.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,9 +15,7 @@ from armkin.inverse.closed import four_bars
 from armkin.inverse.singular import curves
 from armkin.inverse.singular.curves import Curves
 from armkin.inverse.tasks.task import Task
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 
 def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: Bool, target: Array) -> Bool:

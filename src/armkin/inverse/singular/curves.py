@@ -6,7 +6,7 @@ Methods, 1990, ch. 2). Its length is bounded by the second smallest singular val
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,8 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACROSS, CROSSING, OFF_CURVE, SHORTEST_STEP, TINY
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 STEP = 0.2  # [rad, reaches] along a curve
 MOST = 250  # steps

@@ -5,8 +5,6 @@ A self-motion is followed both ways from the posture that is listed, by `curves`
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from armkin.formula.arrays import Array
@@ -16,12 +14,10 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import SOLUTION, WEAK
 from armkin.inverse.singular.curves import Curves
+from armkin.inverse.tasks.task import Task
 from armkin.keep_out.clearance import clear
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.inverse.tasks.task import Task
-    from armkin.model.arm import Arm
 
 FINE = np.deg2rad(0.1)  # between the postures that are looked at
 

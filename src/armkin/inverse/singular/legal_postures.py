@@ -6,8 +6,6 @@ double root at a limit is off it by as much as arithmetic can tell its halves ap
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,10 +16,8 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, CLOSED, SAME, SOLUTION
 from armkin.inverse.singular import components, surfaces
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 
 def with_legal_postures(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Batch:

@@ -8,19 +8,17 @@ have; what is closer, or loses more than one direction, goes there as it is.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.inverse.answers.batch import Goals
 from armkin.inverse.closed import four_bars
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import APART_ROOTS, CLOSED, FOLDED, SAME, SOLUTION, TURNED
-
-if TYPE_CHECKING:
-    from armkin.inverse.answers.batch import Goals
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 PLACES = np.arange(1.0, 5.0)[:, None]  # [rad] along a line; zero is the fifth
 

@@ -9,7 +9,7 @@ way along v, and a curve x(t). The component of the solution set is the interval
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +33,8 @@ from armkin.inverse.numeric.tolerances import (
 )
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 NODES = 10  # values of t at which g and x are computed: polynomials of degree 9 are exact to rounding on `span`
 NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev's, of spans

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import combinations_with_replacement
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +22,8 @@ from armkin.inverse.numeric.tolerances import ACCEPTED, BENT, FOLD_WAY, GROWTH, 
 from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 BOW = 0.1  # of its length: a curve is no farther off its chord
 AROUND = 256  # directions in a plane, of which each stands for its opposite, too

@@ -6,8 +6,6 @@ was made from. Both solve it: the arm that stands there stays.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,12 +15,10 @@ from armkin.inverse.answers.batch import Batch, Goals, named, wider
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CLOSE_BY, SOLUTION, THERE
+from armkin.inverse.tasks.task import Task
 from armkin.model import limits
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.inverse.tasks.task import Task
-    from armkin.model.arm import Arm
 
 AT_ONCE = 4096  # targets whose branches are compared with `near` together
 ROOM = 2.0 * SOLUTION  # [reaches] from the tool to a target that `near` might solve: twice the tolerance, for rounding

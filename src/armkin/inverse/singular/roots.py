@@ -7,27 +7,15 @@ beside it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import (
-    CLOSE_BY,
-    DOUBLE_ROOT,
-    ERROR,
-    HIGH,
-    SAME,
-    SOLUTION,
-    TINY,
-)
+from armkin.inverse.numeric.tolerances import CLOSE_BY, DOUBLE_ROOT, ERROR, HIGH, SAME, SOLUTION, TINY
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 BESIDE = 0.1  # of the distance between two: as far as a posture beside the one half way may be from it
 ROOT = 0.03  # of that distance: an exact root's next Newton step is shorter, that of a point off one of order 16 longer
@@ -52,14 +40,7 @@ def joined(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array
 
 
 def alike(
-    arm: Arm,
-    task: Task,
-    q: Array,
-    k: NDArray[np.int64],
-    b: NDArray[np.int64],
-    sigma: Array,
-    size: Array,
-    target: Array,
+    arm: Arm, task: Task, q: Array, k: NDArray[np.int64], b: NDArray[np.int64], sigma: Array, size: Array, target: Array
 ) -> tuple[Bool, Array]:
     """Which candidates are one with the b-th of their target, and how far they are from it: (k, M).
 

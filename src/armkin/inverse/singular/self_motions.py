@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,11 +31,8 @@ from armkin.inverse.numeric.tolerances import (
 )
 from armkin.inverse.singular import circuits, roots
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
 
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed

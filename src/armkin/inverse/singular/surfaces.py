@@ -8,7 +8,7 @@ second of the two held it is that curve, and each curve of the arm of the others
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,8 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import FOLDED
 from armkin.inverse.singular.components import More, examine
+from armkin.model.arm import Arm
 from armkin.model.lock import lock
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 Pair = tuple[int, int, float]  # joints about one line, and the way of the first for a turn of the second
 

@@ -10,7 +10,6 @@ its own Jacobian has full rank, because the virtual axes are in general position
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,13 +23,9 @@ from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ANSWERED, AT_ZERO, EXACT, PARALLEL
 from armkin.inverse.tasks.task import Task
-from armkin.model.arm import from_links
+from armkin.model.arm import Arm, from_links
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse, rotation_about
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
 
 PHASE = 0.7321  # [rad]
 _POSE = Task("pose", 3, np.zeros((0, 6)), np.zeros(0), "full")

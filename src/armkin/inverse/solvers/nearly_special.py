@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +48,7 @@ from armkin.inverse.solvers import general, pairs, position_pencil
 from armkin.inverse.solvers.pairs import AROUND, around
 from armkin.inverse.tasks.choose_task import NEARLY_PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
-
+from armkin.model.arm import Arm
 
 CHUNK = 1024  # poses corrected at once
 NAMED_AT_ONCE = 256  # branches are named: buffers of so many are kept

@@ -9,7 +9,6 @@ every root of the class is accounted for, or the target remains open.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +20,9 @@ from armkin.inverse.closed.newton_steps import ABSENT
 from armkin.inverse.numeric import newton, root_pairs
 from armkin.inverse.numeric.tolerances import ANSWERED, APART_ROOTS
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.rotation import rotation_about
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
 TOUCHING = APART_ROOTS**2  # square of half of what lies between complex roots, up to which they may be one real root

@@ -15,7 +15,7 @@ one joint alone, and with them the roots by 1e-16 / S1: nothing is lost, unless 
 from __future__ import annotations
 
 from itertools import permutations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,11 +38,9 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
 )
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain
 from armkin.model.rotation import inverse
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 CHUNK = 1024  # targets solved at once
 ALL = np.array(list(permutations(range(4))))  # which of four roots goes where

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from armkin.errors import UsageError
 from armkin.inverse.closed import anywhere, elbow, planar, spherical, three_joints, three_parallel
@@ -17,10 +16,7 @@ from armkin.inverse.numeric.tolerances import RANK
 from armkin.inverse.solvers import general, nearly_special, tool_axis
 from armkin.inverse.tasks.choose_task import default_task, rank, redundant, task_for
 from armkin.inverse.tasks.task import Task
-from armkin.model.arm import actual
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm, actual
 
 
 @lru_cache(maxsize=256)

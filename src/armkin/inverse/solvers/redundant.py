@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,11 +17,9 @@ from armkin.inverse.numeric.tolerances import EXACT
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task
+from armkin.model.arm import Arm
 from armkin.model.lock import lock
 from armkin.model.rotation import inverse, joint_motion
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 
 class Redundancy(NamedTuple):

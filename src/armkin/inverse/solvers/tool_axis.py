@@ -7,7 +7,6 @@ anything: any orientation with the wanted axis will do, and the virtual joint is
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +16,7 @@ from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.subproblems import Candidates, Prefer
 from armkin.inverse.elimination.merge import projection
 from armkin.inverse.tasks.task import Task
-from armkin.model.arm import from_links
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm, from_links
 
 
 def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geometry | None:

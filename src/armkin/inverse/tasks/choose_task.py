@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,11 +11,9 @@ from armkin.errors import RedundantArmError, UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.residuals import task_jacobian
 from armkin.inverse.tasks.task import LABELS, Task
+from armkin.model.arm import Arm
 from armkin.model.chain import Chain, axes
 from armkin.model.units import radian_or_reach
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
 
 NEARLY_PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
 INDEPENDENT = 1e-4  # singular value of a task's independent rows

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,9 +22,7 @@ from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.trace import StraightLineCode
-
-if TYPE_CHECKING:
-    from armkin.model.arm import Arm
+from armkin.model.arm import Arm
 
 LABELS = {
     "xy": ("x", "y"),
