@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import armkin.keep_out.loading
+import armkin.keep_out.load_with_scene
 import armkin.model.build
 from armkin.model.arm import Arm
 from armkin.robot_file import RobotFile
@@ -36,4 +36,4 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
 def install() -> None:
     """For all tests of this process."""
     armkin.model.build.build = build
-    armkin.keep_out.loading.build = build  # type: ignore[attr-defined]
+    armkin.keep_out.load_with_scene.build = build  # type: ignore[attr-defined]

@@ -8,7 +8,7 @@ import pytest
 
 from armkin import robot_file
 from armkin.forward import fk, frames
-from armkin.keep_out.loading import load
+from armkin.keep_out.load_with_scene import load
 from urdf_chains import CHAINS, moving, pose
 
 ROBOTS = Path(__file__).parents[1] / "robots"

@@ -32,7 +32,7 @@ TYPE_CHECKING = False  # type checkers know better; importing typing would doubl
 __version__ = "1.0.0"
 
 if TYPE_CHECKING:
-    from armkin.calibration.procedure import calibrate as calibrate
+    from armkin.calibration.calibrate import calibrate as calibrate
     from armkin.compiled.compiled_arm import CompiledArm as CompiledArm
     from armkin.compiled.compiled_arm import compile as compile
     from armkin.errors import ArmkinError as ArmkinError
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from armkin.inverse.solvers.recognise import method as method
     from armkin.keep_out.clearance import Clearance as Clearance
     from armkin.keep_out.clearance import clearance as clearance
-    from armkin.keep_out.loading import load as load
+    from armkin.keep_out.load_with_scene import load as load
     from armkin.model.arm import Arm as Arm
     from armkin.model.lock import lock as lock
     from armkin.model.lock import unlock as unlock
@@ -79,7 +79,7 @@ if TYPE_CHECKING:
 _HOME = {
     "CompiledArm": "compiled.compiled_arm",
     "compile": "compiled.compiled_arm",
-    "calibrate": "calibration.procedure",
+    "calibrate": "calibration.calibrate",
     "ArmkinError": "errors",
     "FileError": "errors",
     "LinkError": "errors",
@@ -102,7 +102,7 @@ _HOME = {
     "ik": "inverse.solve",
     "Clearance": "keep_out.clearance",
     "clearance": "keep_out.clearance",
-    "load": "keep_out.loading",
+    "load": "keep_out.load_with_scene",
     "Arm": "model.arm",
     "lock": "model.lock",
     "unlock": "model.lock",

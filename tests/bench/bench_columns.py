@@ -241,7 +241,7 @@ class Beside(NamedTuple):
 
 def _beside(address: str, pids: tuple[int, int], work: Any, job: float, count: int) -> Beside:
     """What `count` chunks take of worker, scheduler and this process, a chunk."""
-    from armkin.engines.run import Engine, in_order
+    from armkin.engines.ordered_chunks import Engine, in_order
 
     before = [*map(_used, pids), time.process_time(), time.perf_counter()]
     for _ in in_order(Engine(cluster=address), work, job, [bytes(1 << 20)] * count):

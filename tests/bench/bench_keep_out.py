@@ -25,7 +25,7 @@ import numpy as np
 import armkin
 from armkin.formula.arrays import Array
 from armkin.keep_out.bodies import ends
-from armkin.keep_out.guard import Guard, guard
+from armkin.keep_out.body_pairs import Guard, guard
 from armkin.keep_out.shapes.box import Box
 from armkin.keep_out.shapes.capsule import Capsule
 from armkin.keep_out.shapes.floor import Floor

@@ -25,7 +25,7 @@ from armkin.board_kinds import BOARDS
 from armkin.errors import LinkError
 from armkin.model import build as arms
 from armkin.model.arm import Arm
-from armkin.motion.corners import rounded
+from armkin.motion.rounded_waypoints import rounded
 from armkin.robot_file import parse
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import armkin
 from armkin import robot_file
-from armkin.export import tables
+from armkin.export import conventions
 from armkin.model.build import build
 from armkin.robot_file.writing import text
 
@@ -40,7 +40,7 @@ class Built:
 def built(arm: armkin.Arm, seed: int, *, base: bool = True) -> Built:
     """A built arm: every number of its table a bit off."""
     rng = np.random.default_rng(seed)
-    data: dict[str, Any] = tables.dh(arm)
+    data: dict[str, Any] = conventions.dh(arm)
     joints = []
     for joint in data["joints"]:
         row = dict(joint["dh"])

@@ -219,7 +219,7 @@ def test_at_a_terminal_a_joint_moves_while_its_key_comes_again_and_again(tmp_pat
     ],
 )
 def test_what_shall_be_seen_is_what_the_joint_does(robot: str, j: int, words: str) -> None:
-    from armkin.board.first_hour import _expected
+    from armkin.board.commissioning import _expected
 
     arm = armkin.load(robot)
     assert _expected(arm, arm.home, j) == words

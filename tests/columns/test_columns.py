@@ -19,7 +19,7 @@ from armkin.cli.csv_rows import Columns
 from armkin.columns import csv_and_json_lines, finished_chunks, ik_columns
 from armkin.columns.csv_cells import csv_line
 from armkin.columns.table import Table, Words, part
-from armkin.compiled import nearest as compiled_nearest
+from armkin.compiled import least_motion as compiled_nearest
 from armkin.compiled import table_lines as compiled_text
 from armkin.errors import UnfinishedError
 from command_line import THREE_DOF, Result, run

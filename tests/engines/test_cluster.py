@@ -21,7 +21,7 @@ import pytest
 import armkin
 from armkin.cli import csv_rows
 from armkin.engines import cluster
-from armkin.engines.run import Engine, in_order
+from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ClusterError
 from command_line import ROOT, THREE_DOF, run
 from killed_once import square
@@ -63,7 +63,7 @@ def test_a_killed_worker_loses_its_chunk_alone(address: str, where: str, tmp_pat
 
 _POOL = """
 import os, sys
-from armkin.engines.run import Engine, in_order
+from armkin.engines.ordered_chunks import Engine, in_order
 from killed_once import waiting
 if __name__ == "__main__":
     for found in in_order(Engine(workers=2), waiting, "", range(9)):

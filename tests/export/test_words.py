@@ -14,7 +14,7 @@ import pytest
 import armkin
 from armkin import robot_file
 from armkin.errors import UsageError
-from armkin.export import tables
+from armkin.export import conventions
 from armkin.export.urdf import urdf as write_urdf
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.arm import actual, from_links
@@ -25,9 +25,9 @@ from command_line import ROOT, run
 
 FILES = sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests/robots").glob("*.yaml"))
 KINDS: dict[str, Callable[[armkin.Arm], dict[str, Any]]] = {
-    "screws": tables.screws,
-    "dh": tables.dh,
-    "mdh": lambda arm: tables.dh(arm, modified=True),
+    "screws": conventions.screws,
+    "dh": conventions.dh,
+    "mdh": lambda arm: conventions.dh(arm, modified=True),
 }
 
 
@@ -123,7 +123,7 @@ def test_a_makers_table_comes_back_as_printed() -> None:
     """UR5e and Panda through screws: a = -425 and -82.5 with theta 0, as their makers write them."""
     for name, modified in (("ur5e", False), ("panda", True)):
         arm = armkin.load(name)
-        rows = [joint["dh"] for joint in tables.dh(again(tables.screws(arm)), modified=modified)["joints"]]
+        rows = [joint["dh"] for joint in conventions.dh(again(conventions.screws(arm)), modified=modified)["joints"]]
         assert arm.file is not None
         for row, joint in zip(rows, arm.file.joints, strict=True):
             assert joint.dh is not None
@@ -136,18 +136,18 @@ def test_axes_a_hair_from_parallel_have_no_table() -> None:
     link[1][1, 2], link[1][2, 1] = -1e-9, 1e-9
     arm = from_links(link, [False, False], name="hair")
     with pytest.raises(UsageError, match=r"the axes of q1 and q2 are 5.7e-08 deg from parallel.*screws say it"):
-        tables.dh(arm)
-    off = np.abs(armkin.fk(again(tables.screws(arm)), values(arm)) - armkin.fk(arm, values(arm)))
+        conventions.dh(arm)
+    off = np.abs(armkin.fk(again(conventions.screws(arm)), values(arm)) - armkin.fk(arm, values(arm)))
     assert off[:, :3, 3].max() < 1e-9
 
 
 def test_what_targets_count_from_is_said_where_it_changes() -> None:
     arm = armkin.load("planar_3dof")
-    assert tables.differences(arm, tables.dh(arm)) == []
-    shifted = {**tables.dh(arm), "task": "xy_theta"}
+    assert conventions.differences(arm, conventions.dh(arm)) == []
+    shifted = {**conventions.dh(arm), "task": "xy_theta"}
     shifted["joints"] = [dict(joint) for joint in shifted["joints"]]
     shifted["joints"][0]["dh"] = {**shifted["joints"][0]["dh"], "theta": 30.0}
-    assert tables.differences(arm, shifted) == [
+    assert conventions.differences(arm, shifted) == [
         "theta counts from another zero: in targets it is 30 deg more for the same pose"
     ]
 

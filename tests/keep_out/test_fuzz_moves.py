@@ -33,7 +33,7 @@ from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
 from armkin.board.stopping import Stop
 from armkin.board_kinds import BOARDS
-from armkin.keep_out.guard import Guard, guard
+from armkin.keep_out.body_pairs import Guard, guard
 from armkin.motion.timing.trajectory import Trajectory
 from command_line import ROOT, Result, run
 from starting_elsewhere import KINDS, watch

@@ -12,10 +12,10 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
-from armkin.keep_out.guard import guard
+from armkin.keep_out.body_pairs import guard
 from armkin.keep_out.levers import levers
-from armkin.keep_out.proof import hit_samples
-from armkin.keep_out.way import Cubics
+from armkin.keep_out.motion_geometry import Cubics
+from armkin.keep_out.motion_proof import hit_samples
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan
 from armkin.motion.plan.proved_free import check_free, proved, seconds

@@ -10,7 +10,7 @@ import pytest
 
 import armkin
 from armkin.errors import NoBranchError, RobotFileError
-from armkin.keep_out.guard import guard, postures
+from armkin.keep_out.body_pairs import guard, postures
 from armkin.robot_file import keep_out_keys, scene_file
 from command_line import run
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.keep_out.guard import guard, postures
+from armkin.keep_out.body_pairs import guard, postures
 from armkin.teach.pose_answers import Question, look
 from command_line import run
 

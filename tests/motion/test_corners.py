@@ -11,8 +11,8 @@ import armkin
 from armkin.board.firmware.segments.trajectory_to_counts import cut
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
-from armkin.motion.corners import rounded
 from armkin.motion.joint_moves import plan
+from armkin.motion.rounded_waypoints import rounded
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from armkin.board.summaries import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units
-from armkin.motion.corners import rounded
 from armkin.motion.path_planner import HOLD
+from armkin.motion.rounded_waypoints import rounded
 from armkin.motion.timing.curve import Curve
 from armkin.motors import joints, motor_names, pulse_units, pulses
 

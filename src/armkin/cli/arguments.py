@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def load(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
     """The arm of a robot file, or of a shipped robot, in its scene; tool: what `--tool` says."""
-    from armkin.keep_out.loading import load
+    from armkin.keep_out.load_with_scene import load
     from armkin.robot_file.catalogue import locate
 
     if not robot:

@@ -19,7 +19,7 @@ from armkin.columns.csv_cells import csv_line
 from armkin.columns.finished_chunks import Parts
 from armkin.columns.formats import Format, format_of
 from armkin.columns.table import Table
-from armkin.engines.run import Engine, in_order
+from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ArmkinError, FileError, NoSolutionError, UnfinishedError, UsageError
 
 _AT_ONCE = 4096  # rows that become objects together: Python's take a hundred times the room of numbers

@@ -77,7 +77,7 @@ class Rows:
             return self._of_values([np.array(self.values)])
         if self.source != "-" and not self.source.lower().endswith((".npz", ".parquet", ".jsonl")):
             return self._of_text(self.source)
-        from armkin.columns.reading import reader_of
+        from armkin.columns.input_columns import reader_of
 
         read = reader_of(self.source)
         if read is None:

@@ -38,6 +38,6 @@ def fk(arm: Arm, q: Array, task: str | None = None) -> Array:
 
 def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
     """`armkin.columns.ik_columns.nearest`, where it serves."""
-    from armkin.compiled import nearest as found
+    from armkin.compiled import least_motion as found
 
     return found.nearest(q, wanted, near, scale)

@@ -34,7 +34,7 @@ def _quiet(offers: Callable[[typer.Context], Iterable[str]]) -> Complete:
 
 
 def _arm(ctx: typer.Context) -> Arm:
-    from armkin.keep_out.loading import load
+    from armkin.keep_out.load_with_scene import load
 
     return load(str(ctx.params["robot"]))
 

@@ -350,7 +350,7 @@ def _cells(text: str) -> list[str]:
 
 
 def _places(heading: Sequence[str], name: str) -> list[int]:
-    """See `armkin.columns.reading.places`."""
-    from armkin.columns.reading import places  # here, as it needs numpy
+    """See `armkin.columns.input_columns.places`."""
+    from armkin.columns.input_columns import places  # here, as it needs numpy
 
     return places(heading, name)

@@ -81,8 +81,8 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
     """What motions pass through under `--ignore-keep-out`."""
     import numpy as np
 
+    from armkin.keep_out.body_pairs import guard
     from armkin.keep_out.clearance import hits_text
-    from armkin.keep_out.guard import guard
 
     deepest: dict[tuple[str, str], float] = {}
     for one in trajectories:

@@ -5,7 +5,7 @@ csv_and_json_lines.py  CSV and JSON Lines; csv_cells.py: single lines
 npz.py                 numpy's archive of arrays
 parquet.py             Parquet (pyarrow)
 formats.py             which of them a file's ending means
-reading.py             columns of numbers from .npz, .parquet and .jsonl, chunk by chunk
+input_columns.py       columns of numbers from .npz, .parquet and .jsonl, chunk by chunk
 finished_chunks.py     finished chunks beside a file that is not whole yet, and how a later run goes on with them
 fk_columns.py          joint values to the columns of fk and pulses
 ik_columns.py          targets to the columns of ik

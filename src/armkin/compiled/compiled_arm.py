@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin import forward
-from armkin.compiled import eliminated, source, toolchain
+from armkin.compiled import c_source, elimination_rows, toolchain
 from armkin.compiled.one_target import Single
 from armkin.compiled.results import Results
 from armkin.errors import UsageError
@@ -131,7 +131,7 @@ class _CompiledTask:
         which, form = _class_of(self.turned, task)
         if which is not None and form is not None:  # an elimination named after a class is that elimination in C
             form = c_program.plain_form(self.turned, which, form) if form.places is not None else form
-        library = source.library(arm, self.turned, which, form)
+        library = c_source.library(arm, self.turned, which, form)
         code = toolchain.load(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self._poses, self._points = code.arm_poses, code.arm_points
@@ -148,10 +148,10 @@ class _CompiledTask:
         self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 7], size
         code.arm_single.argtypes, code.arm_single.restype = [pointer], size
         self._single = self._quick(code.arm_single)
-        self._in_c: eliminated.InC | None = None
-        if form is not None and source.has_rows(self.task, form):
+        self._in_c: elimination_rows.InC | None = None
+        if form is not None and c_source.has_rows(self.task, form):
             code.arm_rows.argtypes, code.arm_rows.restype = [size, *[pointer] * 3], None
-            self._in_c = eliminated.InC(self.geometry, form, code.arm_rows, self.branches, self.n)
+            self._in_c = elimination_rows.InC(self.geometry, form, code.arm_rows, self.branches, self.n)
 
     def fk(self, q: ArrayLike, workers: int) -> Array:
         """Poses (..., 4, 4) of joint values (..., n)."""

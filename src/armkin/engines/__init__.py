@@ -3,7 +3,7 @@
 The work is a pure function of (job, chunk), so that every engine gives the same results in the same order. Of a job of
 any size only a window of chunks is outstanding: nothing grows with the work.
 
-run.py      `in_order`: chunks in, results out
-pool.py     processes on this machine
-cluster.py  Dask distributed
+ordered_chunks.py  `in_order`: chunks in, results out
+pool.py            processes on this machine
+cluster.py         Dask distributed
 """

@@ -28,7 +28,7 @@ AHEAD = 3  # chunks a thread of the workers
 
 
 def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]) -> Iterator[Result]:
-    """See `armkin.engines.run.in_order`. Raises ClusterError for a scheduler that cannot be reached or goes away."""
+    """See `armkin.engines.ordered_chunks`. Raises ClusterError for a scheduler that cannot be reached or goes away."""
     client = _client(address)
     try:
         _check_workers(client, address)

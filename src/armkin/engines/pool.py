@@ -28,7 +28,7 @@ _job: tuple[Callable[[Any, Any], Any], Any] | None = None
 
 
 def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]) -> Iterator[Result]:
-    """See `armkin.engines.run.in_order`."""
+    """See `armkin.engines.ordered_chunks.in_order`."""
     source = iter(chunks)
     waiting: deque[tuple[Chunk, Future[Result]]] = deque()
     pool, lost = _pool(workers, work, job), 0

@@ -1,8 +1,8 @@
 """An arm in other words.
 
-tables.py    robot files in another convention: screws, DH standard or modified
-urdf.py      URDF, with limits, speeds and visuals
-arm_json.py  plain numbers for JSON
-c/           C99 that needs nothing but libm
-js/          an ES module without imports
+conventions.py  robot files in another convention: screws, DH standard or modified
+urdf.py         URDF, with limits, speeds and visuals
+arm_json.py     plain numbers for JSON
+c/              C99 that needs nothing but libm
+js/             an ES module without imports
 """

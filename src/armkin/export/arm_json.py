@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.errors import UsageError
-from armkin.export import tables
+from armkin.export import conventions
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def numbers(arm: Arm) -> dict[str, Any]:
 
     `links`: the tool's pose is links[0] Z1(ratio1 q1) links[1] ... Zn(ratio_n q_n) links[n], Z = Rz or Tz.
     """
-    screws = tables.screws(arm)
+    screws = conventions.screws(arm)
     limits, home, unit = units.limits_out(arm), units.home_out(arm), units.names(arm)
     speeds, accels = (units.joints_out(arm, values).tolist() for values in (arm.max_speed, arm.max_accel))
     joints = [
@@ -55,7 +55,7 @@ def numbers(arm: Arm) -> dict[str, Any]:
 def _table(arm: Arm, *, modified: bool) -> dict[str, Any] | None:
     """A DH table with its base and tool, or None if there is none."""
     try:
-        data = tables.dh(arm, modified=modified)
+        data = conventions.dh(arm, modified=modified)
     except UsageError:
         return None
     rows = [joint["dh"] for joint in data["joints"]]

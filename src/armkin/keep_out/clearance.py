@@ -13,7 +13,7 @@ from armkin.forward import as_joints
 from armkin.model.lock import unlock
 
 if TYPE_CHECKING:
-    from armkin.keep_out.guard import Guard
+    from armkin.keep_out.body_pairs import Guard
     from armkin.model.arm import Arm
 
 
@@ -117,6 +117,6 @@ def assumed(arm: Arm) -> list[tuple[str, float]]:
 
 def _guard(arm: Arm) -> Guard:
     """The pairs of an arm with keep-outs; what they need is imported for such arms alone."""
-    from armkin.keep_out.guard import guard
+    from armkin.keep_out.body_pairs import guard
 
     return guard(arm)

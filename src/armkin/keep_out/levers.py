@@ -9,7 +9,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 
 if TYPE_CHECKING:
-    from armkin.keep_out.guard import Guard
+    from armkin.keep_out.body_pairs import Guard
 
 
 def levers(held: Guard, out: Array) -> Array:

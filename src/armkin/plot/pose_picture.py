@@ -163,7 +163,7 @@ class _Drawing:
         """What the arm must not touch, translucent; a floor is drawn as far as the picture goes."""
         if not self.robot.keep_out or self.dimensions == 2:
             return
-        from armkin.keep_out.guard import guard
+        from armkin.keep_out.body_pairs import guard
         from armkin.keep_out.shapes.floor import Floor
 
         surfaces = import_module("mpl_toolkits.mplot3d.art3d").Poly3DCollection

@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar
 from armkin.columns import npz
 from armkin.columns.finished_chunks import Parts
 from armkin.columns.table import Table
-from armkin.engines.run import Engine, in_order
+from armkin.engines.ordered_chunks import Engine, in_order
 
 
 class Numbered(Protocol):

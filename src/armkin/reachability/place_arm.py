@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
+from armkin.keep_out.body_pairs import guard
 from armkin.keep_out.clearance import clear
-from armkin.keep_out.guard import guard
 from armkin.model.rotation import rotation_about
 from armkin.model.units import DEGREE
 

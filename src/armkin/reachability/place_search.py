@@ -27,7 +27,7 @@ from armkin import __version__, files
 from armkin.columns.finished_chunks import Parts, digest
 from armkin.columns.formats import ENDINGS
 from armkin.columns.table import Table
-from armkin.engines.run import Engine
+from armkin.engines.ordered_chunks import Engine
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik

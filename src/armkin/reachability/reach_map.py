@@ -16,7 +16,7 @@ from armkin.columns import npz
 from armkin.columns.finished_chunks import Parts
 from armkin.columns.formats import format_of
 from armkin.columns.table import Table
-from armkin.engines.run import Engine
+from armkin.engines.ordered_chunks import Engine
 from armkin.errors import UsageError
 from armkin.files import check, ending, whole
 from armkin.formula.arrays import Array

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.engines.run import Engine, in_order
+from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import position as position_of

@@ -84,7 +84,7 @@ def _obstacles(arm: Arm) -> list[float]:
     """The surfaces of all keep-outs, as triangles: nine numbers each, in the frame of targets."""
     if not arm.keep_out:
         return []
-    from armkin.keep_out.guard import guard
+    from armkin.keep_out.body_pairs import guard
 
     return [x for _, one in guard(arm).obstacles for x in one.triangles(1.4 * arm.reach).round(2).ravel().tolist()]
 

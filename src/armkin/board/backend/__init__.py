@@ -1,13 +1,13 @@
 """What every kind of board can do for an arm. Our own firmware is one of several.
 
-board.py           what a kind is: one class, with capabilities
-starting.py        where a motion begins: what every trajectory that becomes counts is held to
-sent_positions.py  a trajectory for a board that is sent positions, not segments
-servo_arm.py       an arm of bus servos of any make
-stepper_arm.py     an arm of steppers on a board that obeys every program
-record.py          what armkin last left on a board that other programs write to
-assumptions.py     motors and rates made up for a simulation, where the file has none
-missing_keys.py    what a robot file lacks for its board
+board.py            what a kind is: one class, with capabilities
+starting.py         where a motion begins: what every trajectory that becomes counts is held to
+sent_positions.py   a trajectory for a board that is sent positions, not segments
+servo_arm.py        an arm of bus servos of any make
+stepper_arm.py      an arm of steppers on a board that obeys every program
+position_record.py  what armkin last left on a board that other programs write to
+assumptions.py      motors and rates made up for a simulation, where the file has none
+missing_keys.py     what a robot file lacks for its board
 
 A backend is made for an arm and an open port. It speaks joints and counts of the arm's motors; how a trajectory
 becomes bytes is its own business.

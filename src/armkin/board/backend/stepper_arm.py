@@ -20,7 +20,7 @@ from armkin.model.units import joints_out
 from armkin.motors import motor_accel, motor_names, pulses
 
 if TYPE_CHECKING:
-    from armkin.board.backend.record import Record
+    from armkin.board.backend.position_record import Record
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 

@@ -16,8 +16,8 @@ from armkin.board.grbl import gcode, replies, settings
 from armkin.board.grbl.grbl_session import GrblError, Session
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.position import Place
+from armkin.board.grbl.position_watch import Watch
 from armkin.board.grbl.spindle import Spindle
-from armkin.board.grbl.watch import Watch
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:

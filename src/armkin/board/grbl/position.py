@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.record import Record
+from armkin.board.backend.position_record import Record
 from armkin.board.backend.starting import unbelievable
 from armkin.errors import LinkError
 

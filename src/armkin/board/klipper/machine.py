@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.record import Record
+from armkin.board.backend.position_record import Record
 from armkin.board.backend.sent_positions import Job, braking
 from armkin.board.backend.starting import unbelievable
 from armkin.board.backend.stepper_arm import StepperArm

@@ -3,7 +3,7 @@
 port.py         what every port can do
 scene_note.py   the scene that a port was last used with
 port_lock.py    the lock that keeps two programs from one arm
-notes.py        small files beside it
+port_notes.py   small files beside it
 logged_port.py  a port whose bytes are logged
 serial_port.py  serial ports
 boot_loader.py  what an opened port may have started
@@ -12,9 +12,9 @@ socket_port.py  the Unix socket of a program on this computer
 
 from armkin.board.ports.boot_loader import leave_boot_loader
 from armkin.board.ports.logged_port import LOG, traced
-from armkin.board.ports.notes import read_note, remove_note, write_note
 from armkin.board.ports.port import BAUD, SIM, Port
 from armkin.board.ports.port_lock import ask_to_stop, holder, holder_rate, note_path, record_path
+from armkin.board.ports.port_notes import read_note, remove_note, write_note
 from armkin.board.ports.serial_port import Found, SerialPort, list_ports
 from armkin.board.ports.socket_port import SocketPort, is_socket
 

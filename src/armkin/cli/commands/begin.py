@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from armkin.board.backend import Backend
     from armkin.board.backend.board import Board
-    from armkin.board.first_hour import Found
+    from armkin.board.commissioning import Found
     from armkin.model.arm import Arm
 
 
@@ -39,7 +39,7 @@ def begin(
     end the robot file is corrected, shown as a diff first; --out writes another file instead. With --port sim what an
     imported table does not say of motors is assumed, and named.
     """
-    from armkin.board import first_hour
+    from armkin.board import commissioning
     from armkin.robot_file.catalogue import locate, shipped
 
     path = locate(robot)
@@ -49,7 +49,7 @@ def begin(
         raise FileError(f"{out} is there already; give another name", file=out)
     link = board_link.Link(port, baud, None, resume=False, reset=not no_reset, no_scene=no_scene)
     session = _Session(robot, path, scene, link)
-    found = first_hour.Found()
+    found = commissioning.Found()
     with keys() as person:
         try:
             session.run(found, person)
@@ -75,31 +75,31 @@ class _Session:
 
     def run(self, found: Found, person: Keys) -> None:
         """All steps, in their order."""
-        from armkin.board import first_hour
+        from armkin.board import commissioning
 
         board, arm = self._board(found)
         with self._open(board) as machine:
             self.port = machine.port.name  # the one that was found is asked again
             keep_outs.check_start(machine, arm, self.link.no_scene)
-            found.inverted |= first_hour.directions(board, person)
+            found.inverted |= commissioning.directions(board, person)
         board, arm = self._board(found)
         with self._open(board):
-            found.zeros = first_hour.zeros(board, person, forget=bool(found.inverted))
+            found.zeros = commissioning.zeros(board, person, forget=bool(found.inverted))
             if not found.zeros:
-                found.limits = first_hour.limits(board, person)
-                found.at_home = first_hour.first_move(board, person)
+                found.limits = commissioning.limits(board, person)
+                found.at_home = commissioning.first_move(board, person)
                 return
         board, arm = self._board(found)
         with self._open(board):
-            found.limits = first_hour.limits(board, person)
-            found.at_home = first_hour.first_move(board, person)
+            found.limits = commissioning.limits(board, person)
+            found.at_home = commissioning.first_move(board, person)
 
     def _open(self, board: Board) -> AbstractContextManager[Backend]:
         return board_link.backend(board, self.port, self.link.baud, reset=self.link.reset)
 
     def _board(self, found: Found) -> tuple[Board, Arm]:
         """The board of the file as it is corrected so far."""
-        from armkin.keep_out.loading import checked
+        from armkin.keep_out.load_with_scene import checked
         from armkin.robot_file import parse
         from armkin.robot_file.scene_file import read
 

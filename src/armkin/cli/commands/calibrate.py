@@ -14,7 +14,7 @@ from armkin.model import units
 from armkin.model.targets import targets_in
 
 if TYPE_CHECKING:
-    from armkin.calibration.procedure import Calibration
+    from armkin.calibration.calibrate import Calibration
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
@@ -115,7 +115,7 @@ def _file(found: Calibration, arm: Arm) -> str:
 
 
 def _suggest(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: bool, out: str | None) -> None:
-    from armkin.calibration.procedure import next_poses
+    from armkin.calibration.calibrate import next_poses
     from armkin.columns.csv_cells import csv_line
 
     before = None if rows is None else units.joints_in(arm, rows[:, : arm.n])

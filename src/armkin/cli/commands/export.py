@@ -101,11 +101,11 @@ def _urdf(arm: Arm, out: str | None) -> None:
 
 
 def _table(arm: Arm, convention: str, out: str | None) -> None:
-    from armkin.export import tables
+    from armkin.export import conventions
     from armkin.robot_file.writing import text
 
-    data = tables.screws(arm) if convention == "screws" else tables.dh(arm, modified=convention == "modified")
-    lines = list(tables.differences(arm, data))  # reads it: a number may be beyond what a robot file takes
+    data = conventions.screws(arm) if convention == "screws" else conventions.dh(arm, modified=convention == "modified")
+    lines = list(conventions.differences(arm, data))  # reads it: a number may be beyond what a robot file takes
     with output.destination(out) as write:
         write(text(data))
     for line in lines:

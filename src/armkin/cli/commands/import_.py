@@ -36,7 +36,7 @@ def import_(
     Screws, exactly as the URDF has them, limits, speeds and names, on stdout: armkin import arm.urdf > arm.yaml
     """
     from armkin import robot_file
-    from armkin.export import tables
+    from armkin.export import conventions
     from armkin.model.build import build
     from armkin.robot_file import catalogue, urdf
     from armkin.robot_file.writing import text
@@ -53,7 +53,7 @@ def import_(
             raise
         raise UsageError(f"{error}\ngive it with --{option} LINK") from None
     arm = build(robot_file.parse(text(found.data), f"{file} as a robot file"))
-    data: dict[str, Any] = tables.dh(arm) if dh else found.data
+    data: dict[str, Any] = conventions.dh(arm) if dh else found.data
     with output.destination(out) as write:
         write(text(data, found.notes))
     for note in found.notes:

@@ -68,7 +68,7 @@ def _keep_outs(arm: Arm) -> KeepOuts:
     """Bodies, pairs that do not count, hits at home; nothing without keep-outs."""
     if not arm.keep_out:
         return {}
-    from armkin.keep_out.report import report
+    from armkin.keep_out.keep_out_json import report
 
     return report(arm)  # type: ignore[return-value]
 

@@ -97,7 +97,7 @@ def new(
 
 def _check(made: str, path: str) -> None:
     """Raise RobotFileError for a file that is not valid, or whose floor is hit in every posture."""
-    from armkin.keep_out.loading import checked
+    from armkin.keep_out.load_with_scene import checked
     from armkin.robot_file import parse
 
     checked(parse(made, path))

@@ -60,7 +60,7 @@ def place(
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")
     arms = [arguments.load(word) for word in words[:-1]]
     settings = _settings(step, z, yaw, area)
-    from armkin.engines.run import Engine
+    from armkin.engines.ordered_chunks import Engine
     from armkin.inverse.solve import ik
     from armkin.reachability.place_file import write
     from armkin.reachability.place_search import each

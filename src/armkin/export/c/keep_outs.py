@@ -11,7 +11,7 @@ from armkin.export.c import kernel
 from armkin.export.c.source_parts import part
 from armkin.formula.c_and_js_code import number
 from armkin.keep_out.bodies import ends_formula
-from armkin.keep_out.guard import guard
+from armkin.keep_out.body_pairs import guard
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -12,9 +12,9 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.keep_out.clearance import hits, whole_arm
-from armkin.keep_out.proof import Proof, prove
-from armkin.keep_out.proof import hit_samples as find_hits
-from armkin.keep_out.way import Cubics, Way
+from armkin.keep_out.motion_geometry import Cubics, Way
+from armkin.keep_out.motion_proof import Proof, prove
+from armkin.keep_out.motion_proof import hit_samples as find_hits
 from armkin.model import units
 from armkin.model.lock import unlock
 from armkin.motion.timing.curve import Curve
@@ -25,7 +25,7 @@ from armkin.motion.timing.trajectory import Straight, Stretch, Trajectory
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from armkin.keep_out.guard import Guard
+    from armkin.keep_out.body_pairs import Guard
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
@@ -99,7 +99,7 @@ def proved(trajectory: Trajectory, *, tight: bool = False) -> Found | None:
     whole, _ = whole_arm(arm, trajectory.start[None])
     if not whole.keep_out:
         return None
-    from armkin.keep_out.guard import guard
+    from armkin.keep_out.body_pairs import guard
 
     held, allowed, found, postures = guard(whole), None, None, 0
     escaping: tuple[int, ...] = ()
@@ -178,7 +178,7 @@ def hit_samples(arm: Arm, q: Array) -> NDArray[np.bool_] | None:
     """Which of neighbouring postures (N, n) hit something; None for an arm that need not look."""
     if not arm.keep_out or arm.ignores_keep_out:
         return None
-    from armkin.keep_out.guard import guard
+    from armkin.keep_out.body_pairs import guard
 
     whole, full = whole_arm(arm, q)
     return find_hits(guard(whole), full)

@@ -8,8 +8,8 @@ import numpy as np
 
 from armkin.forward import frames
 from armkin.keep_out.bodies import ends
+from armkin.keep_out.body_pairs import guard
 from armkin.keep_out.clearance import hits
-from armkin.keep_out.guard import guard
 from armkin.robot_file.keep_out_keys import names
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from armkin.calibration.impossible_rows import check
 from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
 from armkin.calibration.robust_fit import Measured
 from armkin.errors import UsageError
-from armkin.export import tables
+from armkin.export import conventions
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints
@@ -112,7 +112,7 @@ def calibrate(
     ]
     return Calibration(
         arm=new,
-        data=tables.screws(new, tables.tool_of(arm) @ tool),
+        data=conventions.screws(new, conventions.tool_of(arm) @ tool),
         level=LEVELS[choice.level],
         before=choice.errors[0],
         after=choice.errors[choice.level],

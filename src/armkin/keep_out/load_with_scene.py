@@ -43,7 +43,7 @@ def checked(file: RobotFile, around: Scene | None = None, tool: Sequence[float] 
     """The arm of a robot file and a scene. Raises RobotFileError if a keep-out is hit in every posture."""
     arm = build(file, around, tool)
     if arm.keep_out:
-        from armkin.keep_out.guard import check
+        from armkin.keep_out.body_pairs import check
 
         check(arm)
     return arm

@@ -21,8 +21,8 @@ from armkin.keep_out.levers import levers
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from armkin.keep_out.guard import Guard
-    from armkin.keep_out.way import Way
+    from armkin.keep_out.body_pairs import Guard
+    from armkin.keep_out.motion_geometry import Way
 
 STEP = 0.01  # [mm] of motion that is not looked into any further
 _FIRST = 16  # intervals to begin with
