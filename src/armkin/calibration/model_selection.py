@@ -41,28 +41,11 @@ class Choice:
 
 
 def choose(
-    model: Model, data: Measured, fixed: Collection[str] = (), tick: Callable[[int, int], object] = lambda *_: None
+    model: Model, data: Measured, fixed: Collection[str] = (), tick: Callable[[int, int], object] | None = None
 ) -> Choice:
     """The level that the rows justify, fitted to all of them; tick: how many fits are done, and of how many."""
-    parts = _parts(len(data))
-    # Fit all that is free first: every level starts from the pose of its base.
     sets = [free_at(model, level, data, fixed) for level in range(len(LEVELS))]
-    errors = np.empty((len(LEVELS), len(data)))
-    fits: list[Fit | None] = []
-    count = 1 + len(parts)
-    for level, free in enumerate(sets):
-        if level and np.array_equal(free, sets[level - 1]):
-            errors[level] = errors[level - 1]
-            fits.append(fits[-1])
-            continue
-        start = fits[-1].p if fits and fits[-1] is not None else None
-        whole = fit(model, data, free, start)
-        fits.append(whole)
-        for part, held in enumerate(parts):
-            tick(level * count + part + 1, len(LEVELS) * count)
-            used = np.setdiff1d(np.arange(len(data)), held)
-            p = fit(model, data.rows(used), free, start, steps=12).p if len(free) else whole.p
-            errors[level, held] = np.linalg.norm(residuals(model, p, data.rows(held))[0], axis=1)
+    fits, errors = _cross_validated(model, data, sets, tick or (lambda done, of: None))
     level, sure = 0, False  # sure: the level is better than the file by more than chance
     for richer in range(1, len(LEVELS)):
         if np.array_equal(sets[richer], sets[level]):
@@ -70,12 +53,37 @@ def choose(
         better = _better(errors[level], errors[richer], first=not sure)
         if not better and not (richer == 1 and _clearly(errors)):
             continue
-        candidate = fits[richer]
-        if len(data) >= MANY or (candidate is not None and _settled(model, candidate, errors[0])):
+        if len(data) >= MANY or _settled(model, fits[richer], errors[0]):
             level, sure = richer, better
-    chosen = fits[level]
-    assert chosen is not None
-    return Choice(level, errors, chosen)
+    return Choice(level, errors, fits[level])
+
+
+def _cross_validated(
+    model: Model, data: Measured, sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
+) -> tuple[list[Fit], Array]:
+    """Every level fitted to all rows, and how far each row is off where it was left out: (levels, N) [mm].
+
+    sets: numbers of the parameters that are free at each level.
+    """
+    parts = _parts(len(data))
+    errors = np.empty((len(sets), len(data)))
+    fits: list[Fit] = []
+    count = 1 + len(parts)
+    for level, free in enumerate(sets):
+        if level and np.array_equal(free, sets[level - 1]):
+            errors[level] = errors[level - 1]
+            fits.append(fits[-1])
+            continue
+        # Every level starts from the last one's fit to all rows: from the pose of its base.
+        start = fits[-1].p if fits else None
+        whole = fit(model, data, free, start)
+        fits.append(whole)
+        for part, held in enumerate(parts):
+            tick(level * count + part + 1, len(sets) * count)
+            used = np.setdiff1d(np.arange(len(data)), held)
+            p = fit(model, data.rows(used), free, start, steps=12).p if len(free) else whole.p
+            errors[level, held] = np.linalg.norm(residuals(model, p, data.rows(held))[0], axis=1)
+    return fits, errors
 
 
 def free_at(model: Model, level: int, data: Measured, fixed: Collection[str]) -> NDArray[np.intp]:

@@ -118,7 +118,7 @@ def place(
     workers: int = 1,
     cluster: str | None = None,
     progress: Callable[[int], None] | None = None,
-    solve: Solve = ik,
+    solve: Solve | None = None,
 ) -> list[Place]:
     """Where each arm, by itself, reaches the targets (N, m) or (N, 4, 4) [mm, rad] of its task, or carries a path.
 
@@ -138,7 +138,7 @@ def place(
     several = [arms] if not isinstance(arms, Sequence) else list(arms)
     settings = {"area": area, "step": step, "yaw": yaw, "z": z}
     told = None if progress is None else lambda done, total: progress(done)
-    return each(several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), told, solve)
+    return each(several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), told, solve or ik)
 
 
 def each(
