@@ -6,6 +6,7 @@ import pytest
 import armkin
 from armkin import Status
 from armkin.inverse.branches.whole_turns import nearest_row
+from armkin.inverse.redundant import answers_on_planes
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import redundancy
@@ -291,6 +292,47 @@ def test_traced_intervals_end_where_their_arm_has_one_posture_less() -> None:
     for value in [*(ends[1::3] - np.deg2rad(1e-5)), *(ends[1::3] + np.deg2rad(1e-5))]:
         own = held_answers(arm, 6, float(value), target[4], None)
         assert covers(arm, legal, float(value), 0.0).sum() == len(own), np.rad2deg(value)
+
+
+@pytest.mark.parametrize(
+    ("number", "value", "count"),
+    [(48, 185.63707, 7), (174, 104.98252, 6), (180, 182.51449, 4), (272, 182.9476, 8), (291, 353.91396, 6)],
+)
+def test_a_curve_that_passes_a_straight_wrist_is_whole(number: int, value: float, count: int) -> None:
+    """kinova_gen3: five targets of 300 that lacked intervals or parts of some, up to half of them."""
+    arm = armkin.load("kinova_gen3")
+    target = postures(arm, None, 300, 77)[1][number]
+    s = armkin.ik(arm, target)
+    assert s.interval is not None
+    value = float(np.deg2rad(value))
+    assert len(held_answers(arm, 6, value, target, None)) == count
+    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == count
+
+
+@pytest.mark.parametrize(("number", "count"), [(169, 16), (226, 24), (247, 16)])
+def test_curves_on_which_joint_1_hardly_moves_are_found(number: int, count: int) -> None:
+    """kinova_gen3, nearly stretched: all answers lie between two of the values of joint 1 that are asked."""
+    arm = armkin.load("kinova_gen3")
+    s = armkin.ik(arm, postures(arm, None, 300, 77)[1][number])
+    assert s.within_limits.sum() == count
+
+
+def test_answers_do_not_depend_on_the_joint_whose_values_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """kinova_gen3 by the elimination at values of joint 7, or by a spherical wrist's branches at values of joint 1."""
+    arm = armkin.load("kinova_gen3")
+    target = postures(arm, None, 2, 78)[1]
+    near = armkin.ik(arm, target)
+    assert "near spherical wrist" in near.why
+    monkeypatch.setattr(answers_on_planes, "nearly_closed", lambda arm, free: free)
+    other = armkin.ik(arm, target)
+    assert near.interval is not None
+    assert other.interval is not None
+    for k in range(len(target)):
+        own, same = near.interval[k][near.within_limits[k]], other.interval[k][other.within_limits[k]]
+        assert len(own) == len(same)
+        assert len(own)
+        away = np.abs(np.remainder(own[:, None] - same + np.pi, 2 * np.pi) - np.pi).max(axis=2)
+        assert away.min(axis=1).max() < 1e-9
 
 
 def test_a_target_that_only_postures_outside_the_limits_reach_has_no_legal_interval() -> None:

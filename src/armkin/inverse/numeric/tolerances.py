@@ -102,6 +102,7 @@ NO_COST = 1e-18  # costs that differ by less are equal
 EQUAL_COST = 1e-9  # share by which costs of one minimum differ
 PROBE = 1e-6  # of the way to the next sample of a curve, where it is asked whether the motion falls
 SAME_SEED = 1e-4  # [rad, reaches] an arc ends at the answer this close by; residual of one worth a correction
+ROUGHLY = 1e-4  # [reaches, rad] what the middle of a cubic that follows a curve of answers misses at most
 SHORTEST_ARC = 1e-6  # [rad, reaches] step along a curve of answers, below which it is given up
 LAST_STEP = 1e-9  # [rad, reaches] a step of the descent after which none is worth while
 SHORTENED = 0.005  # shortest part of a step that is tried

@@ -9,7 +9,9 @@ samples.py            what samples of these show, and between which they change
 refine_samples.py     between which more are taken
 branch_ends.py        where these end
 arm_angle.py          those curves in closed form, of a shoulder, an elbow and a wrist
-traced_curves.py      the same traced through all joints, of other joints without a closed form
+answers_on_planes.py  answers at values of a joint, of other joints without a closed form
+curve_points.py       points of their curves, and cubics between these
+traced_curves.py      such answers joined to curves
 traced_families.py    and their families
 interval_pieces.py    pieces of such curves: intervals of the redundant joint
 families.py           one joint more than the target asks for: intervals of the redundant joint

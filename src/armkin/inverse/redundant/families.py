@@ -23,14 +23,14 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.numeric.tolerances import PROBE, SAME, SOLUTION
+from armkin.inverse.redundant.answers_on_planes import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
 from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
 from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion
 from armkin.inverse.redundant.other_joints import Follower, Ik
-from armkin.inverse.redundant.traced_curves import PLANES
-from armkin.inverse.redundant.traced_families import Traced
-from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
+from armkin.inverse.redundant.traced_families import Traced, traced
+from armkin.inverse.solvers.redundant import Redundancy, moved, nearly_closed, redundancy
 from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
 from armkin.keep_out.clearance import clear
 from armkin.model import units
@@ -39,7 +39,7 @@ from armkin.model.limits import outside
 
 AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 64  # targets whose arm angles are worked on together
-TRACED = 48  # and whose curves are traced together
+TRACED = 250  # and whose curves are traced together
 FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free
 
 # The answers of some targets N, as curves with a parameter: all their `pieces`; whether no curve can be missing,
@@ -75,7 +75,9 @@ def families(
             rows.add(k, Turning.along(of, goal[k : k + some], each[k : k + some]))
         else:
             find = Follower(ik, true, turned, goal[k : k + some], each[k : k + some])
-            rows.add(k, Followed.along(find) if turned.by_formula else Traced.along(find))
+            for curves in [Followed.along(find)] if turned.by_formula else traced(find):
+                rows.add(k, curves)
+                k += len(curves.short)
     rows.add_points(task, goal, not turned.by_formula)
     q, interval, legal, branch = rows.stacked()
     valid = branch >= 0
@@ -146,7 +148,9 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     elif free.by_formula:
         how = f"{free.geometry.name}, at {SAMPLES} values of it"
     else:
-        how = f"{free.geometry.name}, at {PLANES} values of it, and traced between them"
+        guide = nearly_closed(true, free)
+        name = free.geometry.name if guide is free else f"near {guide.geometry.name}"
+        how = f"{name}, at {PLANES} values of {arm.joint_names[guide.joint]}, and traced between them"
     return (
         f"families of {joint}",
         f"{joint} is redundant: ik lists the intervals of its values; the others: {how}",
@@ -170,6 +174,8 @@ class _Rows:
         self.complete[rows], self.short[rows] = curves.complete, curves.short
         near = self.near[begin + pieces.row]
         q = _nearest(self.arm, curves, near)
+        if isinstance(curves, Traced):
+            q = curves.settled(pieces, q)
         some = np.flatnonzero(self.stands[begin + pieces.row])
         q[some] = _standing(self.arm, self.joint, rows_of(pieces, some), q[some], near[some])
         if self.arm.keep_out:

@@ -87,6 +87,12 @@ class Follower(NamedTuple):
             goal = moved(self.arm, self.free, self.target[rows], t)
             s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
             return np.insert(s.q, self.free.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
+        q, missed = self.candidates(rows, t)
+        np.copyto(q, np.nan, where=~(missed <= ACCEPTED)[..., None])
+        return q
+
+    def candidates(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
+        """Of a closed form all branches (M, B, n), real or not, and what they miss (M, B)."""
         axes = _recorded(self.arm, self.free)[1]
         out = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
         missed = np.empty(out.shape[1:])
@@ -98,9 +104,7 @@ class Follower(NamedTuple):
             for j, q in enumerate(values):
                 out[j, :, some] = np.broadcast_to(q, shape).reshape(-1, shape[-1])
             missed[:, some] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
-        q = out.transpose(2, 1, 0)
-        np.copyto(q, np.nan, where=~(missed.T <= ACCEPTED**2)[..., None])
-        return q
+        return out.transpose(2, 1, 0), np.sqrt(missed.T)
 
     def _candidates(self, rows: NDArray[np.intp], t: Array, room: list[NDArray[Any]]) -> list[Any]:
         """The values of all joints and what they miss, squared, on their own branch axes before targets (M,); the

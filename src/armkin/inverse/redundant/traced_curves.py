@@ -1,9 +1,8 @@
-"""Curves of answers of an arm whose other joints have no closed form: traced from the answers at planes of the joint.
+"""Curves of answers of an arm whose other joints have no closed form: answers on planes of a joint, joined to curves.
 
-The elimination answers PLANES values of the redundant joint. From each answer its curve is traced through the slab
-beside its plane, by Newton's method in all joints with the tangent as the last equation (Allgower and Georg, Numerical
-Continuation Methods, 1990, 2 and 6), to the answer where it leaves the slab; so the arcs join to whole curves, and a
-curve that turns back is followed round its turn.
+Two answers are joined where the cubic through both, along their tangents, solves the target in its middle, as well as
+where that holds of both halves after the middle is moved onto the curve. What such cubics do not join is traced through
+the slab between two planes, step by step.
 """
 
 from __future__ import annotations
@@ -12,235 +11,226 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, wrapped
+from armkin.formula.arrays import Bool, wrapped
 from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import CONVERGING, PAIR_SETTLED, SAME_SEED, SHORTEST_ARC
+from armkin.inverse.numeric.tolerances import SAME_SEED, SHORTEST_ARC, TINY
+from armkin.inverse.redundant.answers_on_planes import Nodes, answered, once
+from armkin.inverse.redundant.curve_points import Points, Ways, onto
 from armkin.inverse.redundant.interval_pieces import Int
-from armkin.inverse.redundant.other_joints import Follower, over_a_turn
+from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
-PLANES = 60  # values of the redundant joint that the elimination answers
-LONGEST = 0.1  # [rad, reaches] step along a curve
-BENT = 0.96  # cosine between the tangents at both ends of a step at least
+HALVINGS = 6  # of the way between two answers
+APART = 6.0  # [rad, reaches] answers may be that one cubic joins
+LONGEST = 0.3  # [rad, reaches] step along a curve
 ASIDE = 0.3  # of a step, that Newton's method moves a point sideways at most
-NEWTON = 4  # its steps
 TRIES = 400  # steps of an arc
-ROUNDS = 3
+ROUNDS = 20  # of arcs, each to the next plane
 
 
-class Points(NamedTuple):
-    """Postures (M, n), unit tangents (M, n) of their curves [rad, reaches], and what the postures miss (M,)."""
+class _Curves:
+    """Nodes of curves, and which halves are joined."""
 
-    q: Array
-    tangent: Array
-    miss: Array
+    def __init__(self, find: Follower) -> None:
+        self.find = find
+        self.planes, self.nodes, grid = answered(find)
+        self.partner = np.full(2 * len(self.nodes.row), -1)
+        behind = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
+        following = np.take_along_axis(grid, behind[:, :, None], axis=1)
+        both = (grid >= 0) & (following >= 0)
+        self._join(2 * grid[both], 2 * following[both] + 1)
 
+    def _add(self, nodes: Nodes) -> Int:
+        """More nodes: their numbers."""
+        first = len(self.nodes.row)
+        self.nodes = stacked([self.nodes, nodes])
+        self.partner = np.append(self.partner, np.full(2 * len(nodes.row), -1))
+        return np.arange(first, first + len(nodes.row))
 
-def onto(find: Follower, row: Int, q: Array, last: Array, fixed: bool = False) -> Points:
-    """Postures q (M, n) moved onto the curves of their targets, across last (M, n), or, fixed, with that held.
-
-    The tangents point to where last does.
-    """
-    arm, task, unit = find.arm, find.free.task, radian_or_reach(find.arm)
-    target = find.target[row]
-    q, tangent, going = q.copy(), last.copy(), np.arange(len(q))
-    for _ in range(NEWTON):
-        some = slice(None) if len(going) == len(q) else going
-        missing, J = newton.scaled(arm, task, q[some], target[some])
-        rows = np.concatenate([J, last[some, None]], axis=1)
-        right = np.zeros((*rows.shape[:2], 2))
-        right[:, :-1, 0], right[:, -1, 1] = missing, 1.0
-        # the direction of a tool's axis is three numbers for two constraints
-        x = nudged(np.linalg.solve, rows, right) if rows.shape[1] == arm.n else np.linalg.pinv(rows) @ right
-        step = x[:, :, 0]
-        tangent[some] = x[:, :, 1] / np.linalg.norm(x[:, :, 1], axis=1, keepdims=True)
-        size = np.abs(step).max(axis=1)
-        q[some] += step * np.minimum(1.0, LONGEST / np.maximum(size, LONGEST))[:, None] * unit
-        going = going[~(size < PAIR_SETTLED)]  # its square is below rounding
-        if not len(going):
-            break
-    miss = newton.missing(arm, task, q, target)
-    return Points(q, tangent, np.where(np.isnan(tangent).any(axis=1), np.inf, miss))
-
-
-class _Seeds(NamedTuple):
-    """Answers on planes: whose target (M,), which plane (M,), and the points, whose tangents raise the joint."""
-
-    row: Int
-    plane: Int
-    points: Points
-
-
-def _seeds(find: Follower, row: Int, plane: Int, q: Array) -> _Seeds:
-    _, J = newton.scaled(find.arm, find.free.task, q, find.target[row])
-    tangent = np.linalg.svd(J)[2][:, -1]
-    tangent = tangent * np.where(tangent[:, find.free.joint] < 0, -1.0, 1.0)[:, None]
-    return _Seeds(row, plane, Points(q, tangent, np.zeros(len(q))))
-
-
-def _answers(find: Follower) -> _Seeds:
-    """Of every target those on all planes."""
-    N, t = len(find.target), over_a_turn(PLANES)
-    q = find.found(np.repeat(np.arange(N), PLANES), np.tile(t, N))
-    place, branch = np.nonzero(~np.isnan(q[:, :, 0]))
-    row, plane, q = place // PLANES, place % PLANES, q[place, branch]
-    missing = newton.missing(find.arm, find.free.task, q, find.target[row])
-    good = missing < SAME_SEED
-    row, plane, q = row[good], plane[good], q[good]
-    last = np.zeros_like(q)
-    last[:, find.free.joint] = 1.0
-    points = onto(find, row, q, last, True)
-    good = points.miss <= CONVERGING
-    return _seeds(find, row[good], plane[good], points.q[good])
-
-
-class _Arcs(NamedTuple):
-    """Of rays M: the points P passed on the way, in their order; where they leave their slab."""
-
-    ray: Int  # (P,)
-    points: Points
-    end: Array  # (M, n) posture on the plane, nan where a ray is lost
-    plane: Int  # (M,) of these
-
-
-def _trace(find: Follower, seeds: _Seeds, ray: Int, side: Int) -> _Arcs:
-    """From seeds ray (M,) to their sides (M,), 1 where the joint grows, else -1."""
-    j, unit, wide = find.free.joint, radian_or_reach(find.arm), 2 * np.pi / PLANES
-    row, plane = seeds.row[ray], seeds.plane[ray]
-    now = rows_of(seeds.points, ray)
-    now = now._replace(tangent=now.tangent * side[:, None])
-    low = over_a_turn(PLANES)[plane]
-    h = np.full(len(ray), LONGEST)
-    end, out = np.full((len(ray), find.arm.n), np.nan), np.zeros(len(ray), np.intp)
-    passed: list[tuple[Int, Points]] = []
-    going = np.arange(len(ray))
-    for _ in range(TRIES):
-        if not len(going):
-            break
-        here = rows_of(now, going)
-        then = onto(find, row[going], here.q + h[going, None] * here.tangent * unit, here.tangent)
-        moved = newton.difference(find.arm, then.q, here.q)
-        aside = np.linalg.norm(moved - h[going, None] * here.tangent, axis=1)
-        good = (then.miss <= CONVERGING) & ((then.tangent * here.tangent).sum(axis=1) > BENT)
-        good &= aside < ASIDE * h[going]
-        h[going] = np.where(good, np.minimum(1.5 * h[going], LONGEST), 0.5 * h[going])
-        depth = wrapped(then.q[:, j] - low[going]) * side[going]
-        left = good & ((depth <= 0.0) | (depth >= wide))
-        if left.any():
-            some, far = going[left], depth[left] >= wide
-            before = wrapped(here.q[left, j] - low[some]) * side[some]
-            share = (np.where(far, wide, 0.0) - before) / np.where(depth[left] == before, 1.0, depth[left] - before)
-            guess = here.q[left] + np.clip(share, 0.0, 1.0)[:, None] * moved[left] * unit
-            out[some] = np.where(far, (plane[some] + side[some]) % PLANES, plane[some])
-            guess[:, j] = over_a_turn(PLANES)[out[some]]
-            held = np.zeros_like(guess)
-            held[:, j] = 1.0
-            there = onto(find, row[some], guess, held, True)
-            end[some] = np.where((there.miss <= CONVERGING)[:, None], there.q, np.nan)
-        inside = good & ~left
-        if inside.any():
-            passed.append((going[inside], rows_of(then, inside)))
-            for one, new in zip(now, then, strict=True):
-                one[going[inside]] = new[inside]
-        going = going[~left & (h[going] > SHORTEST_ARC)]
-    rays = np.concatenate([np.zeros(0, np.intp), *(some for some, _ in passed)])
-    order = np.argsort(rays, kind="stable")
-    points = stacked([points for _, points in passed] or [rows_of(now, rays)])
-    return _Arcs(rays[order], rows_of(points, order), end, out)
-
-
-class Curve(NamedTuple):
-    """A curve of one target: its points in their order, and whether the last one is joined to the first."""
-
-    row: int
-    points: Points
-    closed: bool
-
-
-def curves_of(find: Follower) -> list[Curve]:
-    """All curves of all targets that a seed is on."""
-    seeds = _answers(find)
-    ways: dict[tuple[int, int], tuple[Int, tuple[int, int]]] = {}  # (seed, side): points on the way, where it ends
-    tried: set[tuple[int, int]] = set()
-    passed, count = [], 0
-    for k in range(ROUNDS):
-        rays = [
-            (seed, side)
-            for side in ((1,) if k == 0 else (1, -1))
-            for seed in range(len(seeds.row))
-            if (seed, side) not in ways and (seed, side) not in tried
-        ]
-        if not rays:
-            break
-        tried.update(rays)
-        ray, side = (np.array(column) for column in zip(*rays, strict=True))
-        arcs = _trace(find, seeds, ray, side)
-        seeds, ends = _matched(find, seeds, seeds.row[ray], arcs)
-        index = np.arange(count, count + len(arcs.ray))
-        cut = np.searchsorted(arcs.ray, np.arange(len(ray) + 1)).tolist()
-        stays = (arcs.plane == seeds.plane[ray]).tolist()
-        for i, ((seed, s), to) in enumerate(zip(rays, ends.tolist(), strict=True)):
-            back = (to, s if stays[i] else -s)
-            if to >= 0 and (seed, s) not in ways and back not in ways:
-                own = index[cut[i] : cut[i + 1]]
-                ways[seed, s] = own, back
-                ways[back] = own[::-1], (seed, s)
-        passed.append(arcs.points)
-        count += len(arcs.ray)
-    return _chained(seeds, stacked([*passed, seeds.points]), ways)
-
-
-def _matched(find: Follower, seeds: _Seeds, row: Int, arcs: _Arcs) -> tuple[_Seeds, Int]:
-    """Which seed each arc ends at, -1: none; ends that are no seed yet become one."""
-    ends = np.full(len(row), -1)
-    key = seeds.row * PLANES + seeds.plane
-    order = np.argsort(key, kind="stable")
-    there = np.flatnonzero(~np.isnan(arcs.end[:, 0]))
-    first, last = (
-        np.searchsorted(key[order], row[there] * PLANES + arcs.plane[there], side) for side in ("left", "right")
-    )
-    place = first[:, None] + np.arange(max(int((last - first).max(initial=0)), 1))
-    some = order[np.minimum(place, len(order) - 1)]
-    apart = newton.wrapped_distance(find.arm, seeds.points.q[some], arcs.end[there, None])
-    apart[place >= last[:, None]] = np.inf
-    nearest = apart.argmin(axis=1)
-    found = apart[np.arange(len(there)), nearest] < SAME_SEED
-    ends[there[found]] = some[found, nearest[found]]
-    new: list[int] = []
-    for i in there[~found].tolist():
-        if not any(
-            row[k] == row[i]
-            and arcs.plane[k] == arcs.plane[i]
-            and newton.wrapped_distance(find.arm, arcs.end[k], arcs.end[i]) < SAME_SEED
-            for k in new
-        ):
-            new.append(i)
-            ends[i] = len(seeds.row) + len(new) - 1
-    if new:
-        more = _seeds(find, row[new], arcs.plane[new], arcs.end[new])
-        seeds = stacked([seeds, more])
-    return seeds, ends
-
-
-def _chained(seeds: _Seeds, points: Points, ways: dict[tuple[int, int], tuple[Int, tuple[int, int]]]) -> list[Curve]:
-    """Arcs joined to curves: open ones from their ends, then those that close; points: on the ways, then the seeds'."""
-    M, own = len(seeds.row), np.arange(len(points.miss))[:, None]
-    before = len(own) - M
-    out, left = [], set(range(M))
-    ends = [(seed, -side) for seed in range(M) for side in (1, -1) if (seed, side) not in ways]
-    for begin, side in [*ends, *((seed, 1) for seed in range(M))]:
-        if begin not in left:
-            continue
-        parts, seed, closed = [], begin, False
-        while seed in left:
-            left.remove(seed)
-            parts.append(own[before + seed])
-            if (seed, side) not in ways:
+    def _join(self, a: Int, b: Int) -> None:
+        """Halves a and b (M,) joined by cubics, of which each must do."""
+        find, whose, failed = self.find, np.arange(len(a)), np.zeros(len(a), bool)
+        links: list[tuple[Int, Int, Int]] = []
+        for k in range(HALVINGS + 1):
+            if not len(a):
                 break
-            some, (seed, came) = ways[seed, side]
-            parts.append(some)
-            side, closed = -came, seed == begin
-        out.append(Curve(int(seeds.row[begin]), rows_of(points, np.concatenate(parts)), closed))
-    return out
+            first, last = self.nodes.leaving(a), self.nodes.leaving(b)
+            ways = Ways.between(find, first, last._replace(tangent=-last.tangent))
+            size = np.sqrt((ways.chord**2).sum(axis=1))
+            apart = (ways.chord * first.tangent).sum(axis=1) < 0
+            apart |= ((ways.chord * last.tangent).sum(axis=1) > 0) | (size > APART)
+            row = self.nodes.row[a >> 1]
+            good = ~apart & ways.follow(find, row)
+            links.append((a[good], b[good], whose[good]))
+            failed[whose[apart]] = True
+            left = np.flatnonzero(~good & ~failed[whose])
+            if k == HALVINGS:
+                failed[whose[left]] = True
+                break
+            middle = rows_of(ways, left).at(find, 0.5)
+            points = onto(find, row[left], middle, ways.chord[left] / size[left, None], SAME_SEED)
+            aside = newton.wrapped_distance(find.arm, points.q, middle)
+            good = (points.step < SAME_SEED) & (aside < ASIDE * size[left])
+            failed[whose[left[~good]]] = True
+            left = left[good]
+            new = self._add(Nodes(row[left], np.full(len(left), -1), rows_of(points, good)))
+            a, b = np.concatenate([a[left], 2 * new]), np.concatenate([2 * new + 1, b[left]])
+            whose = np.tile(whose[left], 2)
+        a, b, whose = (np.concatenate(column) for column in zip(*links, strict=True)) if links else (a, b, whose)
+        a, b = a[~failed[whose]], b[~failed[whose]]
+        self.partner[a], self.partner[b] = b, a
+
+    def slab(self, half: Int) -> Int:
+        """In which slab between two planes halves are: the plane below it."""
+        row = self.nodes.row[half >> 1]
+        return np.asarray((self.nodes.plane[half >> 1] - (half & 1)) % self.planes.counts[row])
+
+    def open(self) -> Int:
+        """Halves that are joined to none, of nodes on planes."""
+        return np.flatnonzero((self.partner < 0) & (np.repeat(self.nodes.plane, 2) >= 0))
+
+    def join_pairs(self) -> None:
+        """Open halves of a slab, each with the one that a short cubic leads to, and which leads to it."""
+        half = self.open()
+        slab = self.planes.place(self.nodes.row[half >> 1], self.slab(half))
+        order, every = np.argsort(slab, kind="stable"), np.arange(len(half))
+        half, slab = half[order], slab[order]
+        first, behind = np.searchsorted(slab, slab, "left"), np.searchsorted(slab, slab, "right")
+        place = first[:, None] + np.arange(max((behind - first).max(initial=0), 1))
+        a, b = np.broadcast_to(every[:, None], place.shape), np.minimum(place, len(half) - 1)
+        one, other = self.nodes.leaving(half), self.nodes.leaving(half[b])
+        chord = newton.difference(self.find.arm, other.q, one.q[:, None])
+        along = (chord * (one.tangent[:, None] - other.tangent)).sum(axis=2)
+        cost = 2.0 * np.sqrt((chord * chord).sum(axis=2)) - 0.5 * along
+        cost[(along <= 0) | (place >= behind[:, None]) | (a == b)] = np.inf
+        best = cost.argmin(axis=1)
+        to = np.where(np.isfinite(cost[every, best]), b[every, best], -1)
+        mutual = np.flatnonzero((to > every) & (to[to] == every))
+        self._join(half[mutual], half[to[mutual]])
+
+    def trace(self) -> None:
+        """Open halves, step by step to where they leave their slab."""
+        ray = self.open()
+        passed, end, plane = self._steps(ray)
+        there, every = np.flatnonzero(plane >= 0), np.arange(len(ray))
+        row, slab = self.nodes.row[ray >> 1], self.slab(ray)
+        number = self._on_plane(Nodes(row[there], plane[there], rows_of(end, there)))
+        to, place = np.full(len(ray), -1), np.full(len(self.partner), len(ray))
+        to[there], place[ray] = 2 * number + (plane[there] != slab[there]), every
+        # an arc is traced from both of its ends: once will do
+        kept = (to >= 0) & (self.partner[to] < 0) & (every < place[to]) & (to != ray)
+        kept &= np.isin(every, np.unique(to, return_index=True)[1])
+        some, whose = np.flatnonzero(kept), np.concatenate([some for some, _ in passed])
+        on = np.flatnonzero(kept[whose])
+        points, whose = rows_of(stacked([points for _, points in passed]), on), whose[on]
+        new = self._add(Nodes(row[whose], np.full(len(on), -1), points))
+        a = np.append(ray[some], 2 * new)[np.argsort(np.append(some, whose), kind="stable")]
+        b = np.append(2 * new + 1, to[some])[np.argsort(np.append(whose, some), kind="stable")]
+        self._join(a, b)
+
+    def _on_plane(self, found: Nodes) -> Int:
+        """The nodes that others, on planes, are; those that are none yet become one."""
+        own, number = self.planes.place(found.row, found.plane), np.full(len(found.row), -1)
+        for _ in range(2):
+            near = np.flatnonzero(self.nodes.plane >= 0)
+            place = self.planes.place(self.nodes.row[near], self.nodes.plane[near])
+            asked = np.isin(place, own)
+            i, k = np.nonzero(own[:, None] == place[asked])
+            k = near[asked][k]
+            apart = newton.wrapped_distance(self.find.arm, found.points.q[i], self.nodes.points.q[k])
+            number[i[apart < SAME_SEED]] = k[apart < SAME_SEED]
+            new = np.flatnonzero(number < 0)
+            if not len(new):
+                break
+            new = new[once(self.find, own[new], found.points.q[new])]
+            self._add(Nodes(found.row[new], found.plane[new], rows_of(found.points, new)))
+        return number
+
+    def _steps(self, ray: Int) -> tuple[list[tuple[Int, Points]], Points, Int]:
+        """From halves (M,): the points passed on the way, of which rays; those on the plane at the end, and which, -1:
+        lost."""
+        find, j, unit, values = self.find, self.planes.guide.joint, radian_or_reach(self.find.arm), self.planes.values
+        row, slab, now = self.nodes.row[ray >> 1], self.slab(ray), self.nodes.leaving(ray)
+        behind = (slab + 1) % self.planes.counts[row]
+        low, h = values[row, slab], np.full(len(ray), LONGEST)
+        wide = np.remainder(values[row, behind] - low, 2 * np.pi)
+        end, plane = Points(*(x.copy() for x in now)), np.full(len(ray), -1)
+        passed, going = [(ray[:0], rows_of(now, ray[:0]))], np.arange(len(ray))
+        for _ in range(TRIES):
+            here, step = rows_of(now, going), h[going, None]
+            then = onto(find, row[going], here.q + step * here.tangent * unit, here.tangent)
+            way = Ways.between(find, here, then)
+            aside = np.sqrt(((way.chord - step * here.tangent) ** 2).sum(axis=1))
+            good = then.settled & (aside < ASIDE * h[going]) & way.follow(find, row[going])
+            h[going] = np.where(good, np.minimum(1.5 * h[going], LONGEST), 0.5 * h[going])
+            middle = low[going] + 0.5 * wide[going]
+            depth, before = (wrapped(one.q[:, j] - middle) for one in (then, here))
+            left = good & (np.abs(depth) >= 0.5 * wide[going]) & (np.abs(depth - before) > TINY)
+            some, far = going[left], depth[left] > 0
+            goal = np.where(far, 0.5, -0.5) * wide[some]
+            share = np.clip((goal - before[left]) / (depth[left] - before[left]), 0.0, 1.0)
+            guess = here.q[left] + share[:, None] * way.chord[left] * unit
+            guess[:, j] = middle[left] + goal
+            there = onto(find, row[some], guess, self.planes.held(len(some)))
+            plane[some] = np.where(there.settled, np.where(far, behind[some], slab[some]), -1)
+            inside = good & ~left
+            passed.append((going[inside], rows_of(then, inside)))
+            for one, new, last, final in zip(now, then, end, there, strict=True):
+                one[going[inside]] = new[inside]
+                last[some] = final
+            going = going[~left & (h[going] > SHORTEST_ARC)]
+            if not len(going):
+                break
+        return passed, end, plane
+
+
+class Chains(NamedTuple):
+    """Curves C, target after target: their points P in their order, along their tangents."""
+
+    points: Points
+    row: Int  # (C,) whose target
+    counts: Int  # (C,) of points
+    closed: Bool  # (C,) the last one is joined to the first
+
+
+def curves_of(find: Follower) -> Chains:
+    """All curves of all targets that an answer is on."""
+    curves = _Curves(find)
+    for _ in range(ROUNDS):
+        if not len(curves.open()):
+            break
+        curves.join_pairs()
+        curves.trace()
+    return _chained(curves)
+
+
+def _chained(curves: _Curves) -> Chains:
+    """Halves that are joined as curves, each in one of its two senses."""
+    partner, nodes = curves.partner, curves.nodes
+    M = len(partner)
+    every, end = np.arange(M), M
+    behind = np.append(np.where(partner < 0, end, partner ^ 1), end)  # the half that a curve goes on with
+    rounds = range(max(M, 1).bit_length())
+    jump, least = behind.copy(), np.arange(M + 1)
+    for _ in rounds:
+        least, jump = np.minimum(least, least[jump]), jump[jump]
+    ring = jump[:-1] != end
+    behind[:-1][ring & (behind[:-1] == least[:-1])] = end  # a ring begins at its least half
+    jump, left = behind.copy(), (behind < end).astype(np.intp)
+    last = np.where(behind < end, behind, np.arange(M + 1))
+    for _ in rounds:
+        left, last, jump = left + left[jump], last[last], jump[jump]
+    last = last[:-1]
+    first = np.full(M + 1, -1)
+    begins = np.ones(M + 1, bool)
+    begins[behind] = False
+    first[last[begins[:-1]]] = np.flatnonzero(begins[:-1])
+    one = np.where(ring, least[:-1] < least[every ^ 1], last < (first[last] ^ 1))
+    one &= (nodes.plane[every >> 1] >= 0) | (left[:-1] > 0) | (last != first[last])  # not a middle of a way that failed
+    some = np.flatnonzero(one)
+    row = nodes.row[some >> 1]
+    order = np.lexsort((-left[some], last[some], row))
+    some, row = some[order], row[order]
+    begin = np.flatnonzero(np.diff(last[some], prepend=-1))
+    return Chains(nodes.leaving(some), row[begin], np.diff(begin, append=len(some)), ring[some[begin]])

@@ -1,24 +1,44 @@
-"""Families of an arm whose other joints have no closed form: pieces of the curves that `traced_curves` follows."""
+"""Families of an arm whose other joints have no closed form: pieces of the curves that `traced_curves` joins."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.formula.rows import stacked
+from armkin.formula.rows import rows_of
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import CONVERGING, REACH
+from armkin.inverse.numeric.newton import nudged
+from armkin.inverse.numeric.tolerances import PAIR_SETTLED, REACH, TINY
+from armkin.inverse.redundant.curve_points import Points, Ways, onto
 from armkin.inverse.redundant.interval_pieces import Int, Pieces, best_samples, holding_none, margin, motion, none, runs
 from armkin.inverse.redundant.other_joints import Follower
-from armkin.inverse.redundant.traced_curves import Points, curves_of, onto
+from armkin.inverse.redundant.traced_curves import Chains, curves_of
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
-ON_LIMIT, ON_TURN = 12, 14  # steps to where a limit is crossed, and to where the joint turns back
-STEPS = 16  # of the golden section
+AT_ONCE = 16  # targets whose points stay in the cache
+PARTS = 4  # of the way between two points, at whose ends limits and the joint's sense are asked
+SECANTS = 10  # steps along a cubic to where a limit is crossed or the joint turns back
+WAY = 0.1  # of the way, on both sides, at which a cubic's slope tells how the joint turns back: it is a parabola
+TURNS = 3  # steps along the curve to there
+LAST = 2  # steps that take away what is left of a posture
+STEPS = 12  # of the golden section
+
+
+def traced(find: Follower) -> Iterator[Traced]:
+    """Those of all targets, some at a time."""
+    chains = curves_of(find)
+    point = np.append(0, np.cumsum(chains.counts))
+    for k in range(0, len(find.target), AT_ONCE):
+        a, b = np.searchsorted(chains.row, [k, k + AT_ONCE])
+        some = slice(a, b)
+        points = rows_of(chains.points, slice(point[a], point[b]))
+        own = Chains(points, chains.row[some] - k, chains.counts[some], chains.closed[some])
+        yield Traced.of(find.of(np.arange(k, min(k + AT_ONCE, len(find.target)))), own)
 
 
 class Traced(NamedTuple):
@@ -26,9 +46,11 @@ class Traced(NamedTuple):
 
     find: Follower
     points: Points  # of all curves, one after the other
-    after: Int  # (P,) the point after each, itself where an open curve ends
+    ways: Ways  # from each point to the one after it
+    row: Int  # (P,) whose target
     begin: Int  # (C,) first point of each curve
     counts: Int  # (C,) of its points
+    after: Int  # (P,) the point after each, itself where an open curve ends
     curve: Int  # (N, B) which curve branch b of a target is
     pieces: Pieces
     short: Bool
@@ -36,157 +58,189 @@ class Traced(NamedTuple):
     steps: int = STEPS
 
     @classmethod
-    def along(cls, find: Follower) -> Traced:
-        """The curves of all targets."""
-        found = curves_of(find)
-        N, n = find.near.shape
-        count = np.array([len(one.points.miss) for one in found], np.intp)
-        begin = np.cumsum(count) - count
-        after = np.arange(1, int(count.sum()) + 1)
-        for one, k, length in zip(found, begin.tolist(), count.tolist(), strict=True):
-            after[k + length - 1] = k if one.closed else k + length - 1
-        row = np.array([one.row for one in found], np.intp)
-        branch = np.array([int((row[:k] == row[k]).sum()) for k in range(len(row))], np.intp)
+    def of(cls, find: Follower, chains: Chains) -> Traced:
+        """Curves of some targets."""
+        points, row, count, closed = chains
+        N, begin, P = len(find.target), np.cumsum(count) - count, len(points.step)
+        after = np.arange(1, P + 1)
+        after[begin + count - 1] = np.where(closed, begin, begin + count - 1)
+        branch = np.arange(len(row)) - np.searchsorted(row, row)
         curve = np.zeros((N, int(branch.max(initial=0)) + 1), np.intp)
         curve[row, branch] = np.arange(len(row))
-        points = stacked([one.points for one in found] or [Points(np.zeros((0, n)), np.zeros((0, n)), np.zeros(0))])
-        curves = cls(find, points, after, begin, count, curve, none(n), *np.zeros((2, N), bool))
-        if not len(row):
+        ways = Ways.between(find, points, rows_of(points, after))
+        flags = np.zeros((2, N), bool)
+        curves = cls(find, points, ways, np.repeat(row, count), begin, count, after, curve, none(find.arm.n), *flags)
+        if not P:
             return curves
         extent = np.zeros(N)
-        way = np.add.reduceat(np.abs(curves.chord(np.arange(len(after)))), begin, axis=0).max(axis=1)
-        np.maximum.at(extent, row, 0.5 * way)
+        np.maximum.at(extent, row, 0.5 * np.add.reduceat(np.abs(ways.chord), begin, axis=0).max(axis=1))
         return curves._replace(pieces=curves._pieces(row, branch), short=(extent > 0) & (extent < REACH))
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
-        """The samples beside the best one."""
-        return [pieces.low, pieces.high]
+        """As `Turning.tried`."""
+        return []
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Turning.at`."""
         curve = self.curve[pieces.row, pieces.branch]
         whole = np.floor(parameter)
         point = self.begin[curve] + whole.astype(np.intp) % self.counts[curve]
-        there = self.between(pieces.row, point, parameter - whole)
+        there = self._between(point, parameter - whole, REACH)  # a cubic's miss squared is left
         q, legal = nearest_row(self.find.arm, there.q, self.find.near[pieces.row])
-        return q, legal & (there.miss <= CONVERGING)
+        return q, legal & (there.step < REACH)
 
-    def chord(self, point: Int) -> Array:
-        """From points (M,) to those after them (M, n) [rad, reaches]."""
-        return newton.difference(self.find.arm, self.points.q[self.after[point]], self.points.q[point])
+    def settled(self, pieces: Pieces, q: Array) -> Array:
+        """Postures (P, n) of pieces, without what `at` leaves, by steps of least norm."""
+        find, q = self.find, q.copy()
+        for _ in range(LAST):
+            missing, J = newton.scaled(find.arm, find.free.task, q, find.target[pieces.row])
+            weight = nudged(np.linalg.solve, J @ J.transpose(0, 2, 1), missing[:, :, None])
+            q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(find.arm)
+        return q
 
-    def between(self, row: Int, point: Int, share: Array) -> Points:
-        """Points on the curves at shares (M,) of the way from points (M,) to those after them."""
-        chord = self.chord(point)
-        size = np.linalg.norm(chord, axis=1, keepdims=True)
-        last = np.where(size > 0, chord / np.where(size > 0, size, 1.0), self.points.tangent[point])
-        guess = self.points.q[point] + share[:, None] * chord * radian_or_reach(self.find.arm)
-        return onto(self.find, row, guess, last)
+    def _between(self, point: Int, share: Array, enough: float = PAIR_SETTLED) -> Points:
+        """Points of the curves at shares (M,) of the way from points (M,) to those after them."""
+        ways = rows_of(self.ways, point)
+        last = np.where(ways.chord.any(axis=1, keepdims=True), ways.chord, self.points.tangent[point])
+        return onto(self.find, self.row[point], ways.at(self.find, share), last, enough)
 
     def _pieces(self, row: Int, branch: Int) -> Pieces:
         """All pieces of curves (C,)."""
-        arm, j = self.find.arm, self.find.free.joint
-        whose = np.repeat(row, self.counts)
-        q, tangent, P = self.points.q, self.points.tangent, len(whose)
-        index = np.arange(P)
-        chord, next_tangent = self.chord(index), tangent[self.after]
-        legal = margin(arm, q) >= -SLACK
-        up = tangent[:, j] * (tangent * chord).sum(axis=1) > 0
-        next_up = next_tangent[:, j] * (next_tangent * chord).sum(axis=1) > 0
-        alive = self.after != index
-        crosses, turns = (np.flatnonzero(alive & changed) for changed in (legal != legal[self.after], up != next_up))
-        crossing, turning = np.full(P, np.inf), np.full(P, np.inf)
-        crossing[crosses] = self._crossing(whose[crosses], crosses)
-        turning[turns] = self._turning(whose[turns], turns, up[turns])
-        # nodes: the points, and where something changes on the way to the next one
-        point = np.concatenate([index, crosses, turns])
-        share = np.concatenate([np.zeros(P), crossing[crosses], turning[turns]])
-        order = np.lexsort((share, point))
-        point, share = point[order], share[order]
-        now_legal = np.where(crossing[point] <= share, legal[self.after][point], legal[point]) & alive[point]
-        now_up = np.where(turning[point] <= share, next_up[point], up[point])
-        posture, fits = self._postures(whose, point, share)
-        cost = motion(arm, posture, self.find.near[whose[point]])
-        costs = np.stack([cost, np.where(fits, cost, np.inf)])
-        cuts = np.searchsorted(point, np.append(self.begin, P))
-        parts = []
-        for c, (k, end) in enumerate(zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True)):
-            some = slice(k, end)
-            nodes = _Nodes(
-                point[some] - self.begin[c] + share[some], posture[some], costs[:, some], now_legal[some],
-                now_up[some], alive[point[some]], int(self.counts[c]),
-            )  # fmt: skip
-            parts.append(nodes.pieces(int(row[c]), int(branch[c]), j))
-        return stacked(parts)
+        nodes = self._nodes()
+        return nodes.of_curves(self, row, branch, np.searchsorted(nodes.at, self.begin))
 
-    def _postures(self, whose: Int, point: Int, share: Array) -> tuple[Array, Bool]:
-        """Nodes at their nearest legal copies, and whether they are legal."""
-        q, some = self.points.q[point], np.flatnonzero(share)
-        if len(some):
-            q[some] = self.between(whose[point[some]], point[some], share[some]).q
-        return nearest_row(self.find.arm, q, self.find.near[whose[point]])
+    def _nodes(self) -> _Nodes:
+        """Samples of all curves, and where something changes between them."""
+        arm, j, P = self.find.arm, self.find.free.joint, len(self.row)
+        point, parts = np.repeat(np.arange(P), PARTS), np.arange(PARTS) / PARTS
+        part, own = np.tile(parts, P), [self.ways.at(self.find, u) for u in parts]
+        q = np.stack(own, axis=1).reshape(-1, arm.n)
+        up = (np.stack([self.ways.slope(u, j) for u in parts], axis=1) > 0).ravel()
+        alive = self.after[point] != point
+        following = np.arange(1, len(point) + 1)
+        following[PARTS - 1 :: PARTS] = PARTS * self.after
+        legal: Bool = np.asarray(margin(arm, q) >= -SLACK)
+        next_legal, next_up = legal[following], up[following]
+        crosses, turns = (np.flatnonzero(alive & changed) for changed in (legal != next_legal, up != next_up))
+        crossing, turning = np.full(len(point), np.inf), np.full(len(point), np.inf)
+        crossing[crosses], crossed = self._crossing(point[crosses], part[crosses])
+        turning[turns], turned = self._turning(point[turns], part[turns])
+        cell = np.concatenate([np.arange(len(point)), crosses, turns])
+        share = np.concatenate([part, crossing[crosses], turning[turns]])
+        posture = np.concatenate([q, crossed, turned])
+        order = np.lexsort((share, cell))
+        cell, share = cell[order], share[order]
+        return _Nodes(
+            point[cell] + share, posture[order],
+            np.where(crossing[cell] <= share, next_legal[cell], legal[cell]) & alive[cell],
+            np.where(turning[cell] <= share, next_up[cell], up[cell]), alive[cell],
+        )  # fmt: skip
 
-    def _crossing(self, row: Int, point: Int) -> Array:
-        """Shares of the way (M,) at which a limit is crossed: regula falsi, the Illinois way."""
-        arm = self.find.arm
-        lo, hi = np.zeros(len(point)), np.ones(len(point))
-        at_lo, at_hi = margin(arm, self.points.q[point]), margin(arm, self.points.q[self.after[point]])
-        share, side = 0.5 * (lo + hi), np.zeros(len(point))
-        for _ in range(ON_LIMIT if len(point) else 0):
-            apart = np.where(at_hi == at_lo, 1.0, at_hi - at_lo)
-            share = np.where(at_hi == at_lo, 0.5 * (lo + hi), (lo * at_hi - hi * at_lo) / apart)
-            value = margin(arm, self.between(row, point, share).q)
-            low = (value >= 0) == (at_lo >= 0)
-            at_hi = np.where(low, np.where(side > 0, 0.5 * at_hi, at_hi), value)
-            at_lo = np.where(low, value, np.where(side < 0, 0.5 * at_lo, at_lo))
-            lo, hi, side = np.where(low, share, lo), np.where(low, hi, share), np.where(low, 1.0, -1.0)
-        return share
+    def _crossing(self, point: Int, low: Array) -> tuple[Array, Array]:
+        """Shares of the way (M,) at which a limit is crossed, and the postures there: its joint is held on it."""
+        arm, ways = self.find.arm, rows_of(self.ways, point)
+        share = _root(lambda t: margin(arm, ways.at(self.find, t)), low, low + 1.0 / PARTS)
+        guess = ways.at(self.find, share)
+        free = (arm.upper - arm.lower == np.inf) | (~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi))
+        low, high = np.where(free, 0.0, arm.lower), np.where(free, 0.0, arm.upper)
+        off = guess - 0.5 * (low + high)
+        off = np.where(arm.prismatic, off, wrapped(off))
+        room = np.where(free, np.inf, 0.5 * (high - low) - np.abs(off))
+        which, index = room.argmin(axis=1), np.arange(len(point))
+        held = np.zeros_like(guess)
+        held[index, which] = 1.0
+        guess[index, which] += np.sign(off[index, which]) * room[index, which]
+        there = onto(self.find, self.row[point], guess, held)
+        good = there.settled & (np.abs(there.q - guess).max(axis=1, initial=0.0) < REACH)
+        some = np.flatnonzero(~good)  # it touches its limit alone
+        there.q[some] = self._between(point[some], share[some]).q
+        return share, there.q
 
-    def _turning(self, row: Int, point: Int, up: Bool) -> Array:
-        """Shares of the way (M,) at which the joint turns back, which it does square: bisection to some 1e-5."""
-        lo, hi = np.zeros(len(point)), np.ones(len(point))
-        for _ in range(ON_TURN if len(point) else 0):
-            middle = 0.5 * (lo + hi)
-            same = (self.between(row, point, middle).tangent[:, self.find.free.joint] > 0) == up
-            lo, hi = np.where(same, middle, lo), np.where(same, hi, middle)
-        return lo
+    def _turning(self, point: Int, low: Array) -> tuple[Array, Array]:
+        """Shares of the way (M,) at which the joint turns back, and the postures there: by a step along the tangent."""
+        j, ways = self.find.free.joint, rows_of(self.ways, point)
+        share = _root(lambda t: ways.slope(t, j), low, low + 1.0 / PARTS)
+        there = self._between(point, share)
+        size = np.sqrt((ways.begin**2).sum(axis=1))
+        bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * size**2)
+        for _ in range(TURNS if len(point) else 0):
+            step = np.clip(
+                -there.tangent[:, j] / np.where(np.abs(bend) > TINY, bend, np.inf), -REACH * size, REACH * size
+            )
+            ahead = there.q + step[:, None] * there.tangent * radian_or_reach(self.find.arm)
+            after = onto(self.find, self.row[point], ahead, there.tangent)
+            bend = np.where(step == 0.0, bend, (after.tangent - there.tangent)[:, j] / np.where(step == 0.0, 1.0, step))
+            there = after
+        return share, there.q
+
+
+def _root(value: Callable[[Array], Array], lo: Array, hi: Array) -> Array:
+    """Where values change their sign between lo and hi (M,): regula falsi, the Illinois way."""
+    at_lo, at_hi = value(lo), value(hi)
+    share, side = 0.5 * (lo + hi), np.zeros(len(lo))
+    for _ in range(SECANTS if len(lo) else 0):
+        apart = np.where(at_hi == at_lo, 1.0, at_hi - at_lo)
+        share = np.where(at_hi == at_lo, 0.5 * (lo + hi), (lo * at_hi - hi * at_lo) / apart)
+        share = np.clip(share, lo, hi)
+        here = value(share)
+        low = (here >= 0) == (at_lo >= 0)
+        at_hi = np.where(low, np.where(side > 0, 0.5 * at_hi, at_hi), here)
+        at_lo = np.where(low, here, np.where(side < 0, 0.5 * at_lo, at_lo))
+        lo, hi, side = np.where(low, share, lo), np.where(low, hi, share), np.where(low, 1.0, -1.0)
+    return share
 
 
 class _Nodes(NamedTuple):
-    """The points of one curve, and where a limit is crossed or the joint turns back: K of them, as they follow."""
+    """Samples of curves, and where a limit is crossed or the joint turns back: K of them, as they follow."""
 
-    at: Array  # (K,) parameter
+    at: Array  # (K,) parameter, counting the points of all curves
     q: Array  # (K, n)
-    cost: Array  # (2, K) motion from near; of legal ones
     legal: Bool  # (K,) behind the node
     up: Bool  # (K,) whether the joint grows behind it
     alive: Bool  # (K,) whether the curve goes on behind it
-    whole: int  # the parameter after a whole turn
 
-    def pieces(self, row: int, branch: int, joint: int) -> Pieces:
-        """The pieces of the curve."""
-        K = len(self.at)
-        turns = (self.up != np.roll(self.up, 1))[None]
-        good = (self.legal & self.alive)[None]
-        _, first, length = runs(good, turns)
-        empty_of, begin, count = runs(self.alive[None], turns)
-        empty = holding_none(good, empty_of, begin, count)
-        legal = np.repeat([True, False], [len(first), int(empty.sum())])
-        first, length = np.concatenate([first, begin[empty]]), np.concatenate([length, count[empty]])
-        best = best_samples(self.cost, legal.astype(np.intp), first, length + 1)
-        t = self.q[:, joint]
-        way = np.concatenate([[0.0], np.cumsum(np.tile(wrapped(np.roll(t, -1) - t), 2))])
-        start = t[first]
-        end = start + way[first + length] - way[first]
+    def of_curves(self, curves: Traced, row: Int, branch: Int, cuts: Int) -> Pieces:
+        """The pieces of curves (C,), which begin at nodes cuts (C,): in a table with a row each, whose last node is
+        repeated at the parameter where the curve closes."""
+        arm, near = curves.find.arm, curves.find.near
+        count = np.diff(cuts, append=len(self.at))
+        C, K = len(row), int(count.max())
+        k = np.arange(K)
+        last = cuts + count - 1
+        own = np.minimum(cuts[:, None] + k, last[:, None])
+        good, up, alive = self.legal[own], self.up[own], self.alive[own]
+        whole = curves.counts
+        padded = (k >= count[:, None]) & self.alive[last][:, None]
+        at = np.where(padded, whole[:, None], self.at[own] - curves.begin[:, None])
+        own = np.where(padded, cuts[:, None], own)
+        q, fits = nearest_row(arm, self.q, near[curves.row[self.at.astype(np.intp)]])
+        cost = motion(arm, q, near[curves.row[self.at.astype(np.intp)]])
+        costs = np.concatenate([cost[own], np.where(fits, cost, np.inf)[own]])
+        turns = up != np.roll(up, 1, axis=1)
+        of, first, length = runs(good, turns)
+        other, begin, run = runs(alive, turns)
+        empty = holding_none(good, other, begin, run)
+        legal = np.repeat([True, False], [len(of), int(empty.sum())])
+        of, first = np.append(of, other[empty]), np.append(first, begin[empty])
+        length = np.append(length, run[empty])
+        best = best_samples(costs, of + C * legal, first, length + 1)
+        t = self.q[own, curves.find.free.joint]
+        way = np.cumsum(np.tile(wrapped(np.roll(t, -1, axis=1) - t), 2), axis=1)
+        way = np.concatenate([np.zeros((C, 1)), way], axis=1)
+        start = t[of, first]
+        end = start + way[of, first + length] - way[of, first]
 
-        def at(node: Int) -> Array:
-            return np.asarray(self.at[node % K] + self.whole * (node // K))
+        def parameter(node: Int) -> Array:
+            return np.asarray(at[of, node % K] + whole[of] * (node // K))
 
         on = first + best
-        return Pieces(
-            np.full(len(first), row), np.full(len(first), branch), legal,
-            np.minimum(start, end), np.where(length == K, np.minimum(start, end) + 2 * np.pi, np.maximum(start, end)),
-            at(first), at(first + length),
-            at(np.maximum(on - 1, first)), at(on), at(np.minimum(on + 1, first + length)),
-            self.q[on % K],
+        low = np.minimum(start, end)
+        found = Pieces(
+            row[of], branch[of], legal, low, np.where(length == K, low + 2 * np.pi, np.maximum(start, end)),
+            parameter(first), parameter(first + length),
+            parameter(np.maximum(on - 1, first)), parameter(on), parameter(np.minimum(on + 1, first + length)),
+            q[own[of, on % K]],
         )  # fmt: skip
+        exact, allowed = curves.at(found, found.at)
+        inside = (best > 0) & (best < length) & (allowed | ~legal)
+        return found._replace(start=np.where(inside[:, None], exact, found.start))

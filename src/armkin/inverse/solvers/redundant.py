@@ -11,9 +11,10 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
+from armkin.inverse.closed import spherical, three_parallel
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
-from armkin.inverse.numeric.tolerances import EXACT
+from armkin.inverse.numeric.tolerances import EXACT, NEAR
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task
@@ -68,6 +69,19 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
             continue
     closed = [one for one in found if one.geometry.pairs is not None]
     return next(iter(closed or found[:1]), None)
+
+
+@lru_cache(maxsize=64)
+def nearly_closed(arm: Arm, free: Redundancy) -> Redundancy:
+    """A joint whose others miss a closed form by little, to be held in place of the redundant one; else that one."""
+    for joint in (arm.n - 1, 0):
+        if free.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
+            continue
+        rest = lock(arm, {arm.joint_names[joint]: 0.0})
+        for alike in (module.recognise(rest, free.task, NEAR) for module in (spherical, three_parallel)):
+            if alike is not None and (one := Redundancy(joint, rest, free.task, alike)).by_formula:
+                return one
+    return free
 
 
 def _turns_about_the_tool(arm: Arm, task: Task) -> bool:

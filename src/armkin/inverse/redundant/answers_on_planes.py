@@ -1,0 +1,123 @@
+"""Answers of some targets at values of one joint, planes: where curves of answers are begun.
+
+The joint is one whose others miss a closed form by little, as a spherical wrist whose axes do not quite meet: the
+branches of the arm that has it are moved onto the arm; else the redundant one, at whose values the elimination answers.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import rows_of
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.tolerances import ACCEPTED, NEAR, SAME_SEED
+from armkin.inverse.redundant.curve_points import Points, onto
+from armkin.inverse.redundant.interval_pieces import Int, turning
+from armkin.inverse.redundant.other_joints import Follower, over_a_turn
+from armkin.inverse.solvers.redundant import Redundancy, nearly_closed
+
+PLANES = 60  # values of the joint that are answered
+BETWEEN = 12  # parts of the way between two, where answers may be that neither has
+
+
+class Nodes(NamedTuple):
+    """Points of curves: whose target (M,), on which plane (M,), -1 of none; there the tangents raise the joint.
+
+    The half 2 m of a curve leaves node m along its tangent, 2 m + 1 against it.
+    """
+
+    row: Int
+    plane: Int
+    points: Points
+
+    def leaving(self, half: Int) -> Points:
+        """The nodes of halves (...), their tangents along these."""
+        points = rows_of(self.points, half >> 1)
+        return points._replace(tangent=points.tangent * (1 - 2 * (half & 1))[..., None])
+
+
+class Planes(NamedTuple):
+    """Values of a joint that are answered: (N, V), inf behind the last ones, and how many of each target (N,)."""
+
+    find: Follower
+    guide: Redundancy  # that joint, and the others
+    values: Array
+    counts: Int
+
+    def held(self, count: int) -> Array:
+        """Directions (M, n) in which that joint alone moves."""
+        out = np.zeros((count, self.find.arm.n))
+        out[:, self.guide.joint] = 1.0
+        return out
+
+    def place(self, row: Int, plane: Int) -> Int:
+        """One number for targets and their planes (M,), counted round the turn."""
+        return np.asarray(row * self.values.shape[1] + plane % self.counts[row])
+
+    def answers(self, row: Int, plane: Int, q: Array) -> tuple[Nodes, Int]:
+        """Postures (M, n) moved along their planes (M,) onto curves, each once, and which of them are (K,)."""
+        points = onto(self.find, row, q, self.held(len(q)), SAME_SEED)
+        good = np.flatnonzero(points.step < SAME_SEED)
+        good = good[once(self.find, self.place(row[good], plane[good]), points.q[good])]
+        return Nodes(row[good], plane[good], rows_of(points, good)), good
+
+
+def answered(find: Follower) -> tuple[Planes, Nodes, Int]:
+    """The planes of all targets, and the answers on them; which is whose, by plane and branch (N, V, B), -1: none."""
+    guide, even, N = nearly_closed(find.arm, find.free), over_a_turn(PLANES), len(find.target)
+    row, t = np.repeat(np.arange(N), PLANES), np.tile(even, N)
+    source = find._replace(free=guide)
+    if guide is find.free:
+        q = find.found(row, t)
+        there, own = ~np.isnan(q[:, :, 0]), q[:0, 0]
+    else:
+        q, missed = source.candidates(row, t)
+        more, own = _between(source, even, missed.reshape(N, PLANES, -1))
+        row, t = np.append(row, more), np.append(t, own[:, guide.joint])
+        others = source.candidates(more, t[N * PLANES :])
+        q, there = np.append(q, others[0], axis=0), np.append(missed, others[1], axis=0) < NEAR
+    order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
+    plane = np.empty_like(row)
+    plane[order] = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    planes = Planes(find, guide, np.full((N, int(count.max(initial=PLANES))), np.inf), count)
+    planes.values[row, plane] = t
+    one, branch = np.nonzero(there)
+    last = np.arange(N * PLANES, len(row))  # those between are answers already, of no branch
+    start = np.append(q[one, branch], own, axis=0)
+    one, branch = np.append(one, last), np.append(branch, np.full(len(last), q.shape[1]))
+    nodes, good = planes.answers(row[one], plane[one], start)
+    grid = np.full((*planes.values.shape, q.shape[1] + 1), -1)
+    grid[nodes.row, nodes.plane, branch[good]] = np.arange(len(good))
+    return planes, nodes, grid[:, :, :-1]
+
+
+def _between(source: Follower, t: Array, missed: Array) -> tuple[Int, Array]:
+    """Answers (M, n) of targets (M,) where these may be between values t (K,) alone, as what branches miss (N, K, B)
+    tells: of a short curve, whose joint cannot be held where it turns back."""
+    width, part = t[1] - t[0], np.arange(1, BETWEEN) / BETWEEN
+    off = np.where(missed <= ACCEPTED, np.nan, -missed)
+    row, k = np.nonzero(turning(off, np.broadcast_to(t, missed.shape[:2])).any(axis=2))
+    row, values = np.repeat(row, len(part)), (t[k, None] + width * part).ravel()
+    q, missed = source.candidates(row, values)
+    best = missed.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
+    some, branch = np.nonzero(missed[best] < NEAR)
+    row, q = row[best[some]], q[best[some], branch]
+    q, miss = newton.correct(source.arm, source.free.task, q, source.target[row])
+    good = np.flatnonzero(miss < SAME_SEED)
+    good = good[once(source, row[good], q[good])]
+    return row[good], q[good]
+
+
+def once(find: Follower, group: Int, q: Array) -> Bool:
+    """Which postures (M, n) of groups (M,) are the first of those that are the same."""
+    key = np.cos(q - 0.3) @ np.sqrt(np.arange(2.0, 2.0 + q.shape[1]))
+    order = np.lexsort((key, group))
+    first, second = order[:-1], order[1:]
+    near = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * SAME_SEED)
+    some = np.flatnonzero(near)
+    out = np.ones(len(q), bool)
+    out[second[some[newton.wrapped_distance(find.arm, q[first[some]], q[second[some]]) < SAME_SEED]]] = False
+    return out

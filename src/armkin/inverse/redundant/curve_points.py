@@ -1,0 +1,103 @@
+"""Points of curves of answers, onto which postures are moved in all joints, and cubics between them.
+
+By Newton's method with the tangent, or a joint that is held, as the last equation (Allgower and Georg, Numerical
+Continuation Methods, 1990, 2 and 6).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from armkin.formula.arrays import Array, Bool
+from armkin.formula.rows import stacked
+from armkin.inverse.numeric import newton
+from armkin.inverse.numeric.newton import nudged
+from armkin.inverse.numeric.tolerances import PAIR_SETTLED, ROUGHLY
+from armkin.inverse.redundant.interval_pieces import Int
+from armkin.inverse.redundant.other_joints import Follower
+from armkin.model.units import radian_or_reach
+
+FARTHEST = 0.3  # [rad, reaches] step of Newton's method,
+NEWTON = 4  # and how many
+AT_ONCE = 1000  # postures that it works on: they stay in the cache
+
+
+class Points(NamedTuple):
+    """Postures (M, n), unit tangents (M, n) of their curves [rad, reaches], and sizes of the last steps there (M,)."""
+
+    q: Array
+    tangent: Array
+    step: Array
+
+    @property
+    def settled(self) -> Bool:
+        """Whether rounding is all that is left (M,)."""
+        return np.asarray(self.step < PAIR_SETTLED)
+
+
+def onto(find: Follower, row: Int, q: Array, last: Array, enough: float = PAIR_SETTLED) -> Points:
+    """Postures q (M, n) moved onto the curves of their targets, across last (M, n): a tangent, or a joint that is held.
+
+    The tangents point to where last does. enough: size of a step that is the last one.
+    """
+    some = (slice(k, k + AT_ONCE) for k in range(0, max(len(q), 1), AT_ONCE))
+    return stacked([_onto(find, row[own], q[own], last[own], enough) for own in some])
+
+
+def _onto(find: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:
+    """As `onto`, of postures that stay in the cache."""
+    arm, task, unit = find.arm, find.free.task, radian_or_reach(find.arm)
+    target = find.target[row]
+    q, tangent, size, going = q.copy(), last.copy(), np.full(len(q), np.inf), np.arange(len(q))
+    for _ in range(NEWTON):
+        if not len(going):
+            break
+        some = slice(None) if len(going) == len(q) else going
+        missing, J = newton.scaled(arm, task, q[some], target[some])
+        rows = np.concatenate([J, last[some, None]], axis=1)
+        right = np.zeros((*rows.shape[:2], 2))
+        right[:, :-1, 0], right[:, -1, 1] = missing, 1.0
+        # the direction of a tool's axis is three numbers for two constraints
+        x = nudged(np.linalg.solve, rows, right) if rows.shape[1] == arm.n else np.linalg.pinv(rows) @ right
+        step = x[:, :, 0]
+        tangent[some] = x[:, :, 1] / np.sqrt((x[:, :, 1] ** 2).sum(axis=1, keepdims=True))
+        longest = np.abs(step).max(axis=1)
+        q[some] += step * np.minimum(1.0, FARTHEST / np.maximum(longest, FARTHEST))[:, None] * unit
+        size[some] = np.where(np.isnan(longest), np.inf, longest)
+        going = going[~(size[some] < enough)]  # its square is left
+    return Points(q, tangent, size)
+
+
+class Ways(NamedTuple):
+    """Cubics from postures q (M, n) along their chords (M, n), with the derivatives at both ends [rad, reaches]."""
+
+    q: Array
+    chord: Array
+    begin: Array
+    end: Array
+
+    @classmethod
+    def between(cls, find: Follower, a: Points, b: Points) -> Ways:
+        """Those between points, which follow an arc of a circle to the sixth order."""
+        chord = newton.difference(find.arm, b.q, a.q)
+        cosine = np.maximum((a.tangent * b.tangent).sum(axis=1), -1.0)
+        size = 2.0 * np.sqrt((chord * chord).sum(axis=1)) / (1.0 + np.sqrt(0.5 * (1.0 + cosine)))
+        return cls(a.q, chord, size[:, None] * a.tangent, size[:, None] * b.tangent)
+
+    def at(self, find: Follower, share: Array | float) -> Array:
+        """Postures at shares (M,) of the way, or all at one."""
+        u = np.asarray(share)[..., None]
+        on = self.chord * (u * u * (3.0 - 2.0 * u)) + (self.begin * (1.0 - u) - self.end * u) * (u * (1.0 - u))
+        return np.asarray(self.q + on * radian_or_reach(find.arm))
+
+    def slope(self, share: Array | float, j: int) -> Array:
+        """How joint j changes there (M,)."""
+        u = share
+        own = self.begin[:, j] * (1.0 - u) * (1.0 - 3.0 * u) + self.end[:, j] * u * (3.0 * u - 2.0)
+        return np.asarray(6.0 * u * (1.0 - u) * self.chord[:, j] + own)
+
+    def follow(self, find: Follower, row: Int) -> Bool:
+        """Which lie on the curves of their targets row (M,), as their middles tell."""
+        return newton.missing(find.arm, find.free.task, self.at(find, 0.5), find.target[row]) < ROUGHLY
