@@ -25,7 +25,7 @@ HALVINGS = 6  # of the way between two answers
 APART = 6.0  # [rad, reaches] answers may be that one cubic joins
 LONGEST = 0.3  # [rad, reaches] step along a curve
 ASIDE = 0.3  # of a step, that Newton's method moves a point sideways at most
-TRIES = 400  # steps of an arc
+TRIES = 100  # steps of an arc
 ROUNDS = 20  # of arcs, each to the next plane
 
 
@@ -159,10 +159,10 @@ class _Curves:
         passed, going = [(ray[:0], rows_of(now, ray[:0]))], np.arange(len(ray))
         for _ in range(TRIES):
             here, step = rows_of(now, going), h[going, None]
-            then = onto(find, row[going], here.q + step * here.tangent * unit, here.tangent)
+            then = onto(find, row[going], here.q + step * here.tangent * unit, here.tangent, SAME_SEED)
             way = Ways.between(find, here, then)
             aside = np.sqrt(((way.chord - step * here.tangent) ** 2).sum(axis=1))
-            good = then.settled & (aside < ASIDE * h[going]) & way.follow(find, row[going])
+            good = (then.step < SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(find, row[going])
             h[going] = np.where(good, np.minimum(1.5 * h[going], LONGEST), 0.5 * h[going])
             middle = low[going] + 0.5 * wide[going]
             depth, before = (wrapped(one.q[:, j] - middle) for one in (then, here))

@@ -20,7 +20,7 @@ from armkin.inverse.redundant.traced_curves import Chains, curves_of
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
-AT_ONCE = 16  # targets whose points stay in the cache
+AT_ONCE = 64  # targets whose points are worked on together
 PARTS = 4  # of the way between two points, at whose ends limits and the joint's sense are asked
 SECANTS = 10  # steps along a cubic to where a limit is crossed or the joint turns back
 WAY = 0.1  # of the way, on both sides, at which a cubic's slope tells how the joint turns back: it is a parabola
@@ -161,8 +161,8 @@ class Traced(NamedTuple):
         j, ways = self.find.free.joint, rows_of(self.ways, point)
         share = _root(lambda t: ways.slope(t, j), low, low + 1.0 / PARTS)
         there = self._between(point, share)
-        size = np.sqrt((ways.begin**2).sum(axis=1))
-        bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * size**2)
+        size = np.maximum(np.sqrt((ways.begin**2).sum(axis=1)), TINY)
+        bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, TINY))
         for _ in range(TURNS if len(point) else 0):
             step = np.clip(
                 -there.tangent[:, j] / np.where(np.abs(bend) > TINY, bend, np.inf), -REACH * size, REACH * size
