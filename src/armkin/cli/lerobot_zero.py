@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from armkin.board.backend.board import Board
+    from armkin.model.arm import Arm
 
 
 def record(
@@ -29,7 +30,6 @@ def record(
     check: compares them with the servos, where a port is named, and says which that is.
     """
     from armkin.files import keep
-    from armkin.motors import motor_names
     from armkin.robot_file import parse
     from armkin.robot_file.catalogue import locate
     from armkin.robot_file.edit import replaced
@@ -61,6 +61,14 @@ def record(
         "invert": [bool(motor.drive_mode) for motor in found.motors],
         "gripper_ends": None if found.gripper_ends is None else list(found.gripper_ends),
     }
+    with output.destination(None) as write:
+        write(f"{render.to_json(answer) if json else _table(arm, found)}\n")
+
+
+def _table(arm: Arm, found: Any) -> str:
+    """What changes, a line a servo."""
+    from armkin.motors import motor_names
+
     rows = [["joint", "zero", "was", "limits/deg", "counts"]]
     for name, zero, was, pair, motor in zip(
         motor_names(arm), found.zero, arm.motors, found.limits, found.motors, strict=True
@@ -70,5 +78,4 @@ def record(
     if found.gripper is not None and found.gripper_ends is not None and arm.gripper is not None:
         ends = "open {:.3f}, closed {:.3f}".format(*found.gripper_ends)
         rows.append(["gripper", f"{found.gripper.middle:g}", f"{arm.gripper.zero:g}", ends, ""])
-    with output.destination(None) as write:
-        write(render.to_json(answer) + "\n" if json else render.table(rows, left=(0, 4)) + "\n")
+    return render.table(rows, left=(0, 4))

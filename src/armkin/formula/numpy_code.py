@@ -124,12 +124,16 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
             lines += _halves(buffers, node, signed)
     parameters = [buffers.names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers.all))]
     outputs = list(map(buffers.name, recording.outputs))
-    scope = {**buffers.constants, "where": _where, "add": np.add, "subtract": np.subtract, "positive": np.positive}
-    scope |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
+    return function_of(parameters, lines, outputs, buffers.constants | _functions(recording, scalar)), buffers.all
+
+
+def _functions(recording: Recording, scalar: bool) -> dict[str, Any]:
+    """What the written lines call, by name; scalar: see `write`."""
+    found: dict[str, Any] = {"where": _where, "add": np.add, "subtract": np.subtract, "positive": np.positive}
+    found |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
     if scalar:
-        scope |= {op: partial(_one_by_one, function) for op, function in _ROUNDED.items()}
-    scope |= {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in scope}
-    return function_of(parameters, lines, outputs, scope), buffers.all
+        found |= {op: partial(_one_by_one, function) for op, function in _ROUNDED.items()}
+    return found | {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in found}
 
 
 def _halves(buffers: _Buffers, node: Node, signed: Node) -> Iterator[str]:

@@ -50,10 +50,7 @@ Step = tuple[Value, str, list[Value | str]]  # a value: the operation that it is
 def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
     """Branch axes unrolled, one line a value that is used more than once: a function of the inputs as numbers."""
     steps, outputs = _unrolled(recording)
-    uses: Counter[Value | str] = Counter(x for every in outputs for x in every)
-    for result, op, args in reversed(steps):
-        if uses[result]:
-            uses.update(args * 2 if op == "sign" else args)
+    uses = _uses(steps, outputs)
     inputs: list[Value] = [(id(node), ()) for node in recording.inputs]
     texts: dict[Value | str, tuple[str, int]] = {x: (f"i{k}", 0) for k, x in enumerate(inputs)}
     lines: list[str] = []
@@ -77,6 +74,15 @@ def write(recording: Recording) -> Callable[..., tuple[Any, ...]]:
         joined = ", ".join(text(v)[0] for v in every)
         returned.append(f"({joined},)" if axes_of(x) else joined)
     return function_of([texts[x][0] for x in inputs], lines, returned, dict(_FUNCTIONS))
+
+
+def _uses(steps: list[Step], outputs: list[list[Value | str]]) -> Counter[Value | str]:
+    """How many times each value that leads to an output is read."""
+    uses: Counter[Value | str] = Counter(x for every in outputs for x in every)
+    for result, op, args in reversed(steps):
+        if uses[result]:
+            uses.update(args * 2 if op == "sign" else args)
+    return uses
 
 
 def _unrolled(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:

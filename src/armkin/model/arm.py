@@ -144,28 +144,28 @@ def from_links(
     n = len(prismatic)
     links = _frozen(link)
     span = np.broadcast_to([-math.inf, math.inf], (n, 2)) if limits is None else np.asarray(limits, dtype=float)
-    gain = np.zeros((0, n)) if motor_gain is None else motor_gain
+    gain = _given(motor_gain, np.zeros((0, n)))
     sliding = np.abs(np.where(np.isfinite(span), span, 0.0)).max(axis=1)[np.asarray(prismatic, dtype=bool)]
     return Arm(
         name=name,
         joint_names=joint_names or tuple(f"q{i + 1}" for i in range(n)),
         prismatic=_frozen(prismatic, bool),
         link=links,
-        frame=_frozen(np.broadcast_to(np.eye(4), (n, 4, 4)) if frame is None else frame),
-        base=_frozen(np.eye(4) if base is None else base),
+        frame=_given(frame, np.broadcast_to(np.eye(4), (n, 4, 4))),
+        base=_given(base, np.eye(4)),
         lower=_frozen(span[:, 0]),
         upper=_frozen(span[:, 1]),
-        home=_frozen(np.zeros(n) if home is None else home),
-        max_speed=_frozen(np.full(n, math.nan) if max_speed is None else max_speed),
-        max_accel=_frozen(np.full(n, math.nan) if max_accel is None else max_accel),
-        max_jerk=_frozen(np.full(n, math.nan) if max_jerk is None else max_jerk),
-        dh_sign=_frozen(np.ones(n) if dh_sign is None else dh_sign),
-        dh_theta=_frozen(np.zeros(n) if dh_theta is None else dh_theta),
-        ratio=_frozen(np.ones(n) if ratio is None else ratio),
+        home=_given(home, np.zeros(n)),
+        max_speed=_given(max_speed, np.full(n, math.nan)),
+        max_accel=_given(max_accel, np.full(n, math.nan)),
+        max_jerk=_given(max_jerk, np.full(n, math.nan)),
+        dh_sign=_given(dh_sign, np.ones(n)),
+        dh_theta=_given(dh_theta, np.zeros(n)),
+        ratio=_given(ratio, np.ones(n)),
         pitch_offset=pitch_offset,
         task=task,
-        motor_gain=_frozen(gain),
-        motor_bias=_frozen(np.zeros(len(np.asarray(gain))) if motor_bias is None else motor_bias),
+        motor_gain=gain,
+        motor_bias=_given(motor_bias, np.zeros(len(gain))),
         reach=float(np.linalg.norm(links[1:, :3, 3], axis=1).sum() + sliding.sum()) or 1.0,
         pose_names=tuple(poses or ()),
         pose_joints=_frozen(np.array(list((poses or {}).values()), dtype=float).reshape(-1, n)),
@@ -173,6 +173,10 @@ def from_links(
         hard_limits=rest.pop("hard_limits", (False,) * n),
         **rest,
     )
+
+
+def _given(values: ArrayLike | None, default: Array) -> Array:
+    return _frozen(default if values is None else values)
 
 
 def _frozen(values: ArrayLike, dtype: type = float) -> NDArray[Any]:

@@ -88,21 +88,27 @@ def _carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step: floa
         if lost or (slow > 1.0 and slow >= before):
             return 0 if leaving and k == 2 else k - 1, "a singularity is near"
         before, leaving = slow, slow > 1.0
-        there = here + first
+        here = here + first
         for _ in range(3):
-            r, J = scaled(arm, task, there[None], goal)
-            there = there + np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0] * unit
-        if not float(np.abs(scaled(arm, task, there[None], goal)[0]).max()) < 1e-7:
+            r, J = scaled(arm, task, here[None], goal)
+            here = here + np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0] * unit
+        if not float(np.abs(scaled(arm, task, here[None], goal)[0]).max()) < 1e-7:
             return k - 1, "it is out of reach" if k > 1 else "a singularity is near"
-        outside = (there < arm.lower) | (there > arm.upper)
-        if outside.any():
-            return k - 1, f"{arm.joint_names[int(np.argmax(outside))]} is at its limit"
-        if arm.keep_out and not arm.ignores_keep_out and not stuck:
-            near = clearance(arm, there)
-            if float(near.mm) < 0:
-                return k - 1, f"{near.body!s} would hit {near.other!s}"
-        here = there
+        if why := _why_not_there(arm, here, stuck):
+            return k - 1, why
     return most, ""
+
+
+def _why_not_there(arm: Arm, q: Array, stuck: bool) -> str:
+    """The limit or the hit at a posture, in words; stuck: the arm touches something to begin with."""
+    outside = (q < arm.lower) | (q > arm.upper)
+    if outside.any():
+        return f"{arm.joint_names[int(np.argmax(outside))]} is at its limit"
+    if arm.keep_out and not arm.ignores_keep_out and not stuck:
+        near = clearance(arm, q)
+        if float(near.mm) < 0:
+            return f"{near.body!s} would hit {near.other!s}"
+    return ""
 
 
 def _beside(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, by: float) -> Array:

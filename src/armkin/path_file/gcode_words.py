@@ -62,6 +62,18 @@ def _checked(line: str, raw: str, name: str, number: int) -> str:
     return body
 
 
+def _why_no_words(line: str, packed: str) -> str:
+    """What is wrong with a line that is more than words; packed: the line without its blanks."""
+    at = 0
+    while (one := _WORD.match(packed, at)) is not None:
+        at = one.end()
+    rest = packed[at:]
+    if rest[0] in "#=[]" or rest[1:2] in ("#", "["):
+        return f"'{rest[:20]}': expressions, parameters and macros are not known"
+    near = next((some for some in line.split() if not _is_words(some)), rest)
+    return f"'{near[:20]}' is no word of G-code: a letter and a number, such as X10"
+
+
 def words_of(line: str, name: str, number: int) -> Words:
     """The words of a line. Raises PathFileError with line and word."""
     line = line.upper()
@@ -81,14 +93,7 @@ def words_of(line: str, name: str, number: int) -> Words:
     found = _WORD.findall(packed)
     words = [letter + number for letter, number in found]
     if "".join(words) != packed:
-        at = 0
-        while (one := _WORD.match(packed, at)) is not None:
-            at = one.end()
-        rest = packed[at:]
-        if rest[0] in "#=[]" or (len(rest) > 1 and rest[1] in "#["):
-            raise wrong(name, number, f"'{rest[:20]}': expressions, parameters and macros are not known")
-        near = next((some for some in line.split() if not _is_words(some)), rest)
-        raise wrong(name, number, f"'{near[:20]}' is no word of G-code: a letter and a number, such as X10")
+        raise wrong(name, number, _why_no_words(line, packed))
     return tuple(
         (letter, float(number), word) for (letter, number), word in zip(found, words, strict=True) if letter != "N"
     )

@@ -90,6 +90,21 @@ def _task(arm: Arm) -> tuple[Task | None, str]:
         return None, str(error)
 
 
+def _goal(arm: Arm, task: Task, question: Question, kept: list[int]) -> tuple[list[float], Array]:
+    """The target in its labels' units and as `ik` takes it: the question's own, or that of its pose.
+
+    kept: the joints that are not held.
+    """
+    if question.target is None:
+        goal = targets_of(task, fk(arm, question.q)[None], question.q[None, kept])[0]
+        [values] = targets_out(task.labels, goal[None])
+        return values, goal
+    values = list(question.target)
+    if len(values) != len(task.labels):
+        raise UsageError(f"target: task {task.name} takes {len(task.labels)} numbers: {' '.join(task.labels)}")
+    return values, targets_in(task.labels, [values])[0]
+
+
 def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, Any]:
     """Every branch of the target; `q` is the pose to show."""
     shown = units.joints_out(arm, question.q).tolist()
@@ -102,14 +117,7 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
     if quick:
         quick.build(prepared, task.name)
     kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
-    if question.target is None:
-        goal = targets_of(task, fk(arm, question.q)[None], question.q[None, kept])[0]
-        [values] = targets_out(task.labels, goal[None])
-    else:
-        values = list(question.target)
-        if len(values) != len(task.labels):
-            raise UsageError(f"target: task {task.name} takes {len(task.labels)} numbers: {' '.join(task.labels)}")
-        goal = targets_in(task.labels, [values])[0]
+    values, goal = _goal(arm, task, question, kept)
     request = replace(request, task=task.name)
     [found] = choose_branch.solve(request, goal[None])
     branches = found.branches
@@ -129,9 +137,8 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
     }
     if question.target is None:
         answer["chosen"] = _same(branches, question.q)
-        return answer
-    stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
-    if found.within_limits:
+    elif found.within_limits:
+        stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
         answer["chosen"] = stay[0] if stay else 0  # a free one, if there is one
         answer["q"] = branches[answer["chosen"]].q
     elif question.nearest:

@@ -15,7 +15,9 @@ from armkin.motion.joint_moves import missing_rates, rate_lines
 from armkin.motors import joints_per_pulse, undriven
 
 if TYPE_CHECKING:
+    from armkin.board_kinds import ForeignBoard
     from armkin.model.arm import Arm
+    from armkin.robot_file.robot_keys import Board, Drive
 
 Lack = tuple[str, list[str]]  # what is missing in words, and lines to add
 _DRIVER = "A4988"  # in lines to add
@@ -104,24 +106,33 @@ def without_board(arm: Arm) -> list[Lack]:
         driver = f", driver: {_DRIVER}" if any(m.kind == "stepper" for m in arm.motors) or undriven(arm) else ""
         choice = f"kinds: {', '.join(installed_kinds.names())}; drivers: {', '.join(DRIVERS)}"
         return [("it has no board", [f"board: {{kind: {kind}{driver}}}   # for example; {choice}"])]
+    foreign = installed_kinds.foreign(arm.board.kind)
+    return _without_driver(arm, arm.board) if foreign is None else _without_foreign_axes(arm, foreign)
+
+
+def _without_foreign_axes(arm: Arm, foreign: ForeignBoard) -> list[Lack]:
+    """Missing axes of a board that has its own drivers and settings."""
+    bare = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
+    if not bare:
+        return []
+    add = f"axis: {foreign.axes[0]}   # into the drives of {', '.join(bare)} ({', '.join(foreign.axes)})"
+    return [(f"motors {', '.join(bare)} have no axis", [add])]
+
+
+def _without_driver(arm: Arm, settings: Board) -> list[Lack]:
+    """Missing axes and the missing driver of a board with our firmware."""
     found: list[Lack] = []
-    if (foreign := installed_kinds.foreign(arm.board.kind)) is not None:  # it has its own drivers and settings
-        bare = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
-        if bare:
-            add = f"axis: {foreign.axes[0]}   # into the drives of {', '.join(bare)} ({', '.join(foreign.axes)})"
-            found.append((f"motors {', '.join(bare)} have no axis", [add]))
-        return found
-    board, steppers = BOARDS[arm.board.kind], False
-    for motor in [*arm.motors, *([] if arm.gripper is None else [arm.gripper])]:
-        steppers = steppers or motor.kind == "stepper"
+    board = BOARDS[settings.kind]
+    driven: list[tuple[str, Drive]] = [(f"motor {motor.name}", motor) for motor in arm.motors]
+    driven += [] if arm.gripper is None else [("the gripper", arm.gripper)]
+    for what, motor in driven:
         if motor.axis is None:
-            what = "the gripper" if motor is arm.gripper else f"motor {getattr(motor, 'name', '')}"
             free = board.servos if motor.kind == "servo" else board.steppers
             add = f"axis: {(*free, '?')[0]}   # into the drive of {what} ({', '.join(free)})"
             found.append((f"{what} has no axis", [add]))
-    if steppers and arm.board.driver is None:
+    if settings.driver is None and any(motor.kind == "stepper" for _, motor in driven):
         why = "its board has no driver: it sets the pulse timing"
-        keys = {**arm.board.model_dump(exclude_none=True), "driver": _DRIVER}
+        keys = {**settings.model_dump(exclude_none=True), "driver": _DRIVER}
         line = f"board: {{{', '.join(f'{key}: {value}' for key, value in keys.items())}}}"
         found.append((why, [f"{line}   # for example, in place of board:; drivers: {', '.join(DRIVERS)}"]))
     return found

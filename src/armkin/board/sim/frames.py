@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.protocol import AxisImage, Error, Image, Segment
+from armkin.board.firmware.wire.protocol import AxisImage, Error, Image, RowImage, Segment
 from armkin.board_kinds import Board
 
 
@@ -60,21 +61,28 @@ _FAR = 2**30
 
 def image_valid(image: Image, board: Board) -> bool:
     """Whether a board may take a configuration: every field in its range."""
-    if len(image.axes) != len(board.axes) or len(image.rows) > board.rows:
-        return False
-    if image.step_high > 80 or image.step_low > 50 or image.dir_setup > 100:
-        return False
-    if not all(_axis_valid(axis, servo=board.servo_mask >> i & 1) for i, axis in enumerate(image.axes)):
-        return False
-    for weights in (*(guard.weight for guard in image.guards), *(row.weight for row in image.rows)):
-        if any(w and not axis.used for w, axis in zip(weights, image.axes, strict=True)):
-            return False
-    for row in image.rows:
-        reach = zip(row.weight, image.axes, strict=True)
-        most = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
-        if row.lower > row.upper or most >= _FAR:
-            return False
-    return True
+    return (
+        len(image.axes) == len(board.axes)
+        and len(image.rows) <= board.rows
+        and image.step_high <= 80
+        and image.step_low <= 50
+        and image.dir_setup <= 100
+        and all(_axis_valid(axis, servo=board.servo_mask >> i & 1) for i, axis in enumerate(image.axes))
+        and all(_weights_valid(guard.weight, image.axes) for guard in image.guards)
+        and all(_weights_valid(row.weight, image.axes) and _row_valid(row, image.axes) for row in image.rows)
+    )
+
+
+def _weights_valid(weights: Sequence[int], axes: Sequence[AxisImage]) -> bool:
+    """Whether all axes that count are used."""
+    return all(axis.used for weight, axis in zip(weights, axes, strict=True) if weight)
+
+
+def _row_valid(row: RowImage, axes: Sequence[AxisImage]) -> bool:
+    """Whether a coupled limit has its bounds in order, and its sum fits the board's numbers."""
+    reach = zip(row.weight, axes, strict=True)
+    most = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
+    return row.lower <= row.upper and most < _FAR
 
 
 def _axis_valid(axis: AxisImage, *, servo: int) -> bool:

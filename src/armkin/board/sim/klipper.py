@@ -241,11 +241,8 @@ class Klipper(SimulatedTime):
         along = abs(way["X"]) or max(map(abs, way.values()))
         if along < 1e-9:
             return
-        speed = self.feed / 60
-        for name in self.axes:
-            if way[name]:
-                speed = min(speed, self.steppers[name].velocity * along / abs(way[name]))
-        seconds = along / speed
+        allowed = (self.steppers[name].velocity * along / abs(way[name]) for name in self.axes if way[name])
+        seconds = along / min([self.feed / 60, *allowed])
         speeds = {name: way[name] / seconds for name in self.axes}
         if way["X"] and self._moves:
             self.jumps += sum(abs(v - self._speeds.get(k, 0.0)) > self.steppers[k].corner for k, v in speeds.items())

@@ -213,6 +213,14 @@ def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
     return convention, table
 
 
+def _slides(cells: Mapping[str, str], where: str, *, d_varies: bool) -> bool:
+    """Whether a row's joint is prismatic, by its type or, without one, by its variable."""
+    kind = (cells.get("type") or "").lower()
+    if kind not in ("", "revolute", "prismatic", "r", "p"):
+        raise UsageError(f"{where}type: '{cells['type']}' must be revolute or prismatic")
+    return kind in ("prismatic", "p") or (not kind and d_varies)
+
+
 def _row(cells: Mapping[str, str], i: int) -> Row:
     from armkin.robot_file.new_file import Row
 
@@ -221,10 +229,7 @@ def _row(cells: Mapping[str, str], i: int) -> Row:
     for key in ("alpha", "a"):
         if values[key][1]:
             raise UsageError(f"{where}{key}: '{cells[key]}' is a variable; only theta or d can be")
-    kind = (cells.get("type") or "").lower()
-    if kind not in ("", "revolute", "prismatic", "r", "p"):
-        raise UsageError(f"{where}type: '{cells['type']}' must be revolute or prismatic")
-    slides = kind in ("prismatic", "p") or (not kind and values["d"][1])
+    slides = _slides(cells, where, d_varies=values["d"][1])
     if values["d"][1] and values["theta"][1]:
         raise UsageError(f"{where}both theta and d are variables; a joint has one")
     limits = _limits(cells, where)
