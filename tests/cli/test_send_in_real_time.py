@@ -158,6 +158,9 @@ def test_stop_beside_a_suspended_sender() -> None:
             assert stop.code == 0, stop.err
             assert "the arm stands" in stop.err
             _, err = sender.communicate(timeout=60)
+            if b"Write timeout" in err:  # suspended amid a write, whose time is over when it goes on
+                seconds[-1] = math.inf
+                continue
             assert sender.returncode == 143, err
             board.time.patience = 0.12
             finish(board)

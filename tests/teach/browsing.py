@@ -119,13 +119,16 @@ def until(page: Page, condition: str, argument: object = None, seconds: float = 
 
 def jogged(page: Page, press: Callable[[], None], release: Callable[[], None], there: Callable[[], object]) -> None:
     """A jog's button is held until the board is there, and stays held. On a busy computer the page's signs of life come
-    late, which ends the jog: it is pressed anew then, as a person would."""
+    late, which ends the jog, or ended it before the button was held: it is pressed anew then, as a person would."""
     end = time.monotonic() + 120
+    pressed = time.monotonic()
     press()
     while not there():
         assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
-        if "press again" in page.inner_text("#arrived"):
+        unheard = time.monotonic() > pressed + 10 and not standing(page).startswith("jog")
+        if unheard or "press again" in page.inner_text("#arrived"):
             release()
+            pressed = time.monotonic()
             press()
         page.wait_for_timeout(20)
 

@@ -67,8 +67,12 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         # Jog as long as the button is held.
         before = net(board)
         page.select_option("#jog-joint", label="q1")
-        page.hover("#jog-up")
-        jogged(page, page.mouse.down, page.mouse.up, lambda: net(board)[0] > before[0] + 50)
+
+        def press() -> None:
+            page.hover("#jog-up")  # anew each time: where a bar goes, it moves up
+            page.mouse.down()
+
+        jogged(page, press, page.mouse.up, lambda: net(board)[0] > before[0] + 50)
         page.mouse.up()
         idle(page, "jog: done")
         after = net(board)
