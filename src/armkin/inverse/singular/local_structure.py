@@ -201,7 +201,10 @@ def _second_order(
     far, near = 4.0 * np.sqrt(SOLUTION / size), 2.0 * SOLUTION / np.maximum(sigma, TINY)
     h = np.clip(np.minimum(far, near), SERIES, 4.0 * SERIES)
     more, close = np.zeros((2, *v.shape)), (r * r).sum(axis=1) < CLOSED**2
+    may = close & np.where(sigma**2 < 2.0 * SOLUTION * size, far <= h, near <= h)  # what smaller terms of third order tell
     for _ in range(BACK):
+        if not may.any():
+            break
         rest = both_ways(0.5 * (h * h)[:, None] * w + SIGNS * h[:, None] * v + more)
         g, off = rest[:, :, -1], np.linalg.norm(rest[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], TINY)
         cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
@@ -214,8 +217,7 @@ def _second_order(
         bent = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(more, axis=2).max(axis=0) + off
         new = ~out.known & (turns | alone) & (bent < 0.1 * h) & close
         out.known[new], out.boundary[new] = True, turns[new]
-        if out.known.all():
-            break
+        may &= ~out.known
         more -= (inverse * rest[:, :, :-1, None]).sum(axis=2)
     # where |g| is `SOLUTION` first: with the sign of b; and against it, or beyond the turn
     ahead = 2.0 * SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * SOLUTION * size))
