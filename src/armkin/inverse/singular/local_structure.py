@@ -21,6 +21,7 @@ from armkin.inverse.numeric.tolerances import (
     ARRIVED,
     BENT,
     CLOSED,
+    ERROR,
     FINEST,
     FOLD_WAY,
     HIGH,
@@ -51,7 +52,7 @@ SERIES = 0.01  # [rad, reaches] as far as a series of second order is compared w
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
 FINE = np.linspace(0.0, 1.0, 33)[:, None]  # of a component: where its slope is compared
-FINER = np.linspace(0.0, 1.0, 1025)[:, None]  # of an interval in which it ends, and of the one between two of these
+FINER = np.linspace(0.0, 1.0, 129)[:, None]  # of an interval in which it ends, and of the one between two of these
 
 
 class Structure(NamedTuple):
@@ -201,7 +202,7 @@ def _second_order(
     far, near = 4.0 * np.sqrt(SOLUTION / size), 2.0 * SOLUTION / np.maximum(sigma, TINY)
     h = np.clip(np.minimum(far, near), SERIES, 4.0 * SERIES)
     more, close = np.zeros((2, *v.shape)), (r * r).sum(axis=1) < CLOSED**2
-    may = close & np.where(sigma**2 < 2.0 * SOLUTION * size, far <= h, near <= h)  # what smaller terms of third order tell
+    may = close & (np.where(sigma**2 < 2.0 * SOLUTION * size, far, near) <= h)  # where third is small enough
     for _ in range(BACK):
         if not may.any():
             break
@@ -244,30 +245,32 @@ def _polynomials(
     """
     M, n = q.shape
     rows, k = u.shape[1:]
-    t, who = np.multiply.outer(NODE, span).ravel(), np.tile(np.arange(M), NODES)
-    unit = radian_or_reach(arm)
-    bordered = np.zeros((len(t), rows + 1, rows + 1))
-    bordered[:, :rows, n:], bordered[:, rows, :n] = u[who], v[who]
-    away = t[:, None] * v[who] + 0.5 * (t * t)[:, None] * w[who]
-    inverse, left, active = np.empty_like(bordered), np.empty((len(t), k)), np.arange(len(t))
+    t, unit = np.multiply.outer(NODE, span)[:, :, None], radian_or_reach(arm)
+    away = t * (v + 0.5 * t * w)
+    inverse, left = np.empty((NODES, M, rows + 1, rows + 1)), np.empty((NODES, M, k))
+    bordered = np.zeros(inverse.shape)
+    bordered[:, :, :rows, n:], bordered[:, :, rows, :n] = u, v
+    on, going, before = np.zeros(M, bool), np.arange(M), np.zeros(M)
     for _ in range(ITERATIONS):
-        one = who[active]
-        r, bordered[active, :rows, :n] = newton.scaled(arm, task, q[one] + away[active] * unit, target[one])
-        ahead = t[active] - (v[one] * away[active]).sum(axis=1)
-        inverse[active] = last = newton.nudged(np.linalg.inv, bordered[active])
-        step = (last @ np.concatenate([r, ahead[:, None]], axis=1)[:, :, None])[:, :, 0]
-        away[active] += step[:, :n]
-        left[active] = step[:, n:]
-        size = np.abs(step[:, :n]).max(axis=1)
-        active = active[~(size < ARRIVED) & (np.abs(away[active]).max(axis=1) < 3.0 * np.abs(t[active]))]
-        if not len(active):
+        at, goal = away[:, going], np.concatenate([target[going]] * NODES)
+        r, J = newton.scaled(arm, task, (q[going] + at * unit).reshape(-1, n), goal)
+        matrix = bordered[:, going]
+        matrix[:, :, :rows, :n] = J.reshape(NODES, -1, rows, n)
+        ahead = t[:, going] - (v[going] * at).sum(axis=2, keepdims=True)
+        last = newton.nudged(np.linalg.inv, matrix.reshape(-1, rows + 1, rows + 1)).reshape(matrix.shape)
+        step = (last @ np.concatenate([r.reshape(NODES, -1, rows), ahead], axis=2)[..., None])[..., 0]
+        away[:, going], left[:, going], inverse[:, going] = at + step[:, :, :n], step[:, :, n:], last
+        size = np.abs(step[:, :, :n]).max(axis=(0, 2))
+        # the next step is about as many times smaller than this as this one's square than the last one's
+        done = (size < ARRIVED) | (size**3 < ERROR * before[going] ** 2)
+        near = (np.abs(away[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0)
+        on[going], before[going] = done & near, size
+        going = going[~done & near]
+        if not len(going):
             break
-    good = np.abs(away).max(axis=1) < 3.0 * np.abs(t)
-    good[active] = False
-    on = good.reshape(NODES, M).all(axis=0)
     # the last rows span what no motion across v reaches: u has turned on the way
-    g = _least(inverse[:, n:, :rows], left)
-    chebyshev = np.tensordot(_FIT, np.concatenate([away, g], axis=1).reshape(NODES, M, n + k), axes=1)
+    g = _least(inverse[:, :, n:, :rows], left)
+    chebyshev = np.tensordot(_FIT, np.concatenate([away, g], axis=2), axes=1)
     # the polynomials are exact on the span if their last coefficients are small
     last = np.abs(chebyshev[-2:]).max(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -277,7 +280,7 @@ def _polynomials(
         on &= off < 1.0
     # a crossing is a zero of the bordered Jacobian's smallest singular value, which no two nodes are as close to as it
     # changes between any two
-    weakest = (1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))).reshape(NODES, M)
+    weakest = 1.0 / np.sqrt((inverse * inverse).sum(axis=(2, 3)))
     apart = np.multiply.outer(-np.diff(NODE), span)
     steepest = (np.abs(np.diff(weakest, axis=0)) / apart).max(axis=0)
     alone = (weakest[1:] + weakest[:-1] > 2.0 * steepest * apart).all(axis=0)
@@ -286,11 +289,11 @@ def _polynomials(
 
 
 def _least(across: Array, left: Array) -> Array:
-    """Vectors (M, k) as long as the least residual on the hyperplanes across v: its part along across (M, k, rows)."""
-    if left.shape[1] == 1:
-        return np.asarray(left / np.linalg.norm(across, axis=2))
-    L = np.asarray(np.linalg.cholesky(across @ across.swapaxes(1, 2)), float)
-    return np.asarray(newton.nudged(np.linalg.solve, L, left[:, :, None])[:, :, 0])
+    """Vectors (..., k) as long as the least residual on the hyperplanes across v: it along across (..., k, rows)."""
+    if left.shape[-1] == 1:
+        return np.asarray(left / np.linalg.norm(across, axis=-1))
+    L = np.asarray(np.linalg.cholesky(across @ across.swapaxes(-1, -2)), float).reshape(-1, *across.shape[-2:-1] * 2)
+    return newton.nudged(np.linalg.solve, L, left.reshape(len(L), -1, 1)).reshape(left.shape)
 
 
 _FIT = np.linalg.inv(np.polynomial.chebyshev.chebvander(NODE, NODES - 1))
