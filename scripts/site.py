@@ -117,17 +117,34 @@ def robot_file() -> Iterator[str]:
 
 
 def python() -> Iterator[str]:
-    """The public names with their docstrings."""
+    """The public names with their docstrings, and of classes what they define in public."""
     yield "# Python\n\nLengths in mm, angles in radians; leading axes are batch axes.\n"
     for name in sorted(armkin.__all__):
         what = getattr(armkin, name)
-        if not callable(what) or not (text := inspect.getdoc(what)):
-            continue
-        try:
-            signature = str(inspect.signature(what))
-        except (TypeError, ValueError):
-            signature = ""
-        yield f"## {name}\n\n```text\narmkin.{name}{signature}\n\n{text}\n```\n"
+        if callable(what):
+            yield f"## {name}\n"
+            yield from documented(f"armkin.{name}", what)
+        for inner, member in vars(what).items() if inspect.isclass(what) else ():
+            if not inner.startswith("_") and (inspect.isfunction(member) or hasattr(type(member), "__get__")):
+                yield f"### {name}.{inner}\n"
+                yield from documented(f"{name}.{inner}", member)
+
+
+def documented(name: str, what: Any) -> Iterator[str]:
+    """A signature, if it is called, and a docstring: its sections as tables, its examples as code."""
+    if inspect.isfunction(what):
+        signature = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(what)))
+        yield f"```python\n{name}{signature}\n```\n"
+    for block in (inspect.getdoc(what) or "").split("\n\n"):
+        head, _, rest = block.partition("\n")
+        if head in ("Args:", "Attributes:", "Raises:"):
+            yield f"| {head[:-1]} | |\n|---|---|"
+            rows = re.split(r"\n(?=    \S)", rest.replace("|", "\\|"))
+            yield "\n".join("| `{}` | {} |".format(*" ".join(row.split()).split(": ", 1)) for row in rows) + "\n"
+        elif head == "Returns:":
+            yield f"**Returns** {' '.join(rest.split())}\n"
+        else:
+            yield f"```pycon\n{block}\n```\n" if head.startswith(">>>") else f"{block}\n"
 
 
 def pages(arms: Sequence[str]) -> Iterator[str]:

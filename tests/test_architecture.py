@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+import armkin
+
 SOURCE = Path(__file__).parents[1] / "src"
 
 # Room -> the rooms it may import, besides itself. A room is a folder of `armkin`, or a file beside them.
@@ -212,15 +214,24 @@ def test_classes_have_at_most_250_lines() -> None:
 
 
 def test_functions_have_at_most_60_lines() -> None:
-    """Outside `cli`, where a command's options are its function's parameters."""
+    """Outside `cli`, where a command's options are its function's parameters.
+
+    A public name's docstring, which has a line for every parameter (`test_docstrings`), is not counted.
+    """
     long = {
         f"{module}.{node.name}"
         for module, path in MODULES.items()
         if not module.startswith("armkin.cli.")
         for node in _nodes(path)
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (node.end_lineno or 0) - node.lineno >= 60
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and _lines(module, node) > 60
     }
     assert not long
+
+
+def _lines(module: str, node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    public = module == f"armkin.{armkin._HOME.get(node.name)}"
+    docstring = (node.body[0].end_lineno or 0) - node.body[0].lineno + 1 if public else 0
+    return (node.end_lineno or 0) - node.lineno + 1 - docstring
 
 
 PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))

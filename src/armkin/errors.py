@@ -36,7 +36,10 @@ from typing import Any, Self
 class ArmkinError(Exception):
     """Base of all errors that armkin raises on purpose.
 
-    fields: what the message is about, as values of JSON in mm and degrees: joint, value, lower, upper, file, ...
+    Args:
+        message: what is wrong, where and what is allowed.
+        advice: the next step in Python; the command line has its own words for it.
+        **fields: what the message is about, as values of JSON in mm and degrees: joint, value, lower, upper, file, ...
 
     >>> error = NoSolutionError("q2 = 130 deg is outside -20 to 120 deg", joint="q2", value=130.0)
     >>> error.kind, error.fields
@@ -55,7 +58,15 @@ class ArmkinError(Exception):
         return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(self).__name__.removesuffix("Error")).lower()
 
     def within(self, place: str, **fields: Any) -> Self:
-        """The same error, said of a place: ``row 3: ...``."""
+        """The same error, said of a place: ``row 3: ...``.
+
+        Args:
+            place: what the message begins with.
+            **fields: more of them; they replace those of the same name.
+
+        Returns:
+            An error of the same class.
+        """
         return type(self)(f"{place}: {self.message}", advice=self.advice, **{**self.fields, **fields})
 
 
@@ -102,13 +113,22 @@ class NothingHeldError(UsageError):
 class NoSolutionError(ArmkinError):
     """No pose reaches the target, or none does so within the limits.
 
-    plan: of a path that is not carried the PathPlan as far as it is known.
+    Attributes:
+        plan: of a path that is not carried the PathPlan as far as it is known, else None.
     """
 
     plan: Any = None
 
     def within(self, place: str, **fields: Any) -> Self:
-        """The same error with the same plan, said of a place."""
+        """The same error with the same plan, said of a place.
+
+        Args:
+            place: what the message begins with.
+            **fields: more of them; they replace those of the same name.
+
+        Returns:
+            An error of the same class.
+        """
         told = super().within(place, **fields)
         told.plan = self.plan
         return told

@@ -35,7 +35,15 @@ FEW = 16  # poses that plain Python does sooner than arrays
 def fk(arm: Arm, q: ArrayLike) -> Poses:
     """Pose of the tool for joint values.
 
-    q: (..., n) [rad | mm]. Returns (..., 4, 4) [mm].
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+
+    Returns:
+        (..., 4, 4) [mm] homogeneous transforms of the tool in the frame of targets.
+
+    Raises:
+        UsageError: q is no array of numbers, or its last axis has not the arm's n values.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")
@@ -52,7 +60,15 @@ def fk(arm: Arm, q: ArrayLike) -> Poses:
 def position(arm: Arm, q: ArrayLike) -> Points:
     """Position of the tool alone, at about half the cost of `fk`.
 
-    q: (..., n) [rad | mm]. Returns (..., 3) [mm].
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+
+    Returns:
+        (..., 3) [mm] x, y, z.
+
+    Raises:
+        UsageError: q is no array of numbers, or its last axis has not the arm's n values.
 
     >>> import armkin, numpy as np
     >>> position(armkin.load("robots/planar_2dof.yaml"), np.deg2rad([20, 50])).round(6).tolist()
@@ -69,19 +85,36 @@ def point_numbers(arm: Arm) -> Callable[..., tuple[float, ...]]:
 def frames(arm: Arm, q: ArrayLike) -> Frames:
     """Pose of the base, of every joint's frame and of the tool.
 
-    q: (..., n) [rad | mm]. Returns (..., n + 2, 4, 4) [mm]. Joint frames are those of the
-    robot file's convention: DH frame i, or with screws the moving body's frame that stands
-    on the joint's axis with the base's axes when all joints are zero.
+    Joint frames are those of the robot file's convention: DH frame i, or with screws the moving body's frame that
+    stands on the joint's axis with the base's axes when all joints are zero.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+
+    Returns:
+        (..., n + 2, 4, 4) [mm] the base first, then joint after joint, the tool last.
+
+    Raises:
+        UsageError: q is no array of numbers, or its last axis has not the arm's n values.
     """
 
     return _batched(arm, as_joints(arm, q), (arm.n + 2, 4, 4), _frames)
 
 
 def jacobian(arm: Arm, q: ArrayLike) -> Jacobians:
-    """Geometric Jacobian of the tool in the base's axes, linear rows first.
+    """Geometric Jacobian of the tool in the base's axes, linear rows first (Siciliano et al., Robotics, eq. 3.30).
 
-    q: (..., n) [rad | mm]. Returns (..., 6, n) [mm/rad, 1; prismatic: 1, 0]
-    (Siciliano et al., Robotics, eq. 3.30).
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+
+    Returns:
+        (..., 6, n): rows 0 to 2 are the tool's velocity [mm/rad; 1 for prismatic joints], rows 3 to 5 its angular
+        velocity [1; 0 for prismatic joints], a column for the unit speed of each joint.
+
+    Raises:
+        UsageError: q is no array of numbers, or its last axis has not the arm's n values.
     """
 
     return _batched(arm, as_joints(arm, q), (6, arm.n), jacobian_formula)
@@ -98,10 +131,19 @@ def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Poses, Jacobians]:
 def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Figures:
     """Yoshikawa's measure ``sqrt(det(J J^T))``, computed as the product of J's singular values.
 
-    q: (..., n) [rad | mm]; rows: which rows of the Jacobian count, by default the linear
-    ones for arms of up to three joints and all six otherwise. Returns (...). Lengths are in
-    mm, so the value carries a power of mm (Yoshikawa, Manipulability of Robotic Mechanisms,
-    1985, eq. 13).
+    Lengths are in mm, so the value carries a power of mm (Yoshikawa, Manipulability of Robotic Mechanisms, 1985, eq.
+    13).
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+        rows: which rows of the Jacobian count; by default the linear ones for up to three joints, else all six.
+
+    Returns:
+        (...) [a power of mm] 0 at a singularity, nan where a joint value is not finite.
+
+    Raises:
+        UsageError: q is no array of numbers, or its last axis has not the arm's n values.
     """
     values = _singular_values(arm, q, rows)
     product: Array = np.prod(values, axis=-1)
@@ -111,7 +153,16 @@ def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None
 def condition(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Figures:
     """Condition number of the Jacobian, its linear rows divided by the arm's reach.
 
-    q: (..., n) [rad | mm]; rows as in `manipulability`. Returns (...), inf at a singularity.
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+        rows: which rows of the Jacobian count; by default the linear ones for up to three joints, else all six.
+
+    Returns:
+        (...) [1] from 1; inf or very large at a singularity, nan where a joint value is not finite.
+
+    Raises:
+        UsageError: q is no array of numbers, or its last axis has not the arm's n values.
     """
     values = _singular_values(arm, q, rows, scale=arm.reach)
     with np.errstate(divide="ignore"):

@@ -71,10 +71,20 @@ class Best:
 
 
 def pulses(arm: Arm, q: ArrayLike) -> Pulses:
-    """Whole pulses of every motor: steps counted from home, or servo pulse widths in us.
+    """Whole pulses of every motor: steps counted from home, or the pulse widths or counts of servos.
 
-    q: (..., n) [rad | mm]. Returns (..., motors). Halves round away from zero. A width outside
-    the servo's travel is returned as it is, see `outside_travel`: nothing is clamped.
+    Halves round away from zero. A width outside a servo's travel is returned as it is: nothing is clamped.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+
+    Returns:
+        (..., motors) whole numbers [steps from home | us | counts], a motor's unit by its kind: stepper, RC or bus
+        servo.
+
+    Raises:
+        UsageError: the arm's motors do not determine its joints, or q is no finite (..., n), or beyond 2^53 pulses.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")
@@ -94,9 +104,18 @@ def places(arm: Arm, q: ArrayLike) -> Array:
 def joints(arm: Arm, p: ArrayLike) -> Array:
     """Joint values where the motors stand at these pulses.
 
-    p: (..., motors) [steps from home | us]. Returns (..., n) [rad | mm]. With more motors than
-    joints, the joints that fit all motors best (least squares); motors that contradict each other
-    by more than their rounding are an error.
+    With more motors than joints these are the joints that fit all motors best (least squares).
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        p: (..., motors) [steps from home | us | counts] pulses, whole or not.
+
+    Returns:
+        (..., n) [rad | mm] joint values.
+
+    Raises:
+        UsageError: the motors do not determine the joints, p is no finite (..., motors), or motors of one joint
+            contradict each other by more than their rounding.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")
@@ -137,9 +156,19 @@ def legal_with_same_pulses(arm: Arm, q: ArrayLike) -> Array:
 
 
 def rounding(arm: Arm, q: ArrayLike, p: ArrayLike | None = None) -> Rounding:
-    """Exact and actual joints and tips of the pulses for q.
+    """Exact and actual joints and tips of the pulses for joint values.
 
-    q: (..., n) [rad | mm]; p: (..., motors) the pulses, by default `pulses(arm, q)`.
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+        p: (..., motors) [steps from home | us | counts] whole pulses; by default `pulses(arm, q)`.
+
+    Returns:
+        A `Rounding`: `pulses`, `actual_joints` (..., n) [rad | mm], the exact and the actual tip (..., 3) [mm], and how
+        far these are apart, `error` (...) [mm].
+
+    Raises:
+        UsageError: the arm's motors do not determine its joints, or q is no finite (..., n), or beyond 2^53 pulses.
     """
     exact = as_joints(arm, q)
     counts = pulses(arm, exact) if p is None else np.asarray(p, dtype=np.int64)
@@ -150,11 +179,21 @@ def rounding(arm: Arm, q: ArrayLike, p: ArrayLike | None = None) -> Rounding:
 def best_pulses(arm: Arm, q: ArrayLike) -> Best:
     """Among the pulse vectors around the exact one, that whose tip is nearest to the exact tip.
 
-    q: (..., n) [rad | mm]. The search is complete over its neighbourhood: every motor takes the two
-    pulses on either side of its exact value (one on either side for more than six motors). Only the
-    tip's position counts, its direction may turn by as much as those pulses are worth. A vector that
-    leaves the joint limits or the servos' travel farther than plain rounding does is not considered,
-    nor one that makes two motors of a joint work against each other.
+    The search is complete over its neighbourhood: every motor takes the two pulses on either side of its exact value
+    (one on either side for more than six motors). Only the tip's position counts, its direction may turn by as much as
+    those pulses are worth. A vector that leaves the joint limits or the servos' travel farther than plain rounding does
+    is not considered, nor one that makes two motors of a joint work against each other.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+
+    Returns:
+        A `Best`: the `chosen` and the plainly `rounded` pulses, a `Rounding` each, and `gain` (...) [mm], by how much
+        the chosen ones are nearer.
+
+    Raises:
+        UsageError: as `pulses`, or the arm has more than 12 motors.
     """
     exact, _ = _exact(arm, q)
     values = as_joints(arm, q)

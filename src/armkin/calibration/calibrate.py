@@ -81,10 +81,22 @@ def calibrate(
 ) -> Calibration:
     """The arm that explains measured tips, as far as the rows justify it.
 
-    q: (M, n) [rad | mm] as commanded; measured: (M, 3) [mm] points or (M, 4, 4) poses; fix: kinds that stay as the
-    file has them (base, tool, zeros, ratios, lengths, twists); tick: called with the fits that are done, and how many
-    there will be. Rows that do not fit the others are forgotten. Raises
-    UsageError for rows that cannot be right: too few, on a line, a joint that never moves, other units or columns.
+    Rows that do not fit the others are forgotten.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (M, n) [rad | mm] joint values as commanded.
+        measured: (M, 3) [mm] points or (M, 4, 4) [mm] poses of the tip.
+        fix: kinds that stay as the file has them: "base", "tool", "zeros", "ratios", "lengths", "twists".
+        tick: called with the fits that are done, and how many there will be.
+
+    Returns:
+        A `Calibration`: the corrected `arm`, its `corrections` [mm, rad, 1], and each row's error `before` and `after`
+        (M,) [mm].
+
+    Raises:
+        UsageError: rows that cannot be right: too few, on a line, a joint that never moves, other units or columns; or
+            an unknown kind.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")

@@ -1,6 +1,7 @@
 """An arm's formulas as machine code, built on this computer: `armkin.compile`.
 
 compiled_arm.py      `compile`, and what it returns
+joint_functions.py   poses, positions and clearances of joint values
 one_target.py        one target at a time, in microseconds
 elimination_rows.py  an elimination's branches for targets on an edge, which Python examines
 results.py           results of a batch, as `Solutions` has them

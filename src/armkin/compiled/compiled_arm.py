@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin import forward
 from armkin.compiled import c_source, elimination_rows, toolchain
+from armkin.compiled.joint_functions import WORTH, JointFunctions
 from armkin.compiled.one_target import Single
 from armkin.compiled.results import Results
 from armkin.errors import UsageError
@@ -32,15 +31,14 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.choose_task import default_task
 from armkin.inverse.tasks.task import distance, read_targets
-from armkin.keep_out.clearance import Clearance, clearance, least, named
 from armkin.model.arm import actual
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
     from armkin.inverse.tasks.task import Task
+    from armkin.keep_out.clearance import Clearance
     from armkin.model.arm import Arm
 
-WORTH = 8192  # poses of a closed form that are worth a thread
 BLOCK = 16384  # poses of an elimination whose results are kept in all columns
 UNREAD = 2  # state of a target that must be read (made a rotation, refused) first: parts/batch.c
 
@@ -48,10 +46,21 @@ UNREAD = 2  # state of a target that must be read (made a rotation, refused) fir
 def compile(arm: Arm, task: str | None = None) -> CompiledArm:
     """An arm whose `fk` and `ik` run as machine code, built now by the system's C compiler and kept for later.
 
-    task: for whose `ik` it is built now, the arm's usual one if None; for another task it is built at its first use.
     The results are those of `armkin.fk` and `armkin.ik`, to rounding; targets on an edge that C does not tell (singular
-    postures, roots in doubt) and classes without a form in C are solved by `armkin.ik` itself. Raises
-    MissingExtraError without a C compiler.
+    postures, roots in doubt) and classes without a form in C are solved by `armkin.ik` itself.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        task: for whose `ik` it is built now, the arm's usual one if None; for another task it is built at its first
+            use.
+
+    Returns:
+        The compiled arm.
+
+    Raises:
+        MissingExtraError: there is no C compiler, or it fails.
+        UsageError: the task does not fit the arm.
+        FileError: the folder of compiled arms cannot be written.
 
     >>> import armkin
     >>> fast = armkin.compile(armkin.load("robots/three_dof.yaml"))
@@ -69,7 +78,11 @@ def _compiled(arm: Arm) -> CompiledArm:
 
 
 class CompiledArm:
-    """An arm's formulas as machine code; threads may share it."""
+    """An arm's formulas as machine code, as `armkin.compile` gives them; threads may share it.
+
+    Args:
+        arm: the arm.
+    """
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
@@ -80,16 +93,39 @@ class CompiledArm:
         return f"<CompiledArm {self.arm.name}>"
 
     def fk(self, q: ArrayLike, *, workers: int = 1) -> Array:
-        """Pose of the tool, as `armkin.fk`: q (..., n) [rad | mm] -> (..., 4, 4) [mm]."""
-        return self._any().fk(q, workers)
+        """Pose of the tool, as `armkin.fk`.
+
+        Args:
+            q: (..., n) [rad | mm] joint values; leading axes are a batch.
+            workers: threads that share a large batch.
+
+        Returns:
+            (..., 4, 4) [mm] homogeneous transforms.
+        """
+        return self._any().of_joints.fk(q, workers)
 
     def position(self, q: ArrayLike, *, workers: int = 1) -> Array:
-        """Position of the tool alone: q (..., n) [rad | mm] -> (..., 3) [mm]."""
-        return self._any().position(q, workers)
+        """Position of the tool alone.
+
+        Args:
+            q: (..., n) [rad | mm] joint values; leading axes are a batch.
+            workers: threads that share a large batch.
+
+        Returns:
+            (..., 3) [mm] x, y, z.
+        """
+        return self._any().of_joints.position(q, workers)
 
     def clearance(self, q: ArrayLike) -> Clearance:
-        """How far the arm is from hitting anything, as `armkin.clearance`."""
-        return self._any().clearance(q)
+        """How far the arm is from hitting anything, as `armkin.clearance`.
+
+        Args:
+            q: (..., n) [rad | mm] joint values; leading axes are a batch.
+
+        Returns:
+            The least distances (...) [mm] and the names of the pairs that have them.
+        """
+        return self._any().of_joints.clearance(q)
 
     def ik(
         self,
@@ -100,7 +136,19 @@ class CompiledArm:
         workers: int = 1,
         rounding: ArrayLike | None = None,
     ) -> Solutions:
-        """All branches, as `armkin.ik`; workers: threads that share a large batch."""
+        """All branches, as `armkin.ik`.
+
+        Args:
+            targets: (..., m) [mm, rad] by the task, or (..., 4, 4) [mm] for task "pose".
+            task: what targets prescribe; by default the arm's own task.
+            near: (n,) or (..., n) [rad | mm] joint values to stay close to; by default home.
+            workers: threads that share a large batch.
+            rounding: () or (...) [reaches, rad] how far the targets' numbers may be off; by default what the arrays
+                show.
+
+        Returns:
+            The branches, as `armkin.ik` returns them.
+        """
         if workers != 1:
             check(workers)
         return (self._tasks.get(task) or self._of(task)).ik(targets, near, workers, rounding)
@@ -134,10 +182,7 @@ class _CompiledTask:
         library = c_source.library(arm, self.turned, which, form)
         code = toolchain.load(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
-        self._poses, self._points = code.arm_poses, code.arm_points
-        self._clearances = code.arm_clearances if arm.keep_out and arm.whole is None else None
-        for function in filter(None, (self._poses, self._points, self._clearances)):
-            function.argtypes, function.restype = [size, *[pointer] * 3], size
+        self.of_joints = JointFunctions(arm, code)
         self.branches = library.branches
         if not self.branches:
             return
@@ -152,39 +197,6 @@ class _CompiledTask:
         if form is not None and c_source.has_rows(self.task, form):
             code.arm_rows.argtypes, code.arm_rows.restype = [size, *[pointer] * 3], None
             self._in_c = elimination_rows.InC(self.geometry, form, code.arm_rows, self.branches, self.n)
-
-    def fk(self, q: ArrayLike, workers: int) -> Array:
-        """Poses (..., 4, 4) of joint values (..., n)."""
-        return self._of_joints(self._poses, forward.fk, (4, 4), q, workers)
-
-    def position(self, q: ArrayLike, workers: int) -> Array:
-        """Positions (..., 3) of the tool for joint values (..., n)."""
-        return self._of_joints(self._points, forward.position, (3,), q, workers)
-
-    def clearance(self, q: ArrayLike) -> Clearance:
-        """Least clearances and their pairs; in Python where C has no table of them, or leaves an angle."""
-        values = forward.as_joints(self.arm, q)
-        if self._clearances is None or not np.isfinite(values).all():
-            return clearance(self.arm, values)
-        found = self._of_joints(self._clearances, least, (2,), values, 1).reshape(-1, 2)
-        return named(self.arm, found[:, 0], found[:, 1].astype(np.intp), values.shape[:-1])
-
-    def _of_joints(
-        self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int
-    ) -> Array:
-        """A function of joint values: in C, and in Python for angles that C leaves."""
-        values = forward.as_joints(self.arm, q)
-        flat = np.ascontiguousarray(values.reshape(-1, self.n))
-        out, wild = np.empty((len(flat), *shape)), np.empty(len(flat), np.uint8)
-
-        def part(rows: slice) -> int:
-            pointers = (a[rows].ctypes.data for a in (flat, out, wild))
-            return int(call(rows.stop - rows.start, *pointers))
-
-        if sum(shared(part, len(flat), workers, WORTH)):
-            far = np.flatnonzero(wild)
-            out[far] = python(self.arm, flat[far])
-        return out.reshape(*values.shape[:-1], *shape)
 
     def ik(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None = None) -> Solutions:
         """All branches of targets in the task's shape; said: how far the caller says that they are rounded."""

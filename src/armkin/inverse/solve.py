@@ -56,15 +56,24 @@ def ik(
 ) -> Solutions:
     """All real branches of inverse kinematics.
 
-    targets: (..., m) by the task [mm, rad], or (..., 4, 4) for task "pose"; task: by default the
-    arm's own; near: (n,) or (..., n) [rad | mm] joint values to stay close to, by default home;
-    examine: False leaves targets on an edge (branches that all but meet, joints that are free) as the formulas have
-    them: some of their branches may be missing; workers: threads that share a large batch, whose results are the same;
-    rounding: () or (...) how far the targets' numbers may be off [reaches, rad], by default what the arrays show: near,
-    where it solves its target to within that, is a branch and the best one; position_first: arms of four or five joints
-    asked for task "pose" keep the position and come as near to the rotation as they can
-    (`armkin.inverse.redundant.position_first`).
-    Raises UsageError if the task does not fit the arm or a target is malformed.
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        targets: (..., m) [mm, rad] by the task, or (..., 4, 4) [mm] for task "pose"; leading axes are a batch.
+        task: what targets prescribe, a name of the table in docs/solver.md; by default the arm's own task.
+        near: (n,) or (..., n) [rad | mm] joint values to stay close to; by default home.
+        examine: False leaves targets on an edge (branches that all but meet, joints that are free) as the formulas have
+            them: some of their branches may be missing.
+        workers: threads that share a large batch, whose results are the same.
+        rounding: () or (...) [reaches, rad] how far the targets' numbers may be off; by default what the arrays show.
+            near, where it solves its target to within that, is a branch and the best one.
+        position_first: arms of four or five joints asked for task "pose" keep the position and come as near to the
+            rotation as they can (`armkin.inverse.redundant.position_first`).
+
+    Returns:
+        The branches, `q` (..., B, n) [rad | mm], with their names, whether each is within limits, and the `best` one.
+
+    Raises:
+        UsageError: the task does not fit the arm, a target or near is malformed, or workers is below 1.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")

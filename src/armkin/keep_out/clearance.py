@@ -19,8 +19,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """mm: (...,) least distance of any pair, `clearance` taken off, negative where the arm hits something, inf for
-    an arm without keep-outs; body, other: (...,) the names of that pair, text for one posture.
+    """How far an arm is from the nearest thing that it must not touch.
+
+    Attributes:
+        mm: (...) least distance of any pair, `Arm.clearance` taken off; negative where the arm hits something, inf for
+            an arm without keep-outs, nan where a joint value is.
+        body: (...) the moving body of that pair; text for one posture, empty where there is none.
+        other: (...) what it is nearest to.
     """
 
     mm: Array
@@ -32,7 +37,17 @@ Hit = TypedDict("Hit", {"body": str, "with": str, "depth_mm": float})  # a pair 
 
 
 def clearance(arm: Arm, q: ArrayLike) -> Clearance:
-    """How far an arm is from hitting anything: q (..., n) [rad | mm].
+    """How far an arm is from hitting anything.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (..., n) [rad | mm] joint values; leading axes are a batch.
+
+    Returns:
+        The least distances (...) [mm] and the names of the pairs that have them.
+
+    Raises:
+        UsageError: q is no array of numbers, or its last axis has not the arm's n values.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("three_dof", scene="examples/scenes/three_dof.yaml")

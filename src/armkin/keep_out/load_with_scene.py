@@ -20,11 +20,19 @@ def load(
     *,
     tool: Sequence[float] | None = None,
 ) -> Arm:
-    """Read and validate a robot file, given its path or the name of a shipped robot; a path to a file wins.
+    """Read and validate a robot file, and the scene that the arm stands in.
 
-    scene: a file whose keep-outs are added to the robot's. tool: x, y, z, roll, pitch, yaw [mm, deg] after the last
-    joint, in place of the file's, as on the command line. Raises FileError if a file cannot be read and
-    RobotFileError if it is not valid, or if a keep-out is hit in every posture.
+    Args:
+        path: of a robot file, or the name of a shipped robot; a path to a file wins.
+        scene: a file whose keep-outs are added to the robot's.
+        tool: x, y, z, roll, pitch, yaw [mm, deg] after the last joint, in place of the file's, as on the command line.
+
+    Returns:
+        The arm, read-only.
+
+    Raises:
+        FileError: a file cannot be read.
+        RobotFileError: a file is not valid, or a keep-out is hit in every posture.
 
     >>> load("three_dof").joint_names
     ('q1', 'q2', 'q3')

@@ -22,52 +22,96 @@ if TYPE_CHECKING:
 class Arm:
     """An arm as arrays, read-only, lengths in mm and angles in rad.
 
-    The tool's pose is ``link[0] Z1(r1 q1) link[1] ... Zn(rn qn) link[n]`` with Z = Rz or Tz and the
-    `ratio` r, 1 but for calibrated arms: signs, offsets, base and tool are inside `link`.
+    The tool's pose is ``link[0] Z1(r1 q1) link[1] ... Zn(rn qn) link[n]`` with Z = Rz or Tz and the `ratio` r, 1 but
+    for calibrated arms: signs, offsets, base and tool are inside `link`.
+
+    Attributes:
+        name: as the robot file says.
+        joint_names: of all n joints, from the base on.
+        prismatic: (n,) which joints slide; the others turn.
+        link: (n + 1, 4, 4) [mm] constant transforms between the joints' motions.
+        frame: (n, 4, 4) [mm] reported frame i = chain up to Zi, times frame[i].
+        base: (4, 4) [mm] of the base in the frame of targets.
+        lower: (n,) [rad | mm] limits, -inf where unlimited.
+        upper: (n,) [rad | mm] limits, inf where unlimited.
+        home: (n,) [rad | mm] joint values.
+        max_speed: (n,) [rad/s | mm/s] nan where the file has none.
+        max_accel: (n,) [rad/s2 | mm/s2] nan where the file has none.
+        max_jerk: (n,) [rad/s3 | mm/s3] nan where the file has none.
+        dh_sign: (n,) DH angle = dh_sign * joint value + dh_theta.
+        dh_theta: (n,) [rad].
+        ratio: (n,) actual turn per commanded turn; joint values are commanded ones.
+        pitch_offset: [rad] added to the sum of the parallel joints' angles in the tasks with a pitch.
+        task: as the file says; None: by structure.
+        motor_gain: (motors, n) pulses per rad | mm.
+        motor_bias: (motors,) pulses at home.
+        reach: [mm] no point of the chain is farther from its first joint; 1, a unit, where all lengths are zero.
+        pose_names: of the robot file's poses, besides home.
+        pose_joints: (poses, n) [rad | mm].
+        held: names of joints that `armkin.lock` has folded into the links.
+        motors: in the order of the pulses; () for an arm without a robot file.
+        homing: of every joint, None where there is none.
+        hard_limits: of every joint whether its switch stops every motion into it.
+        body_radius: (n + 1,) [mm] of the base and of what each joint moves, nan where not said.
+        keep_out: of the robot file, then of the scene.
+        clearance: [mm] that is kept from them.
+        ignores_keep_out: motions are not proved: on the operator's word.
+        scene: the scene's file, as given.
+        scene_sha256: of its bytes.
+        tool: x, y, z, roll, pitch, yaw [mm, deg] in place of the file's.
+        of_scene: how many of `keep_out`, its last ones, are the scene's.
+        whole: with keep-outs: what `armkin.lock` was given.
+        gripper: as the file says.
+        board: as the file says.
+        path: of the robot file, as given.
+        sha256: of the robot file's bytes.
+        description: as the file says.
+        source: where the numbers come from.
+        file: the robot file, for whoever prints the file itself; all that arms do is in the fields above.
     """
 
     name: str
     joint_names: tuple[str, ...]
-    prismatic: NDArray[np.bool_]  # (n,)
-    link: Array  # (n + 1, 4, 4)
-    frame: Array  # (n, 4, 4): reported frame i = chain up to Zi, times frame[i]
-    base: Array  # (4, 4)
-    lower: Array  # (n,) -inf where unlimited
-    upper: Array  # (n,)
-    home: Array  # (n,)
-    max_speed: Array  # (n,) rad/s | mm/s, nan where the file has none
-    max_accel: Array  # (n,)
-    max_jerk: Array  # (n,)
-    dh_sign: Array  # (n,) DH angle = dh_sign * joint value + dh_theta
-    dh_theta: Array  # (n,)
-    ratio: Array  # (n,) actual turn per commanded turn; joint values are commanded ones
-    pitch_offset: float  # [rad]
-    task: str | None  # as the file says; None: by structure
-    motor_gain: Array  # (motors, n) pulses per rad | mm
-    motor_bias: Array  # (motors,) pulses at home
-    reach: float  # [mm] no point of the chain is farther from its first joint; 1, a unit, where all lengths are zero
-    pose_names: tuple[str, ...]  # of the robot file's poses, besides home
-    pose_joints: Array  # (poses, n)
-    held: tuple[str, ...] = ()  # names of joints that `lock` has folded into the links
-    motors: tuple[Motor, ...] = ()  # in the order of the pulses; () for an arm without a robot file
-    homing: tuple[Homing | None, ...] = ()  # of every joint
-    hard_limits: tuple[bool, ...] = ()  # of every joint: whether its switch stops every motion into it
-    body_radius: Array | None = None  # (n + 1,) [mm] of the base and of what each joint moves, nan where not said
-    keep_out: tuple[Entry, ...] = ()  # of the robot file, then of the scene
-    clearance: float = 0.0  # [mm] that is kept from them
-    ignores_keep_out: bool = False  # motions are not proved: on the operator's word
-    scene: str = ""  # the scene's file, as given
-    scene_sha256: str = ""  # of its bytes
-    tool: tuple[float, ...] | None = None  # x, y, z, roll, pitch, yaw [mm, deg] in place of the file's
-    of_scene: int = 0  # how many of `keep_out`, its last ones, are the scene's
-    whole: tuple[Arm, Mapping[str, float]] | None = None  # with keep-outs: what `lock` was given
+    prismatic: NDArray[np.bool_]
+    link: Array
+    frame: Array
+    base: Array
+    lower: Array
+    upper: Array
+    home: Array
+    max_speed: Array
+    max_accel: Array
+    max_jerk: Array
+    dh_sign: Array
+    dh_theta: Array
+    ratio: Array
+    pitch_offset: float
+    task: str | None
+    motor_gain: Array
+    motor_bias: Array
+    reach: float
+    pose_names: tuple[str, ...]
+    pose_joints: Array
+    held: tuple[str, ...] = ()
+    motors: tuple[Motor, ...] = ()
+    homing: tuple[Homing | None, ...] = ()
+    hard_limits: tuple[bool, ...] = ()
+    body_radius: Array | None = None
+    keep_out: tuple[Entry, ...] = ()
+    clearance: float = 0.0
+    ignores_keep_out: bool = False
+    scene: str = ""
+    scene_sha256: str = ""
+    tool: tuple[float, ...] | None = None
+    of_scene: int = 0
+    whole: tuple[Arm, Mapping[str, float]] | None = None
     gripper: Gripper | None = None
     board: Board | None = None
-    path: str = ""  # of the robot file, as given
-    sha256: str = ""  # of the robot file's bytes
+    path: str = ""
+    sha256: str = ""
     description: str = ""
-    source: str = ""  # where the numbers come from
-    file: RobotFile | None = None  # for whoever prints the file itself; all that arms do is in the fields above
+    source: str = ""
+    file: RobotFile | None = None
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A copy, or what was pickled, is read-only, too: caches hold code for its values."""

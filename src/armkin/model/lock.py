@@ -22,8 +22,17 @@ if TYPE_CHECKING:
 def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     """The arm with some joints held: fewer joints, the held motions folded into its links.
 
-    held: joint name -> value [rad | mm]. Raises UsageError for an unknown joint or if none is
-    left. Branches of the result go back to the full arm with `unlock`.
+    Branches of the result go back to the full arm with `armkin.unlock`.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        held: joint name -> the value that it is held at [rad | mm].
+
+    Returns:
+        An arm of n - len(held) joints, `Arm.held` their names.
+
+    Raises:
+        UsageError: a joint is unknown, a value is not finite, or no joint is left.
 
     >>> import armkin
     >>> lock(armkin.load("robots/panda.yaml"), {"J3": 0.35}).joint_names
@@ -75,7 +84,18 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
 
 
 def unlock(arm: Arm, held: Mapping[str, float], q: ArrayLike) -> Array:
-    """Joint values of a locked arm as those of the full one: (..., n - held) -> (..., n).
+    """Joint values of a locked arm as those of the full one.
+
+    Args:
+        arm: the full arm, which `armkin.lock` was given.
+        held: joint name -> the value that it is held at [rad | mm], as `armkin.lock` was given it.
+        q: (..., n - held) [rad | mm] values of the other joints, in their order.
+
+    Returns:
+        (..., n) [rad | mm] values of all joints; of rows with a nan the held values are nan, too.
+
+    Raises:
+        UsageError: a joint is unknown, a held value is no number, or q has another number of values.
 
     >>> import armkin
     >>> unlock(armkin.load("robots/three_dof.yaml"), {"q2": 0.5}, [0.1, 0.2]).tolist()

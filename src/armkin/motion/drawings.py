@@ -25,11 +25,24 @@ def drawing(
 ) -> PathFile:
     """A drawing as a path for `armkin.path`: G-code (.gcode, .gco, .nc, .ngc) or SVG.
 
-    at: where the file's zero lies in the arm's base frame, x y z [mm] or with roll pitch yaw [deg]; the tool points
-    against the drawing's z. scale: factor of the file's lengths. feed: speed of the tool where the file has none
-    [mm/s], None: as fast as the joints allow. lift: height of the pen between strokes of an SVG [mm]. grip_by: the
-    words that close and open the gripper, M3 or M106. What was left out of the file is in `notes` of the result.
-    Raises FileError, PathFileError with line and word, UsageError.
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        file: the drawing's name.
+        at: where the file's zero lies in the arm's base frame, x y z [mm] or with roll pitch yaw [deg]; the tool points
+            against the drawing's z.
+        task: what the path's targets prescribe; by default the arm's own task.
+        scale: factor of the file's lengths.
+        feed: [mm/s] speed of the tool where the file has none; None: as fast as the joints allow.
+        lift: [mm] height of the pen between strokes of an SVG.
+        grip_by: the words that close and open the gripper, "M3" or "M106".
+
+    Returns:
+        The moves, in mm and degrees as a path file has them; what was left out of the file is in `notes`.
+
+    Raises:
+        FileError: the file cannot be read.
+        PathFileError: it is not valid; the message has line and word.
+        UsageError: its name has another ending, `at` has not 3 or 6 numbers, or the task cannot hold the tool so.
 
     >>> import armkin
     >>> layer = drawing(armkin.load("three_dof"), "examples/drawing.svg", [320, -50, 200], feed=60)

@@ -41,16 +41,37 @@ def path(
 ) -> PathPlan:
     """A plan through moves: time-optimal, on the branch that carries the whole way.
 
-    moves: a path file's name, its model or its data (millimetres, degrees), or targets (w, m) or (w, 4, 4)
-    [mm, rad] to pass on straight lines. corners: how those without their own blend are passed, "stop", "blend" or
-    "tolerance" (dense points become one smooth curve). start: (n,) where the arm stands, by default home; near: (n,)
-    which branches are preferred, by default the start. speed, accel: fractions of the joints' limits; tool_speed:
-    [mm/s]; jerk: [rad/s3 | mm/s3] for all joints or each; hold: how many times max_accel a joint may be asked for
-    when the board holds on the path, None: no matter. split: change the branch, by a joint move, where none
-    carries on. Where the moves begin elsewhere than at `start`, the plan's `approach` is the joint move from there to
-    its first posture, and no part of its motion. With one joint more than the task asks for, the redundant one is
-    held (`PathPlan.held`), as near to where it stands as carries the whole path. Raises UsageError for moves that
-    make no sense, NoSolutionError if some part is not carried: its `plan` then tells how far every branch goes.
+    Where the moves begin elsewhere than at `start`, the plan's `approach` is the joint move from there to its first
+    posture, and no part of its motion. With one joint more than the task asks for, the redundant one is held
+    (`PathPlan.held`), as near to where it stands as carries the whole path.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        moves: a path file's name, its model or its data (millimetres, degrees), or targets (w, m) or (w, 4, 4) [mm,
+            rad] to pass on straight lines.
+        start: (n,) [rad | mm] where the arm stands; by default home.
+        near: (n,) [rad | mm] which branches are preferred; by default the start.
+        branch: name of the branch to begin on, where the moves begin at a target.
+        task: what targets prescribe; by default the file's, else the arm's own task.
+        tolerance: [mm] between plan and path; by default the file's, else 0.05.
+        corners: how those without their own blend are passed, "stop", "blend" or "tolerance" (dense points become one
+            smooth curve).
+        blend: [mm] radius of the sphere that rounds corners without their own; in place of `corners`.
+        speed: fraction of the joints' max_speed.
+        accel: fraction of the joints' max_accel.
+        tool_speed: [mm/s] at most, along the tool's way; by default the file's.
+        jerk: () or (n,) [rad/s3 | mm/s3] for all joints or each; by default the robot file's, where all joints have
+            one.
+        hold: how many times max_accel a joint may be asked for when the board holds on the path, None: no matter.
+        split: change the branch, by a joint move, where none carries on.
+        samples: targets along each way that are solved at first; by default one a mm, 200 at least.
+
+    Returns:
+        The plan: `duration` [s], joint values `q(t)` [rad | mm] over time, and what was found about its branches.
+
+    Raises:
+        UsageError: moves that make no sense, options out of range, or an arm without max_speed and max_accel.
+        NoSolutionError: some part is not carried; its `plan` tells how far every branch goes.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("three_dof")

@@ -35,11 +35,23 @@ def time_law(
 ) -> Trajectory:
     """The fastest motion from rest to rest through joint values that are samples of a smooth way.
 
-    q: (N, n) [rad | mm], N at least 5; s: (N,) the parameter of the samples, increasing, by default their numbers.
-    speed, accel: fractions of max_speed and max_accel; tool_speed: [mm/s]; jerk: [rad/s3 | mm/s3], by a moving
-    average; hold: see `armkin.path`. The result is sampled at will: `duration`, `q(t)`, `qd(t)`, `qdd(t)`
-    (Pham and Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018).
-    Raises UsageError for samples that are no way, or an arm without rates.
+    Method: Pham and Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (N, n) [rad | mm] the samples, N at least 5.
+        s: (N,) the parameter of the samples, increasing; by default their numbers.
+        speed: fraction of the joints' max_speed.
+        accel: fraction of the joints' max_accel.
+        tool_speed: [mm/s] of the tool at most; None: no bound.
+        jerk: () or (n,) [rad/s3 | mm/s3] at most, by a moving average; None: no bound.
+        hold: how many times max_accel a joint may be asked for when the board holds on the way; None: no matter.
+
+    Returns:
+        The motion, sampled at will: `duration` [s], `q(t)`, `qd(t)`, `qdd(t)` (..., n) [rad | mm, per s, per s2].
+
+    Raises:
+        UsageError: samples that are no way, or an arm without max_speed and max_accel.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("three_dof")

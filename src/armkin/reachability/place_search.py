@@ -63,12 +63,24 @@ FEW, TRIES = 3, 12  # places that a path is planned from, and most that are trie
 class Place:
     """Where one arm reaches the targets; lengths in mm, angles in rad.
 
-    x (X,), y (Y,), yaw (K,): the places. reached: (X, Y, K) targets reached from each, of `of`. margin: (X, Y, K)
-    distance to the nearest place of the grid, continued outside the area, at the same yaw, that does not reach all.
-    best: index of the best place; ties by margin, then by the least distance to a joint limit. positions: (N, 2 or 3)
-    of the targets; postures: (M, n) [rad | mm] for those of them that are reached from the best place. Of a path,
-    targets are points along it; planned: the best places, with their plans; unplanned: why there are none; held: where
-    a redundant joint is held [rad] at the best place.
+    Of a path, targets are points along it.
+
+    Attributes:
+        arm: the arm that is placed.
+        x: (X,) [mm] of the places.
+        y: (Y,) [mm].
+        yaw: (K,) [rad].
+        z: [mm] of all places.
+        reached: (X, Y, K) targets reached from each place, of `of`.
+        margin: (X, Y, K) [mm] distance to the nearest place of the grid, continued outside the area, at the same yaw,
+            that does not reach all.
+        of: how many targets there are.
+        best: index of the best place in `reached`; ties by margin, then by the least distance to a joint limit.
+        positions: (N, 2) or (N, 3) [mm] of the targets.
+        postures: (M, n) [rad | mm] for those of them that are reached from the best place.
+        planned: of a path the best places, with their plans.
+        unplanned: why there are none; empty where there are.
+        held: where a redundant joint is held [rad] at the best place.
     """
 
     arm: Arm
@@ -93,7 +105,7 @@ class Place:
 
     @property
     def xyz(self) -> Array:
-        """The best position: (3,)."""
+        """(3,) [mm] the best position."""
         return np.array([self.x[self.best[0]], self.y[self.best[1]], self.z])
 
 
@@ -120,15 +132,34 @@ def place(
     progress: Callable[[int], None] | None = None,
     solve: Solve | None = None,
 ) -> list[Place]:
-    """Where each arm, by itself, reaches the targets (N, m) or (N, 4, 4) [mm, rad] of its task, or carries a path.
+    """Where each arm, by itself, reaches targets of its task, or carries a path.
 
-    targets: or a path file's name (.yaml) or model: a place counts only if one branch carries each way between joint
-    moves, and the best places are planned (`Place.planned`).
-    area: x and y, each from and to [mm], by default the targets' box grown by the arm's reach; step [mm] and yaw [rad]
-    of the places; z [mm] of all. scene: keep-outs that stand with the targets. out: what is finished stays beside that
-    file until `armkin.reachability.place_file.write` has written it: after a kill it goes on. workers, cluster: see
-    `armkin.reach`; progress gets the positions done. solve: what is asked of an arm, targets and a task, by default
-    `armkin.ik`; one that calls `armkin.compile(arm).ik` is quicker (a function of a module, as it travels).
+    Args:
+        arms: the arm, or several.
+        targets: (N, m) or (N, 4, 4) [mm, rad]; or a path file's name (.yaml) or model: a place counts only if one
+            branch carries each way between joint moves, and the best places are planned (`Place.planned`).
+        area: x and y, each from and to [mm]; by default the targets' box grown by the arm's reach.
+        step: [mm] between places along x and y.
+        yaw: [rad] between places that differ in yaw alone.
+        z: [mm] of all places.
+        scene: a file of keep-outs that stand with the targets.
+        out: what is finished stays beside that file until `armkin.reachability.place_file.write` has written it: after
+            a kill it goes on.
+        workers: processes of this machine.
+        cluster: address of a Dask scheduler, tcp://HOST:PORT, in place of workers.
+        progress: called with the number of positions done.
+        solve: what is asked of an arm, targets and a task, by default `armkin.ik`; one that calls
+            `armkin.compile(arm).ik` is quicker (a function of a module, as it travels).
+
+    Returns:
+        A `Place` for each arm, in their order.
+
+    Raises:
+        UsageError: a number is out of range, a target is malformed, or the task does not fit an arm.
+        FileError: a file cannot be read or written, or parts of another run stand beside it.
+        PathFileError: the path file is not valid.
+        MissingExtraError: a cluster without Dask.
+        ClusterError: the cluster cannot be reached, or a worker fails.
 
     >>> import armkin
     >>> [found] = armkin.place(armkin.load("three_dof"), [[600, 0, 200], [600, 300, 200]], step=100.0)

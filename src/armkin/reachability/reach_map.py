@@ -44,10 +44,22 @@ UNITS = {
 class Reach:
     """Columns by name, one row a cell, and what they come to; `units` has each column's unit.
 
-    x_mm, y_mm, z_mm: the cell's centre in the frame of targets. share, share_any: of its orientations, reached within
-    limits, and limits and keep-outs apart. branches: legal ones, mean over reached orientations. single: share that
-    exactly one legal branch reaches. manipulability (of the tip, as `workspace` measures it), limit_margin: best,
-    step_error_mm: least over all legal answers. nan where no orientation is reached, or nothing is to be measured.
+    Each column is an attribute, too, (cells,). x_mm, y_mm, z_mm: the cell's centre in the frame of targets. share,
+    share_any: of its orientations, reached within limits, and limits and keep-outs apart. branches: legal ones, mean
+    over reached orientations. single: share that exactly one legal branch reaches. manipulability (of the tip, as
+    `workspace` measures it), limit_margin: best, step_error_mm: least over all legal answers. nan where no orientation
+    is reached, or nothing is to be measured.
+
+    Attributes:
+        grid: which cells and orientations were asked.
+        columns: name -> (cells,); empty where they are in a file alone, beyond 5,000,000 cells.
+        method: "arcs" where one solve answers a whole ring, else "poses".
+        cells: how many there are.
+        answers: cells times orientations.
+        solves: targets that were solved for them.
+        reached: cells of which some orientation is reached within limits.
+        volume_mm3: [mm3] of these cells.
+        seconds: [s] that it took.
     """
 
     grid: Grid
@@ -96,9 +108,27 @@ def reach(
 ) -> Reach:
     """Ask every cell of a grid about joint 1's axis for every orientation; cells: `armkin.reachability.cells`.
 
-    grid [mm], azimuths of a ring, directions of the tool's z axis, rolls about it; tool_down: straight down alone.
-    measures: False leaves the columns nan that need Jacobians. out: a .npz, .parquet or .csv of all columns; run again
-    after a kill, it goes on. workers: processes; cluster: a Dask scheduler's address. progress: gets the cells done.
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        grid: [mm] height and radial width of a cell.
+        azimuths: cells of a ring.
+        directions: directions of the tool's z axis (or pitches, yaws) that are asked of each cell.
+        rolls: turns about that axis that are asked of each direction.
+        tool_down: straight down is the only direction.
+        measures: False leaves the columns nan that need Jacobians.
+        out: a .npz, .parquet or .csv file of all columns; run again after a kill, it goes on.
+        workers: processes of this machine.
+        cluster: address of a Dask scheduler, tcp://HOST:PORT, in place of workers.
+        progress: called with the number of cells done.
+
+    Returns:
+        The map, (cells,) a column.
+
+    Raises:
+        UsageError: a number is out of range, no cell is within reach, or no task fits the arm.
+        FileError: the file cannot be written, or parts of another run stand beside it.
+        MissingExtraError: .parquet without pyarrow, a cluster without Dask.
+        ClusterError: the cluster cannot be reached, or a worker fails.
 
     >>> import armkin
     >>> found = armkin.reach(armkin.load("robots/three_dof.yaml"), grid=100.0, azimuths=12)

@@ -61,16 +61,33 @@ def workspace(
 ) -> Workspace:
     """Sample an arm's joints within their limits and see where the tip comes.
 
-    samples: how many random poses (100,000 unless a grid is given), the same for the same seed.
-    grid_points: points on every joint instead, or one number for all.
-    measures: of "manipulability" and "step_error", worked out for every sample.
-    out: a .csv, .npz or .ply file for all samples. keep: how many samples the result holds.
-    progress: called with the number of samples done. position: the tip (N, 3) for joint values (N, n), by default
-    `armkin.forward.position`; `armkin.compile(arm).position` is faster. workers: processes; cluster: a Dask scheduler's
-    address (`position` is then a function of a module, for it travels): the samples are the same ones.
+    Memory does not grow with the number of samples. The volume does not depend on it from 5,000 on; below, its error
+    grows: see `armkin.reachability.volume`.
 
-    Memory does not grow with the number of samples. The volume does not depend on it from 5,000 on; below,
-    its error grows: see `extent`.
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        samples: how many random poses; by default 100,000, unless a grid is given.
+        grid_points: points on every joint in place of random poses: n numbers, or one that counts for all.
+        seed: of the random poses: the same seed has the same ones.
+        measures: of "manipulability" and "step_error" [mm], worked out for every sample.
+        out: a .csv, .npz or .ply file for all samples.
+        volume: whether the volume or area is worked out.
+        keep: about how many samples, a random choice, the result holds.
+        progress: called with the number of samples done.
+        position: the tip (N, 3) [mm] for joint values (N, n), by default `armkin.forward.position`;
+            `armkin.compile(arm).position` is faster (with workers or a cluster a function of a module, for it travels).
+        workers: processes of this machine: the samples are the same ones.
+        cluster: address of a Dask scheduler, tcp://HOST:PORT, in place of workers.
+
+    Returns:
+        A `Workspace`: the tip's box `low`, `high` (3,) [mm], its `reach` [mm], the volume as `extent`, and the
+        measures.
+
+    Raises:
+        UsageError: a number is out of range, samples and a grid are both given, or a prismatic joint has no limits.
+        FileError: the file cannot be written; there is none then.
+        MissingExtraError: a cluster without Dask.
+        ClusterError: the cluster cannot be reached, or a worker fails.
     """
     started = time.perf_counter()
     sampling = _sampling(arm, samples, grid_points, seed)

@@ -45,9 +45,13 @@ AT_ONCE = 256  # targets worked on together
 class Closest:
     """The nearest pose within limits.
 
-    q: (n,) [rad | mm]; position: (3,) of the tool [mm]; distance: to the target's position
-    [mm]; angle: to what else the target prescribes [rad]; converged: it is a local minimum: the
-    gradient vanishes along every joint that no limit stops, and no such motion curves down.
+    Attributes:
+        q: (n,) [rad | mm] its joint values.
+        position: (3,) [mm] of the tool there.
+        distance: [mm] to the target's position.
+        angle: [rad] to what else the target prescribes; 0 where it prescribes nothing else.
+        converged: it is a local minimum: the gradient vanishes along every joint that no limit stops, and no such
+            motion curves down.
     """
 
     q: Array
@@ -60,11 +64,22 @@ class Closest:
 def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None) -> Closest:
     """The pose within limits that misses the target least.
 
-    target: one target (m,) or (4, 4). What is minimised is the squared distance plus the
-    squared angle times the square of a quarter of the reach, so that a radian weighs as much
-    as a quarter of the reach. Projected Levenberg-Marquardt from some starts (`near`, home
-    and the nearest of many postures within limits); the best local minimum is returned, ties going to the
-    one nearest to `near`.
+    What is minimised is the squared distance plus the squared angle times the square of a quarter of the reach, so that
+    a radian weighs as much as a quarter of the reach. Projected Levenberg-Marquardt from some starts (`near`, home and
+    the nearest of many postures within limits); the best local minimum is returned, ties going to the one nearest to
+    `near`.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        target: (m,) [mm, rad] by the task, or (4, 4) [mm] for task "pose": one target.
+        task: what the target prescribes; by default the arm's own task.
+        near: (n,) [rad | mm] joint values to stay close to; by default home.
+
+    Returns:
+        The pose, what it misses [mm, rad], and whether it is a proved local minimum.
+
+    Raises:
+        UsageError: the task does not fit the arm, the target is malformed or several, or near is no finite (n,).
 
     >>> import armkin
     >>> found = closest(armkin.load("robots/planar_2dof.yaml"), [600, 0])

@@ -18,30 +18,52 @@ from armkin.model.arm import Arm
 
 
 class Status(IntEnum):
-    """What the geometry says of a target, limits apart."""
+    """What the geometry says of a target, limits apart.
 
-    EXACT = 0  # isolated branches
-    BOUNDARY = 1  # two branches merge: the target lies on the edge of what that posture reaches
-    SINGULAR = 2  # a whole curve of joint values answers: some joints are free
+    Attributes:
+        EXACT: isolated branches.
+        BOUNDARY: two branches merge: the target lies on the edge of what that posture reaches.
+        SINGULAR: a whole curve of joint values answers: some joints are free.
+        UNREACHABLE: no joint values answer.
+        POSITION: of `ik(..., position_first=True)`: the tool's position is exact, its rotation the nearest there is.
+    """
+
+    EXACT = 0
+    BOUNDARY = 1
+    SINGULAR = 2
     UNREACHABLE = 3
-    POSITION = 4  # position first: the tool's position is exact, its rotation the nearest there is
+    POSITION = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solutions:
     """All branches of a batch of targets; leading axes (...) are the batch's.
 
-    q: (..., B, n) [rad | mm], one row a branch modulo whole turns, the legal copy nearest
-    `near`; rows past the last branch are nan. valid: (..., B) the row reaches the target to
-    1e-9 of the arm's reach. within_limits: (..., B). branch: (..., B) index into `names`, -1
-    past the last. status: (...) of `Status`. free: (..., n) joints that a singular target
-    leaves free. complete: (...) every isolated real branch of this target is guaranteed to be
-    there (never of a sliding arm's targets more than 20 reaches away). rounding: (...) how
-    far the columns of a pose's rotation were from orthonormal; `target` holds the rotation next to it, which
-    the branches answer. angle: (..., B) [rad] how far each row's rotation is off, of `ik(..., position_first=True)`
-    alone: rows are then sorted by it, and `status` tells of the first. interval: (..., B, 2) [rad] where an arm has one
-    joint more than the target asks for: the values of the redundant joint (`armkin.inverse.redundant.families`) along
-    which a row's posture moves within limits; of rows outside limits those of its whole family.
+    Attributes:
+        arm: the arm that was asked.
+        task: what the targets prescribe.
+        target: (..., m) [mm, rad] or (..., 4, 4) [mm] the targets, rotations made orthonormal.
+        near: (..., n) [rad | mm] the joint values to stay close to.
+        q: (..., B, n) [rad | mm], one row a branch modulo whole turns, the legal copy nearest `near`; nan past the
+            last.
+        valid: (..., B) the row reaches the target to 1e-9 of the arm's reach.
+        within_limits: (..., B) the row is within the joints' limits, too.
+        branch: (..., B) index into `names`, -1 past the last.
+        status: (...) of `Status`.
+        free: (..., n) joints that a singular target leaves free.
+        names: of the branches that the arm has.
+        method: the solver class, as `armkin.method` names it.
+        why: the reason why it applies.
+        complete: (...) every isolated real branch of this target is guaranteed to be there (never of a sliding arm's
+            targets more than 20 reaches away).
+        rounding: (...) [reaches, rad] how far the numbers given may be off, as `ik` was told, else how far the columns
+            of a pose's rotation were from orthonormal, and of float32 its last place; `target` holds the rotation next
+            to it, which the branches answer.
+        angle: (..., B) [rad] how far each row's rotation is off, of `ik(..., position_first=True)` alone: rows are then
+            sorted by it, and `status` tells of the first.
+        interval: (..., B, 2) [rad] where an arm has one joint more than the target asks for: the values of the
+            redundant joint (`armkin.inverse.redundant.families`) along which a row's posture moves within limits; of
+            rows outside limits those of its whole family.
     """
 
     arm: Arm
@@ -108,7 +130,12 @@ class Solutions:
         return np.where(np.isfinite(np.min(key, axis=-1)), index, -1)
 
     def residual(self) -> tuple[Array, Array]:
-        """What each branch misses, recomputed from its joint values: (..., B) [mm] and (..., B) [rad]."""
+        """What each branch misses, recomputed from its joint values.
+
+        Returns:
+            (..., B) [mm] of the position, nan where there is no branch, and (..., B) [rad] of what else the task
+            prescribes, 0 where that is nothing.
+        """
         from armkin.forward import fk
 
         B, n = self.q.shape[-2:]

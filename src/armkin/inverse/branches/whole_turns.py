@@ -156,9 +156,19 @@ def nearest_of_joint(arm: Arm, i: int, value: Array, near: Array) -> tuple[Array
 def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     """All copies of one branch within the limits, the one nearest to `near` first.
 
-    q: (n,) [rad | mm]; near: (n,), by default home. Returns (K, n); of equal motions the copy above `near` is first.
-    An unlimited revolute joint has copies without end: it gives the one nearest to `near` alone. Raises UsageError for
-    more than `MOST` copies.
+    An unlimited revolute joint has copies without end: it gives the one nearest to `near` alone. Of equal motions the
+    copy above `near` is first.
+
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        q: (n,) [rad | mm] joint values of the branch, one row.
+        near: (n,) [rad | mm] joint values to stay close to; by default home.
+
+    Returns:
+        (K, n) [rad | mm], K = 0 where no copy is within the limits.
+
+    Raises:
+        UsageError: q or near is no finite (n,), or there are more than 50,000 copies.
 
     >>> import armkin
     >>> arm = armkin.load("robots/ur5e.yaml")  # limits of +-360 degrees, joint 3 of +-180

@@ -60,7 +60,15 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
 def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:
     """Solver class of an arm, why it applies, and whether it guarantees all branches.
 
-    task: by default the arm's own. Raises UsageError if it does not fit the arm.
+    Args:
+        arm: the arm, as `armkin.load` gives it.
+        task: what targets prescribe; by default the arm's own task.
+
+    Returns:
+        The class's name, the reason in words, and True if every isolated branch is guaranteed to be found.
+
+    Raises:
+        UsageError: the task does not fit the arm, or leaves it a redundant joint (RedundantArmError).
 
     >>> import armkin
     >>> armkin.method(armkin.load("three_dof"))

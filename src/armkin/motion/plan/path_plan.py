@@ -82,21 +82,41 @@ class Marker:
 class PathPlan:
     """What `armkin.path` returns: joint values over time, and how they came about.
 
-    length: [mm] of the tool's way; runs, branches, reconfigurations: see their classes; deviation: [mm] a bound of
-    the distance between plan and path, or the greatest distance of a given point from the motion where corners are
-    passed by the tolerance; reduced: blends that did not fit; nearest_singularity: [mm] where, the condition there,
-    the joint values.
+    Attributes:
+        arm: the arm that moves.
+        task: what targets prescribe; None: joint moves alone, on an arm that no task fits.
+        tolerance: [mm] between plan and path that was allowed.
+        speed: fraction of the joints' max_speed, on joint moves.
+        length: [mm] of the tool's way.
+        samples: targets along the tool's way of which all branches were asked for.
+        complete: every isolated branch of these targets is guaranteed to have been found.
+        deviation: [mm] a bound of the distance between plan and path, or the greatest distance of a given point from
+            the motion where corners are passed by the tolerance.
+        rounded_most: [mm] along the way, where a given point lies farthest from the motion; None: no corner is passed
+            so.
+        reduced: blends that did not fit.
+        passed: wrist singularities that are passed straight through.
+        runs: parts of the way, each on one branch.
+        branches: those at the path's start, how far each carries and why no farther.
+        reconfigurations: where a run ends before the path does.
+        nearest_singularity: [mm] where, the Jacobian's condition there, and the joint values (n,) [rad | mm].
+        markers: what happens between two stretches: the gripper, a pause.
+        trajectory: the motion; None: the path was not planned to its end.
+        approach: the joint move from where the arm stands to the start, no part of the motion; None: it stands there.
+        clearance: where there are keep-outs, mm (a lower bound), s_mm, body, with.
+        held: joints that are held all along, and where [rad | mm].
+        on_path: number of a stretch on the tool's way -> it, and the way before it [mm].
     """
 
     arm: Arm
-    task: Task | None  # None: joint moves alone, on an arm that no task fits
+    task: Task | None
     tolerance: float
-    speed: float = 1.0  # fraction of the joints' max_speed, on joint moves
+    speed: float = 1.0
     length: float = 0.0
     samples: int = 0
     complete: bool = True
     deviation: float = 0.0
-    rounded_most: float | None = None  # [mm] where a given point lies farthest from the motion
+    rounded_most: float | None = None
     reduced: Reduced = field(default_factory=Reduced)
     passed: list[Passed] = field(default_factory=list)
     runs: list[PathRun] = field(default_factory=list)
@@ -105,10 +125,10 @@ class PathPlan:
     nearest_singularity: tuple[float, float, Array] | None = None
     markers: list[Marker] = field(default_factory=list)
     trajectory: Trajectory | None = None
-    approach: Trajectory | None = None  # the joint move from where the arm stands to the start, no part of the motion
-    clearance: dict[str, Any] | None = None  # mm (a lower bound), s_mm, body, with: where there are keep-outs
-    held: dict[str, float] = field(default_factory=dict)  # joints held all along, and where [rad | mm]
-    on_path: dict[int, tuple[Stretch, float]] = field(default_factory=dict)  # stretch number -> it, and s before it
+    approach: Trajectory | None = None
+    clearance: dict[str, Any] | None = None
+    held: dict[str, float] = field(default_factory=dict)
+    on_path: dict[int, tuple[Stretch, float]] = field(default_factory=dict)
 
     @property
     def turned(self) -> float | None:
@@ -116,11 +136,22 @@ class PathPlan:
         return max((one.turned for one in self.passed if one.turned), default=None)
 
     def along(self, number: int, stretch: Stretch, base: float) -> None:
-        """Note that a stretch is on the tool's way."""
+        """Note that a stretch is on the tool's way.
+
+        Args:
+            number: of the stretch in the motion.
+            stretch: the stretch itself.
+            base: [mm] the tool's way before it.
+        """
         self.on_path[number] = (stretch, base)
 
     def nearer_singularity(self, q: Array, s: Array) -> None:
-        """Note where joint values (N, n) at lengths s (N,) behind the present end come nearest to a singularity."""
+        """Note where joint values behind the present end come nearest to a singularity.
+
+        Args:
+            q: (N, n) [rad | mm] joint values along the way.
+            s: (N,) [mm] the lengths at which they are.
+        """
         for i in range(0, len(q), _BLOCK):
             some = _worst(self.arm, q[i : i + _BLOCK])
             worst = condition(self.arm, q[i + some])
@@ -130,7 +161,16 @@ class PathPlan:
                 self.nearest_singularity = (self.length + float(s[at]), float(worst[k]), q[at].copy())
 
     def finished(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
-        """The same with its motion from a posture on."""
+        """The same with its motion from a posture on.
+
+        Args:
+            start: (n,) [rad | mm] where the motion begins.
+            made: its stretches, in order.
+            markers: what happens between them.
+
+        Returns:
+            This plan.
+        """
         self.trajectory, self.markers = Trajectory(self.arm, start, tuple(made)), markers
         return self
 
@@ -146,19 +186,47 @@ class PathPlan:
         return self.motion.duration
 
     def q(self, t: ArrayLike) -> Array:
-        """Joint values at times t [s]: (...,) -> (..., n) [rad | mm]."""
+        """Joint values at times; before and behind the motion those at its ends.
+
+        Args:
+            t: (...) [s] times since the motion began.
+
+        Returns:
+            (..., n) [rad | mm].
+        """
         return self.motion.q(t)
 
     def qd(self, t: ArrayLike) -> Array:
-        """Joint speeds: (...,) -> (..., n) [rad/s | mm/s]."""
+        """Joint speeds at times.
+
+        Args:
+            t: (...) [s] times since the motion began.
+
+        Returns:
+            (..., n) [rad/s | mm/s].
+        """
         return self.motion.qd(t)
 
     def qdd(self, t: ArrayLike) -> Array:
-        """Joint accelerations: (...,) -> (..., n) [rad/s2 | mm/s2]."""
+        """Joint accelerations at times.
+
+        Args:
+            t: (...) [s] times since the motion began.
+
+        Returns:
+            (..., n) [rad/s2 | mm/s2].
+        """
         return self.motion.qdd(t)
 
     def s(self, t: ArrayLike) -> Array:
-        """Way of the tool along its path at times t: (...,) [mm]; before, between and behind it stays."""
+        """Way of the tool along its path at times; before, between and behind its stretches it stays.
+
+        Args:
+            t: (...) [s] times since the motion began.
+
+        Returns:
+            (...) [mm].
+        """
         when = np.asarray(t, dtype=float).ravel()
         out = np.zeros(len(when))
         numbers = sorted(self.on_path)
@@ -172,14 +240,28 @@ class PathPlan:
         return out.reshape(np.shape(t))
 
     def s_range(self, number: int) -> tuple[float, float]:
-        """Where a stretch on the tool's way begins and ends [mm]."""
+        """Where a stretch on the tool's way begins and ends.
+
+        Args:
+            number: of the stretch, a key of `on_path`.
+
+        Returns:
+            Begin and end [mm].
+        """
         stretch, base = self.on_path[number]
         assert isinstance(stretch, Curve | Smoothed)
         s = way_of(stretch).s
         return base + float(s[0]), base + float(s[-1])
 
     def grid(self, number: int) -> Array:
-        """Joint values at the grid points of a stretch on the tool's way: (N, n) [rad | mm]."""
+        """Joint values at the grid points of a stretch on the tool's way.
+
+        Args:
+            number: of the stretch, a key of `on_path`.
+
+        Returns:
+            (N, n) [rad | mm].
+        """
         stretch, _ = self.on_path[number]
         assert isinstance(stretch, Curve | Smoothed)
         return way_of(stretch).q

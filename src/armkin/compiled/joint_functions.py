@@ -1,0 +1,64 @@
+"""What a compiled arm says of joint values: poses, positions and clearances, at any angle."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armkin import forward
+from armkin.formula.arrays import Array
+from armkin.inverse.run.workers import shared
+from armkin.keep_out.clearance import Clearance, clearance, least, named
+
+if TYPE_CHECKING:
+    from armkin.model.arm import Arm
+
+WORTH = 8192  # poses of a closed form that are worth a thread
+
+
+class JointFunctions:
+    """Functions of joint values (..., n) [rad | mm] in an arm's library, whatever its task."""
+
+    def __init__(self, arm: Arm, code: ctypes.CDLL) -> None:
+        self.arm = arm
+        self._poses, self._points = code.arm_poses, code.arm_points
+        self._clearances = code.arm_clearances if arm.keep_out and arm.whole is None else None
+        for function in filter(None, (self._poses, self._points, self._clearances)):
+            function.argtypes, function.restype = [ctypes.c_int64, *[ctypes.c_void_p] * 3], ctypes.c_int64
+
+    def fk(self, q: ArrayLike, workers: int) -> Array:
+        """Poses (..., 4, 4) of joint values (..., n)."""
+        return self._run(self._poses, forward.fk, (4, 4), q, workers)
+
+    def position(self, q: ArrayLike, workers: int) -> Array:
+        """Positions (..., 3) of the tool for joint values (..., n)."""
+        return self._run(self._points, forward.position, (3,), q, workers)
+
+    def clearance(self, q: ArrayLike) -> Clearance:
+        """Least clearances and their pairs; in Python where C has no table of them, or leaves an angle."""
+        values = forward.as_joints(self.arm, q)
+        if self._clearances is None or not np.isfinite(values).all():
+            return clearance(self.arm, values)
+        found = self._run(self._clearances, least, (2,), values, 1).reshape(-1, 2)
+        return named(self.arm, found[:, 0], found[:, 1].astype(np.intp), values.shape[:-1])
+
+    def _run(
+        self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int
+    ) -> Array:
+        """A function of joint values: in C, and in Python for angles that C leaves."""
+        values = forward.as_joints(self.arm, q)
+        flat = np.ascontiguousarray(values.reshape(-1, self.arm.n))
+        out, wild = np.empty((len(flat), *shape)), np.empty(len(flat), np.uint8)
+
+        def part(rows: slice) -> int:
+            pointers = (a[rows].ctypes.data for a in (flat, out, wild))
+            return int(call(rows.stop - rows.start, *pointers))
+
+        if sum(shared(part, len(flat), workers, WORTH)):
+            far = np.flatnonzero(wild)
+            out[far] = python(self.arm, flat[far])
+        return out.reshape(*values.shape[:-1], *shape)

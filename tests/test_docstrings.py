@@ -1,0 +1,117 @@
+"""The docstrings of the public names say what goes in, what comes out and what is raised, in one format."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Any
+
+import pytest
+
+import armkin
+from armkin import errors
+
+SECTION = re.compile(r"^(Args|Attributes|Returns|Raises):\n((?:(?:    .*)?\n?)*)", re.M)
+ENTRY = re.compile(r"^    \*{0,2}(\w+): *(\S.*(?:\n {6,}.*)*)", re.M)  # a name, what it is, and lines indented more
+SHAPE = re.compile(r"^\((?:\.\.\.|\d+|[A-Za-z]\w*| [+-] |, ?)*\)")  # (), (..., n), (N, 3)
+ARRAYS = ("ArrayLike", "Array", "NDArray", "Joints", "Points", "Poses", "Frames", "Jacobians", "Figures", "Pulses")
+
+
+def _public() -> Iterator[tuple[str, Any]]:
+    """Every exported callable, and of classes what they define in public."""
+    for name in armkin.__all__:
+        value = getattr(armkin, name)
+        if callable(value):
+            yield name, value
+        if inspect.isclass(value):
+            for inner, member in vars(value).items():
+                if not inner.startswith("_") and (inspect.isfunction(member) or _is_property(member)):
+                    yield f"{name}.{inner}", member
+
+
+def _is_property(member: Any) -> bool:
+    return isinstance(member, property | cached_property)
+
+
+PUBLIC = dict(_public())
+FUNCTIONS = {name: value for name, value in PUBLIC.items() if inspect.isfunction(value)}
+READ = {name: value for name, value in PUBLIC.items() if _is_property(value)}
+CLASSES = {name: value for name, value in PUBLIC.items() if inspect.isclass(value)}
+
+
+def _sections(of: Any) -> dict[str, str]:
+    text = (inspect.getdoc(of) or "") + "\n"
+    return dict(SECTION.findall(text))
+
+
+def _entries(of: Any, section: str) -> dict[str, str]:
+    return {name: " ".join(text.split()) for name, text in ENTRY.findall(_sections(of).get(section, ""))}
+
+
+def _parameters(of: Callable[..., Any]) -> list[str]:
+    return [name for name in inspect.signature(of).parameters if name != "self"]
+
+
+def _is_array(annotation: str) -> bool:
+    return annotation.removesuffix(" | None").partition("[")[0] in ARRAYS
+
+
+def test_there_is_something_to_read() -> None:
+    assert len(FUNCTIONS) > 40
+    assert len(CLASSES) > 12
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_the_first_line_is_a_sentence_by_itself(name: str) -> None:
+    first, *rest = (inspect.getdoc(PUBLIC[name]) or "").splitlines()
+    assert first.endswith(".")
+    assert not rest or not rest[0], "a summary is one line"
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_parameter_has_a_line(name: str) -> None:
+    told = _entries(FUNCTIONS[name], "Args")
+    assert list(told) == _parameters(FUNCTIONS[name])
+    arrays = {given for given in told if _is_array(inspect.signature(FUNCTIONS[name]).parameters[given].annotation)}
+    assert not {given for given in arrays if not SHAPE.match(told[given])}, "an array's line begins with its shape"
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_what_is_returned_is_told(name: str) -> None:
+    annotation = inspect.signature(FUNCTIONS[name]).return_annotation
+    told = " ".join(_sections(FUNCTIONS[name]).get("Returns", "").split())
+    assert bool(told) == (annotation != "None")
+    assert not _is_array(annotation) or SHAPE.match(told), "an array's shape comes first"
+
+
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if "." not in name])
+def test_what_is_raised_is_told(name: str) -> None:
+    told = _entries(FUNCTIONS[name], "Raises")
+    assert told
+    assert all(issubclass(getattr(errors, error), armkin.ArmkinError) for error in told)
+
+
+@pytest.mark.parametrize("name", READ)
+def test_of_an_array_that_is_read_the_shape_is_told(name: str) -> None:
+    getter: Callable[..., Any] = getattr(READ[name], "fget", None) or READ[name].func
+    text = inspect.getdoc(getter) or ""
+    assert not _is_array(inspect.signature(getter).return_annotation) or SHAPE.match(text)
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_field_has_a_line(name: str) -> None:
+    kind = CLASSES[name]
+    if dataclasses.is_dataclass(kind):
+        told = [(field.name, str(field.type)) for field in dataclasses.fields(kind)]
+    elif issubclass(kind, enum.Enum):
+        told = [(member, "") for member in kind.__members__]
+    else:
+        assert list(_entries(kind, "Args")) == (_parameters(kind) if "__init__" in vars(kind) else [])
+        return
+    lines = _entries(kind, "Attributes")
+    assert list(lines) == [field for field, _ in told]
+    assert not {field for field, type_ in told if _is_array(type_) and not SHAPE.match(lines[field])}
