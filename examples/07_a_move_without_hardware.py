@@ -4,7 +4,7 @@ import numpy as np
 
 import armkin
 from armkin.board.kinds import board_of
-from armkin.board.opening import open_board
+from armkin.board.open_board import open_board
 
 arm = armkin.load("three_dof")
 board = board_of(arm)  # the kind of board that the robot file names

@@ -153,7 +153,7 @@ class Late:
     def __set_name__(self, owner, name): os.kill(os.getpid(), signal.SIGINT)
 class Half: late = Late()
 """)
-    program = "import time; from armkin.board.stopping import planning, stoppable\n"
+    program = "import time; from armkin.board.stop_signals import planning, stoppable\n"
     program += "with stoppable(), planning():\n    import half\n    time.sleep(60)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, env=environment)

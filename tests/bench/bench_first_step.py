@@ -25,7 +25,7 @@ from emulator import EmulatedBoard
 import armkin
 from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.ports import SerialPort
 from armkin.errors import LinkError
 

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 from emulator import EmulatedBoard
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.session import probe
 from armkin.board.ports import SerialPort

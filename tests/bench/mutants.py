@@ -66,7 +66,7 @@ MUTANTS = [
     Mutant("motion/tool_path/path_pieces.py", "omega - np.cross(w, omega) / 2", "omega + np.cross(w, omega) / 2",
            "motion"),
     Mutant("path_file/svg_shapes.py", "0.0) if kind == \"skewX\" else", "0.0) if kind == \"skewY\" else", "path_file"),
-    Mutant("board/grbl/gcode.py", "max(60 * speed, SLOWEST)", "max(speed, SLOWEST)", "board"),
+    Mutant("board/grbl/trajectory_to_gcode.py", "max(60 * speed, SLOWEST)", "max(speed, SLOWEST)", "board"),
     Mutant("board/feetech/packet.py", "bytes([~sum(body) & 0xFF])", "bytes([sum(body) & 0xFF])",
            "board/test_feetech_bus.py"),
     Mutant("robot_file/urdf.py", "(cr, sr), (cp, sp), (cy, sy)", "(cy, sy), (cp, sp), (cr, sr)", "robot_file"),

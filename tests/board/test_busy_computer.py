@@ -7,9 +7,9 @@ import pytest
 from test_feetech_machine import ARM, bus, machine
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
-from armkin.board.sim.servo_bus import ServoBus
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.sim.sim_board import SimBoard
+from armkin.board.sim.sim_servo_bus import ServoBus
 from armkin.errors import LinkError
 from armkin.model import build as arms
 from command_line import COUNTS, POSE, ROOT

@@ -14,7 +14,7 @@ from armkin.board.firmware.segments.counts_to_segments import cycles_of
 from armkin.board.firmware.segments.trajectory_to_counts import cut
 from armkin.board.kinds import board_of
 from armkin.board.path_run import follow, parts
-from armkin.board.sim.queue import intervals
+from armkin.board.sim.segment_queue import intervals
 from armkin.formula.arrays import Array
 from armkin.motion.timing.curve import Curve
 

@@ -13,7 +13,7 @@ import pytest
 
 from armkin.board.firmware import gripping, homing, jogging
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Info, Status

@@ -15,7 +15,7 @@ import scservo_sdk as sdk
 from armkin.board.feetech import packet, registers
 from armkin.board.feetech.bus import Bus
 from armkin.board.feetech.packet import Splitter
-from armkin.board.sim.servo_bus import Noise, Servo, ServoBus
+from armkin.board.sim.sim_servo_bus import Noise, Servo, ServoBus
 from armkin.errors import LinkError
 from pty_port import PtyPort
 

@@ -10,8 +10,8 @@ import pytest
 import armkin
 from armkin.board.backend import StoppedError
 from armkin.board.feetech import registers
-from armkin.board.feetech.machine import LAG, SETTLED, ServoMachine
-from armkin.board.sim.servo_bus import Noise, Servo, ServoBus
+from armkin.board.feetech.feetech_machine import LAG, SETTLED, ServoMachine
+from armkin.board.sim.sim_servo_bus import Noise, Servo, ServoBus
 from armkin.errors import LinkError, NoSolutionError
 from armkin.model.build import build
 from armkin.robot_file import parse

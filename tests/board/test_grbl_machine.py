@@ -14,10 +14,10 @@ import armkin
 from armkin.board import path_run
 from armkin.board.backend import StoppedError
 from armkin.board.backend.sent_positions import Job
-from armkin.board.grbl.machine import GrblMachine
+from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
-from armkin.board.sim.grbl import Grbl
+from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError, UsageError
 from armkin.model.build import build
 from armkin.robot_file import parse

@@ -9,7 +9,7 @@ import pytest
 from armkin.board.grbl import replies, settings
 from armkin.board.grbl.grbl_session import GrblError, Session
 from armkin.board.grbl.settings import Axis
-from armkin.board.sim.grbl import Grbl
+from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError
 
 QUICK = {110 + k: 6000.0 for k in range(4)} | {120 + k: 1000.0 for k in range(4)}

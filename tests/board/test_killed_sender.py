@@ -16,8 +16,8 @@ from armkin.board.grbl.settings import wanted
 from armkin.board.kinds import board_of
 from armkin.board.klipper import extra_axes as klipper_axes
 from armkin.board.ports import record_path
-from armkin.board.sim.grbl import Grbl
-from armkin.board.sim.klipper import Klipper
+from armkin.board.sim.sim_grbl import Grbl
+from armkin.board.sim.sim_klipper import Klipper
 from command_line import ROOT
 
 GRBL, KLIPPER = (armkin.load(ROOT / f"tests/robots/three_dof_{kind}.yaml") for kind in ("grbl", "klipper"))

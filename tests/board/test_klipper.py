@@ -18,9 +18,9 @@ from armkin.board import path_run
 from armkin.board.backend import StoppedError
 from armkin.board.backend.sent_positions import Job
 from armkin.board.klipper.extra_axes import axes_of, differences, printer_cfg, settings_of
-from armkin.board.klipper.gcode import Lines
-from armkin.board.klipper.machine import KlipperMachine
-from armkin.board.sim.klipper import Klipper
+from armkin.board.klipper.klipper_machine import KlipperMachine
+from armkin.board.klipper.trajectory_to_g1_lines import Lines
+from armkin.board.sim.sim_klipper import Klipper
 from armkin.errors import LinkError, PositionLostError, UsageError
 from armkin.model.build import build
 from armkin.robot_file import parse

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from armkin.board.backend import StoppedError
 from armkin.board.firmware import homing
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.firmware.wire.session import ReplacedError

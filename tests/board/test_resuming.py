@@ -11,7 +11,7 @@ import pytest
 
 import armkin
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.rest_of_plan import onwards, places_on
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
 from armkin.board.firmware.wire.protocol import HALF, STEP
@@ -208,7 +208,7 @@ def _dies(monkeypatch: pytest.MonkeyPatch, now: Callable[[], bool]) -> None:
 def test_a_stop_says_where_the_arm_stands_and_that_it_can_go_on(
     arm: Arm, motions: dict[str, tuple[object, ...]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from armkin.board.stopping import Stop
+    from armkin.board.stop_signals import Stop
 
     assert arm.send(0, 90, -90, "--assume-home")[0] == 0
     monkeypatch.setattr(Stop, "__call__", lambda self: arm.board.motors.counts()[1] < -3000)

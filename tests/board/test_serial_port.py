@@ -125,7 +125,7 @@ def test_a_line_that_never_falls_silent_leaves_time_for_a_stop(monkeypatch: pyte
 HOLDER = """
 import sys, time
 from armkin.board.ports import port_lock
-from armkin.board.stopping import stoppable
+from armkin.board.stop_signals import stoppable
 port_lock._signals = False
 with stoppable() as asked:
     lock = port_lock.Lock(sys.argv[1])

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import armkin
-from armkin.board.backend.starting import StartError
+from armkin.board.backend.motion_start import StartError
 from armkin.errors import NoSolutionError
 from armkin.motion.joint_moves import plan as plan_joints
 from armkin.motion.joint_moves import straight

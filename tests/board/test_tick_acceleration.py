@@ -17,8 +17,8 @@ from armkin.board.firmware.segments.straight_lines import Pieces
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.streaming import later
 from armkin.board.firmware.wire.protocol import BLOCK, HALF, STEP, AxisImage, Image, Segment
-from armkin.board.sim.frames import RefusedError
-from armkin.board.sim.velocity import Velocity, times_valid
+from armkin.board.sim.frame_fields import RefusedError
+from armkin.board.sim.rate_checks import Velocity, times_valid
 from armkin.board_kinds import BOARDS
 from armkin.model import build as arms
 from armkin.motion.timing.profile import Profile, trapezoid

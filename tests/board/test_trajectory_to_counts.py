@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from armkin.board.firmware.segments import counts_to_segments, straight_lines
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import AxisImage, Image, Segment
-from armkin.board.sim.velocity import Velocity, times_valid
+from armkin.board.sim.rate_checks import Velocity, times_valid
 from armkin.board_kinds import BOARDS
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import build as arms

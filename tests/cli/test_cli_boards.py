@@ -15,8 +15,8 @@ from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.kinds import board_of
 from armkin.board.ports import note_path
-from armkin.board.sim.grbl import Grbl
-from armkin.board.sim.servo_bus import Servo, ServoBus
+from armkin.board.sim.sim_grbl import Grbl
+from armkin.board.sim.sim_servo_bus import Servo, ServoBus
 from armkin.robot_file.edit import replaced
 from command_line import ROOT, THREE_DOF, run
 from pty_port import PtyPort

@@ -13,7 +13,7 @@ import pytest
 
 import armkin
 from armkin.board.klipper.extra_axes import axes_of, settings_of
-from armkin.board.sim.klipper import Klipper
+from armkin.board.sim.sim_klipper import Klipper
 from command_line import ROOT, run
 from unix_port import UnixPort
 

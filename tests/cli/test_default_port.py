@@ -6,8 +6,8 @@ import armkin
 from armkin.board import ports
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
-from armkin.board.sim.grbl import Grbl
-from armkin.board.sim.servo_bus import Servo, ServoBus
+from armkin.board.sim.sim_grbl import Grbl
+from armkin.board.sim.sim_servo_bus import Servo, ServoBus
 from command_line import ROOT, THREE_DOF, run
 from pty_board import PtyBoard
 from pty_port import PtyPort

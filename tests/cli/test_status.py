@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board_kinds import BOARDS
 from armkin.cli.commands import status

@@ -8,7 +8,7 @@ import pytest
 
 import armkin
 from armkin.board.kinds import board_of
-from armkin.board.opening import open_board
+from armkin.board.open_board import open_board
 from command_line import ROOT, THREE_DOF, run
 
 GRBL = ROOT / "tests/robots/three_dof_grbl.yaml"

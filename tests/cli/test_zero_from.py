@@ -11,7 +11,7 @@ import pytest
 
 import armkin
 from armkin.board.feetech import registers
-from armkin.board.sim.servo_bus import Servo, ServoBus
+from armkin.board.sim.sim_servo_bus import Servo, ServoBus
 from command_line import run
 from pty_port import PtyPort
 

@@ -12,7 +12,7 @@ from stepped_port import SteppedPort
 import armkin
 from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.wire.protocol import Ack, Error, Info, Status
 
 ARM = armkin.load("three_dof")

@@ -17,7 +17,7 @@ from stepped_port import SteppedPort
 import armkin
 from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.wire import session
 
 ARM = armkin.load("three_dof")

@@ -11,7 +11,7 @@ from pins import net
 from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import Flag
 from armkin.board.ports import SerialPort

@@ -18,7 +18,7 @@ from emulator import EmulatedBoard
 from pins import at_rest, net, on_the_line
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.ports import SerialPort
 from armkin.errors import HeldError

@@ -17,11 +17,11 @@ from armkin.board.grbl.settings import wanted
 from armkin.board.klipper.extra_axes import axes_of as klipper_axes_of
 from armkin.board.klipper.extra_axes import settings_of
 from armkin.board.ports import Port
-from armkin.board.sim.grbl import Grbl
-from armkin.board.sim.klipper import Klipper
-from armkin.board.sim.servo_bus import Servo, ServoBus
 from armkin.board.sim.sim_board import SimBoard
+from armkin.board.sim.sim_grbl import Grbl
+from armkin.board.sim.sim_klipper import Klipper
 from armkin.board.sim.sim_port import SimPort
+from armkin.board.sim.sim_servo_bus import Servo, ServoBus
 from armkin.board_kinds import BOARDS
 from command_line import ROOT
 

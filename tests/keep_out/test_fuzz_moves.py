@@ -24,14 +24,14 @@ sys.path.append(str(Path(__file__).parents[1]))
 import armkin
 from armkin import installed_kinds
 from armkin.board.backend.board import Board
-from armkin.board.backend.starting import Laid
+from armkin.board.backend.motion_start import Laid
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.kinds import board_of
 from armkin.board.kinds.firmware import FirmwareBoard
 from armkin.board.kinds.klipper import KlipperBoard
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
-from armkin.board.stopping import Stop
+from armkin.board.stop_signals import Stop
 from armkin.board_kinds import BOARDS
 from armkin.keep_out.body_pairs import Guard, guard
 from armkin.motion.timing.trajectory import Trajectory

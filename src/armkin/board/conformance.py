@@ -21,7 +21,7 @@ import numpy as np
 
 from armkin.board.backend import Backend, StoppedError
 from armkin.board.backend.board import Board
-from armkin.board.backend.starting import StartError
+from armkin.board.backend.motion_start import StartError
 from armkin.board.ports import Port, note_path, record_path
 from armkin.errors import ArmkinError, LinkError
 from armkin.formula.arrays import Array

@@ -87,8 +87,8 @@ def backend(
     simulated: what to say of a board in this process.
     """
     from armkin.board.backend import StoppedError
-    from armkin.board.opening import open_board
-    from armkin.board.stopping import stoppable
+    from armkin.board.open_board import open_board
+    from armkin.board.stop_signals import stoppable
 
     port = port_name(port, board, baud, reset=reset)
     if port == SIM:

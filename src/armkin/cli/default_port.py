@@ -43,7 +43,7 @@ def port_name(given: str | None, board: Board, baud: int | None, *, reset: bool 
     """
     if given is not None:
         return given
-    from armkin.board.stopping import stoppable
+    from armkin.board.stop_signals import stoppable
 
     with stoppable() as stop:
         found = [name for name in board.likely() if board.answers(name, baud, stop, reset=reset)]

@@ -1,7 +1,7 @@
 """What every kind of board can do for an arm. Our own firmware is one of several.
 
 board.py            what a kind is: one class, with capabilities
-starting.py         where a motion begins: what every trajectory that becomes counts is held to
+motion_start.py     where a motion begins: what every trajectory that becomes counts is held to
 sent_positions.py   a trajectory for a board that is sent positions, not segments
 servo_arm.py        an arm of bus servos of any make
 stepper_arm.py      an arm of steppers on a board that obeys every program

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.motion_start import check_jog, jog_goal
 from armkin.board.backend.sent_positions import planned
-from armkin.board.backend.starting import check_jog, jog_goal
 from armkin.board.ports import BAUD, SIM
 from armkin.errors import LinkError, UsageError
 from armkin.motion.joint_moves import rate_lines, straight

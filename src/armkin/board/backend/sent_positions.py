@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.starting import Laid
+from armkin.board.backend.motion_start import Laid
 from armkin.motion.joint_moves import plan
 from armkin.motion.timing.trajectory import brake
 from armkin.motors import joints, pulses

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend import Backend, Position, Progress, StoppedError
+from armkin.board.backend.motion_start import from_counts
 from armkin.board.backend.sent_positions import Job, braking
-from armkin.board.backend.starting import from_counts
 from armkin.errors import LinkError, NoSolutionError, PositionKnownError, UsageError
 from armkin.model.units import joints_out
 from armkin.motion.timing.trajectory import Straight

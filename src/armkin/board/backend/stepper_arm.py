@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from armkin.board.backend import Backend, Position, Progress, StoppedError
+from armkin.board.backend.motion_start import from_counts
 from armkin.board.backend.sent_positions import Job
-from armkin.board.backend.starting import from_counts
 from armkin.errors import LinkError, PositionKnownError, PositionLostError, UsageError
 from armkin.model.units import joints_out
 from armkin.motors import motor_accel, motor_names, pulses

@@ -19,7 +19,7 @@ from armkin.errors import FileError, LinkError, UsageError
 from armkin.model.units import DEGREE
 
 if TYPE_CHECKING:
-    from armkin.board.feetech.machine import ServoMachine
+    from armkin.board.feetech.feetech_machine import ServoMachine
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 

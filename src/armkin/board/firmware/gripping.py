@@ -9,8 +9,8 @@ from armkin.errors import GripperKnownError, GripperLostError, LinkError, UsageE
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
+    from armkin.board.firmware.firmware_machine import Machine
     from armkin.board.firmware.gripper_counts import Grip
-    from armkin.board.firmware.machine import Machine
     from armkin.board.firmware.segments.counts_to_segments import Move
 
 

@@ -24,7 +24,7 @@ from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.firmware.machine import Machine
+    from armkin.board.firmware.firmware_machine import Machine
     from armkin.board.firmware.wire.protocol import Status
     from armkin.model.arm import Arm
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.backend.starting import check_jog
+from armkin.board.backend.motion_start import check_jog
 from armkin.board.firmware import resets_and_stops
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import State
@@ -18,7 +18,7 @@ from armkin.model import units
 from armkin.motion.plan.proved_free import free_way
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.machine import Machine
+    from armkin.board.firmware.firmware_machine import Machine
 
 HANDLE = 0.25  # [s] that the board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
 _LONGEST = 60.0  # [s] of a jog that is looked at

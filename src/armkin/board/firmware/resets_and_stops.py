@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from armkin.board.backend.starting import unbelievable
+from armkin.board.backend.motion_start import unbelievable
 from armkin.board.firmware.board_status import WHY
 from armkin.board.firmware.wire.protocol import Error
 from armkin.errors import HeldError, LinkError, PositionLostError

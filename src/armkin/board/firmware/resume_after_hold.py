@@ -22,7 +22,7 @@ from armkin.board.ports import note_path, read_note, remove_note, write_note
 from armkin.errors import HeldError, LinkError, NothingHeldError
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.machine import Machine
+    from armkin.board.firmware.firmware_machine import Machine
 
 _SURE = 1.0  # [s] that the noted time may be off: of places that near, the earliest is taken
 _NOTED = 0.5  # [s] between two notes while the arm moves

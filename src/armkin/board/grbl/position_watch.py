@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.grbl.gcode import PIECE
+from armkin.board.grbl.trajectory_to_gcode import PIECE
 from armkin.errors import LinkError
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import places, pulses

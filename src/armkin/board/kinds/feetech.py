@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.board import Board, Gripped
-from armkin.board.feetech import gripping, registers
+from armkin.board.feetech import registers, servo_gripper
 from armkin.board.feetech.bus import Bus
+from armkin.board.feetech.feetech_machine import ServoMachine, job, servo_ids
 from armkin.board.feetech.lerobot import Calibrated, calibrated
-from armkin.board.feetech.machine import ServoMachine, job, servo_ids
 from armkin.board_kinds import ForeignBoard
 from armkin.motors import pulses
 
@@ -45,7 +45,7 @@ class ServoBusBoard(Board):
 
     def simulated(self) -> Port:
         """A bus in this process, with the arm's servos at its home pose and its gripper's."""
-        from armkin.board.sim.servo_bus import Servo, ServoBus
+        from armkin.board.sim.sim_servo_bus import Servo, ServoBus
 
         home = pulses(self.arm, self.arm.home).tolist()
         servos = [Servo(number, at) for number, at in zip(servo_ids(self.arm), home, strict=True)]
@@ -68,7 +68,7 @@ class ServoBusBoard(Board):
     def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
         """Move the gripper, and tell where it comes to rest."""
         target = self.grip_value(value)
-        at = gripping.grip(self.machine.bus, self.gripper(), target, self.stop)
+        at = servo_gripper.grip(self.machine.bus, self.gripper(), target, self.stop)
         return Gripped(at, target, "deg", measured=True)
 
     def relax(self) -> None:
@@ -77,7 +77,7 @@ class ServoBusBoard(Board):
 
     def zero(self, gripper: float | None) -> tuple[list[int], tuple[int, int] | None]:
         """The servos' counts; and the gripper's, and its `zero` if it stands at a value."""
-        jaw = None if gripper is None else gripping.zero(self.machine.bus, self.gripper(), gripper)
+        jaw = None if gripper is None else servo_gripper.zero(self.machine.bus, self.gripper(), gripper)
         return list(self.machine.counts()), jaw
 
     def calibration(self, path: str, pose: Array | None) -> Calibrated:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armkin.board.backend.board import Board, Gripped, LostSteps
 from armkin.board.firmware import gripping, homing, jogging, resume_after_hold
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.machine import Machine
+from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
 from armkin.board.firmware.wire import find_boards
 from armkin.board.firmware.wire.session import Session

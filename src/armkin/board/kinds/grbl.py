@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.board import Board, Gripped
-from armkin.board.grbl.gcode import job
+from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.grbl_session import Session
-from armkin.board.grbl.machine import GrblMachine
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.trajectory_to_gcode import job
 from armkin.board_kinds import ForeignBoard
 from armkin.errors import UsageError
 from armkin.model import units
@@ -45,7 +45,7 @@ class GrblBoard(Board):
 
     def simulated(self) -> Port:
         """GRBL in this process, set up for the arm, which stands at home."""
-        from armkin.board.sim.grbl import Grbl
+        from armkin.board.sim.sim_grbl import Grbl
 
         axes = axes_of(self.arm)
         settings = {number: value for number, (_, value) in wanted(axes).items()}

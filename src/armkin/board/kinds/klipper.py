@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armkin.board.backend.board import Board
 from armkin.board.klipper.api import Api
 from armkin.board.klipper.extra_axes import SOCKETS, axes_of, printer_cfg, settings_of
-from armkin.board.klipper.machine import KlipperMachine, job
+from armkin.board.klipper.klipper_machine import KlipperMachine, job
 from armkin.board.ports import SIM, SocketPort, is_socket
 from armkin.board_kinds import ForeignBoard
 
@@ -44,7 +44,7 @@ class KlipperBoard(Board):
 
     def simulated(self) -> Port:
         """Klipper in this process, with the sections that the arm needs."""
-        from armkin.board.sim.klipper import Klipper
+        from armkin.board.sim.sim_klipper import Klipper
 
         return Klipper(settings_of(axes_of(self.arm)))
 

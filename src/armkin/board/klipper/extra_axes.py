@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 LETTERS = tuple("ABCDHIJKL")  # of the letters that Klipper leaves to extra axes: none that begins a G-code
 SOCKETS = "~/printer_data/comms/klippy.sock", "/tmp/klippy_uds"  # where Klipper's API server mostly is
-RATE = 10.0  # [units/s] of the virtual axis X that carries the time: see gcode.py
+RATE = 10.0  # [units/s] of the virtual axis X that carries the time: see trajectory_to_g1_lines.py
 PIECE = 0.01  # [s] of one line
 MAX_ACCEL = 1000.0  # [units/s2] of X
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from armkin.board.firmware.wire.protocol import Error, GuardImage, Image
 from armkin.board.sim.axis_counts import row_value
-from armkin.board.sim.frames import RefusedError
+from armkin.board.sim.frame_fields import RefusedError
 
 
 class Rows:

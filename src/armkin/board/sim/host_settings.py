@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 
 from armkin.board.firmware.wire.protocol import AxisImage, Error, Image
-from armkin.board.sim.frames import RefusedError, image_valid
+from armkin.board.sim.frame_fields import RefusedError, image_valid
 from armkin.board_kinds import Board
 
 

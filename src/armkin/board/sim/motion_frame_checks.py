@@ -7,10 +7,10 @@ from dataclasses import replace
 from armkin.board.firmware.wire.protocol import STEP, Error, Segment
 from armkin.board.sim.axis_counts import within
 from armkin.board.sim.coupled_limits import Rows
-from armkin.board.sim.frames import Batch, RefusedError
+from armkin.board.sim.frame_fields import Batch, RefusedError
 from armkin.board.sim.host_settings import Setup
-from armkin.board.sim.queue import Queue
-from armkin.board.sim.velocity import Velocity, times_valid
+from armkin.board.sim.rate_checks import Velocity, times_valid
+from armkin.board.sim.segment_queue import Queue
 
 
 class Batches:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Error, Flag, Info, State, Status, Type
-from armkin.board.sim.commands import Commands
+from armkin.board.sim.command_frames import Commands
 from armkin.board.sim.digital_inputs import Inputs
-from armkin.board.sim.frames import RefusedError
+from armkin.board.sim.frame_fields import RefusedError
 from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.sim_motors import Motors
 from armkin.board_kinds import Board

@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator
 from armkin.board.firmware.wire.protocol import HALF, STEP, Error, Segment, State
 from armkin.board.sim.axis_counts import Axes
 from armkin.board.sim.cruise import Cruise
-from armkin.board.sim.homing import Homing, Search
 from armkin.board.sim.host_settings import Setup
-from armkin.board.sim.jogging import Jogging
-from armkin.board.sim.queue import Queue
+from armkin.board.sim.segment_queue import Queue
+from armkin.board.sim.sim_homing import Homing, Search
+from armkin.board.sim.sim_jogging import Jogging
 
 _STANDING = 0.001  # [s] time to a stop at which a hold stands still
 

@@ -3,7 +3,7 @@
 # No annotations as text here: a key that may be absent is known by NotRequired at run time.
 from typing import Annotated, Literal, NotRequired, TypedDict
 
-from armkin.board.summaries import Summary, Where
+from armkin.board.json_summaries import Summary, Where
 from armkin.cli.answers.kinematics import Head, Tooled
 from armkin.model.units import JointUnits
 

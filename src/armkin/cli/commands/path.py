@@ -207,7 +207,7 @@ def _carried_out(
     """Plan from where the arm stands (or where the motion that is resumed began), then move it."""
     from armkin.board import path_run
     from armkin.board.planner import where_arm_stands
-    from armkin.board.stopping import planning
+    from armkin.board.stop_signals import planning
     from armkin.motors import joints as joints_of
 
     arm = board_link.rehearsed(arm, link.port)

@@ -181,7 +181,7 @@ def _move(
 ) -> None:
     """Plan from where the arm stands, or from where the motion that is resumed began; move; tell where it stands."""
     from armkin.board.planner import Stream, where_arm_stands
-    from armkin.board.stopping import planning
+    from armkin.board.stop_signals import planning
 
     arm, board, simulated = planner.arm, planner.board, board_link.simulated(link.assume)
     with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:

@@ -46,7 +46,7 @@ def stop(
         raise UsageError(f"no armkin moves an arm by {port}; M112 stops Klipper at once, and loses the position")
     from armkin.board.firmware.wire import protocol
     from armkin.board.firmware.wire.session import Session
-    from armkin.board.stopping import stoppable
+    from armkin.board.stop_signals import stoppable
 
     with stoppable() as asked:
         link = SerialPort(port, baud, reset=not no_reset)
@@ -65,7 +65,7 @@ def _port(given: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
     from armkin.board.firmware.wire.find_boards import answering, likely
     from armkin.board.ports import holder
-    from armkin.board.stopping import stoppable
+    from armkin.board.stop_signals import stoppable
 
     if given is None:
         held = [name for name in likely() if holder(name) is not None]

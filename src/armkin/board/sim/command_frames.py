@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 from armkin.board.firmware.wire.protocol import Error, State, Type
 from armkin.board.sim.digital_inputs import Inputs
-from armkin.board.sim.frames import RefusedError, axes_of
-from armkin.board.sim.frames import batch as read_batch
-from armkin.board.sim.homing import Search
+from armkin.board.sim.frame_fields import RefusedError, axes_of
+from armkin.board.sim.frame_fields import batch as read_batch
 from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.motion_frame_checks import Batches
+from armkin.board.sim.sim_homing import Search
 from armkin.board.sim.sim_motors import Motors
 
 _RUNNING = (State.IDLE, State.MOVING)

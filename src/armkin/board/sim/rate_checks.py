@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from armkin.board.firmware.wire.protocol import Error, Image, Segment
-from armkin.board.sim.frames import RefusedError
+from armkin.board.sim.frame_fields import RefusedError
 from armkin.board_kinds import Board
 
 _ALL = 0xFFFF

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.motion_start import unbelievable
 from armkin.board.backend.position_record import Record
 from armkin.board.backend.sent_positions import Job, braking
-from armkin.board.backend.starting import unbelievable
 from armkin.board.backend.stepper_arm import StepperArm
-from armkin.board.klipper import gcode
+from armkin.board.klipper import trajectory_to_g1_lines
 from armkin.board.klipper.api import Api
 from armkin.board.klipper.extra_axes import PIECE, Axis, Difference, axes_of, differences
 from armkin.errors import LinkError
@@ -37,7 +37,7 @@ _REST = 30.0  # [s] until what was sent must be done
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
     """A trajectory from counts `start` (motors,) on, for Klipper."""
-    return Job(trajectory, start, gcode.segments(trajectory))
+    return Job(trajectory, start, trajectory_to_g1_lines.segments(trajectory))
 
 
 class KlipperMachine(StepperArm):
@@ -128,9 +128,9 @@ class KlipperMachine(StepperArm):
     def _follow(self, one: Job, tell: Callable[[float], None]) -> bool:
         """Send a job's lines a little ahead of their time; False if a stop was asked for and the arm brakes."""
         ramp = braking(one.trajectory)
-        lines = gcode.Lines(one, self.axes)
+        lines = trajectory_to_g1_lines.Lines(one, self.axes)
         source = iter(lines)
-        self.api.run(gcode.HEAD)
+        self.api.run(trajectory_to_g1_lines.HEAD)
         began, stopping = self.port.now(), False
         while chunk := [line for _, line in zip(range(_CHUNK), source, strict=False)]:
             self.api.send("gcode/script", {"script": "\n".join(chunk)})

@@ -1,4 +1,4 @@
-"""An arm on a GRBL board: its settings, its motions, its homing. Where it stands is told by position.py."""
+"""An arm on a GRBL board: its settings, its motions, its homing. Where it stands is told by believed_position.py."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from armkin.board.backend.sent_positions import Job
 from armkin.board.backend.stepper_arm import StepperArm
-from armkin.board.grbl import gcode, replies, settings
+from armkin.board.grbl import replies, settings, trajectory_to_gcode
+from armkin.board.grbl.believed_position import Place
 from armkin.board.grbl.grbl_session import GrblError, Session
 from armkin.board.grbl.motor_axes import axes_of
-from armkin.board.grbl.position import Place
 from armkin.board.grbl.position_watch import Watch
-from armkin.board.grbl.spindle import Spindle
+from armkin.board.grbl.spindle_gripper import Spindle
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class GrblMachine(StepperArm):
     """An arm on the GRBL board behind an open port."""
 
     put = "home it, or put it in its home pose and say so"
-    piece = gcode.PIECE
+    piece = trajectory_to_gcode.PIECE
     homes = True
     differences = (
         "GRBL has no checksum: a damaged line may move the arm wrongly until a report, some 0.2 s later, tells",
@@ -115,7 +115,7 @@ class GrblMachine(StepperArm):
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""
-        return gcode.job(trajectory, start)
+        return trajectory_to_gcode.job(trajectory, start)
 
     def _carry_out(self, job: Job, tell: Callable[[float], None]) -> bool:
         """Send a job's lines and watch the arm on its way; the position at its end is recorded."""
@@ -127,7 +127,9 @@ class GrblMachine(StepperArm):
             return self._stop()
 
         # the dwell is answered when all before it has been carried out
-        if not self.session.stream(chain(gcode.lines(job, self.axes, self._place.offset), ["G4P0.01"]), tick):
+        if not self.session.stream(
+            chain(trajectory_to_gcode.lines(job, self.axes, self._place.offset), ["G4P0.01"]), tick
+        ):
             return False
         if self.session.status().state in ("Run", "Jog"):
             raise LinkError("the arm moves on after its plan: another program drives it")

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.motion_start import unbelievable
 from armkin.board.backend.position_record import Record
-from armkin.board.backend.starting import unbelievable
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:

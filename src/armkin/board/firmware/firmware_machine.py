@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from armkin.board.backend import Backend, Position, Progress, StoppedError
-from armkin.board.backend.starting import from_counts, unbelievable
+from armkin.board.backend.motion_start import from_counts, unbelievable
 from armkin.board.firmware import resets_and_stops
 from armkin.board.firmware.board_status import as_json
 from armkin.board.firmware.carry_out_plans import carry_out, carry_out_axis
