@@ -21,8 +21,12 @@ from pathlib import Path
 from typing import Any
 
 import armkin
+from armkin.calibration.calibrate import Calibration
 from armkin.cli.app import load, run
 from armkin.cli.commands import COMMANDS
+from armkin.motion.timing.trajectory import Trajectory
+from armkin.motors import Best, Rounding
+from armkin.reachability.workspace_survey import Workspace
 from armkin.robot_file import catalogue, json_schema
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -31,6 +35,7 @@ DOCS = BUILD / "docs"
 FILE = re.compile(r'```\w+ title="([^"]+)"\n(.*?)```', re.S)
 PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 PAGES["firmware/PROTOCOL.md"] = "protocol.md"
+RESULTS = (Best, Calibration, Rounding, Trajectory, Workspace)  # of functions, and not exported
 
 
 def main(arms: Sequence[str]) -> None:
@@ -117,10 +122,10 @@ def robot_file() -> Iterator[str]:
 
 
 def python() -> Iterator[str]:
-    """The public names with their docstrings, and of classes what they define in public."""
+    """The public names and the classes of results with their docstrings, and what classes define in public."""
     yield "# Python\n\nLengths in mm, angles in radians; leading axes are batch axes.\n"
-    for name in sorted(armkin.__all__):
-        what = getattr(armkin, name)
+    public = {name: getattr(armkin, name) for name in armkin.__all__} | {kind.__name__: kind for kind in RESULTS}
+    for name, what in sorted(public.items()):
         if callable(what):
             yield f"## {name}\n"
             yield from documented(f"armkin.{name}", what)

@@ -6,7 +6,7 @@ import dataclasses
 import enum
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from typing import Any
 
@@ -22,15 +22,22 @@ ARRAYS = ("ArrayLike", "Array", "NDArray", "Joints", "Points", "Poses", "Frames"
 
 
 def _public() -> Iterator[tuple[str, Any]]:
-    """Every exported callable, and of classes what they define in public."""
-    for name in armkin.__all__:
-        value = getattr(armkin, name)
+    """Every exported callable, the classes of results, and of classes what they define in public."""
+    exported = {name: getattr(armkin, name) for name in armkin.__all__}
+    for name, value in {**exported, **{kind.__name__: kind for kind in _results(exported.values())}}.items():
         if callable(value):
             yield name, value
         if inspect.isclass(value):
             for inner, member in vars(value).items():
                 if not inner.startswith("_") and (inspect.isfunction(member) or _is_property(member)):
                     yield f"{name}.{inner}", member
+
+
+def _results(functions: Iterable[Any]) -> Iterator[Any]:
+    """The dataclasses that functions return."""
+    for function in filter(inspect.isfunction, functions):
+        named = re.findall(r"\w+", inspect.signature(function).return_annotation)
+        yield from filter(dataclasses.is_dataclass, map(function.__globals__.get, named))
 
 
 def _is_property(member: Any) -> bool:

@@ -37,13 +37,21 @@ _AT_ONCE = 1 << 16  # tips that `best_pulses` computes in one go
 
 @dataclass(frozen=True)
 class Rounding:
-    """Joint values as whole pulses: where the motors go, and where the tip goes with them."""
+    """Joint values as whole pulses: where the motors go, and where the tip goes with them.
 
-    joints: Array  # (..., n) [rad | mm] as asked
-    pulses: Pulses  # (..., motors) [steps from home | us]
-    actual_joints: Array  # (..., n) [rad | mm] where those pulses put the joints
-    theoretical: Array  # (..., 3) [mm] the tip for the exact joints
-    actual: Array  # (..., 3) [mm] the tip for the actual joints
+    Attributes:
+        joints: (..., n) [rad | mm] as asked.
+        pulses: (..., motors) [steps from home | us | counts].
+        actual_joints: (..., n) [rad | mm] where those pulses put the joints.
+        theoretical: (..., 3) [mm] the tip for the exact joints.
+        actual: (..., 3) [mm] the tip for the actual joints.
+    """
+
+    joints: Array
+    pulses: Pulses
+    actual_joints: Array
+    theoretical: Array
+    actual: Array
 
     @property
     def difference(self) -> Array:
@@ -58,11 +66,17 @@ class Rounding:
 
 @dataclass(frozen=True)
 class Best:
-    """The pulses whose tip is nearest to the exact one, beside plain rounding."""
+    """The pulses whose tip is nearest to the exact one, beside plain rounding.
+
+    Attributes:
+        chosen: the pulses with the nearest tip.
+        rounded: every motor rounded by itself.
+        tried: pulse vectors compared for each pose.
+    """
 
     chosen: Rounding
-    rounded: Rounding  # every motor rounded by itself
-    tried: int  # pulse vectors compared for each pose
+    rounded: Rounding
+    tried: int
 
     @property
     def gain(self) -> Array:

@@ -34,18 +34,31 @@ _LEVEL = ("xy", "xy_theta", "xyz_yaw")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """A corrected arm, and what is known of it."""
+    """A corrected arm, and what is known of it.
+
+    Attributes:
+        arm: the corrected arm.
+        data: the corrected robot file's keys and values.
+        level: the corrections that the rows justified: file, base and tool, zeros, ratios, lengths or twists.
+        before: (M,) [mm] the file's error on each row.
+        after: (M,) [mm] the calibrated arm's error on each row, fitted without it.
+        flagged: (F,) rows that do not fit the others, from 0.
+        noise: [mm] of a measured coordinate.
+        corrections: name, value, deviation (nan: few rows), unit (mm, rad, 1) of each.
+        unseen: corrections that the rows do not show; they stay with the file.
+        held: kinds that were not corrected, and why.
+    """
 
     arm: Arm
-    data: dict[str, Any]  # the robot file's keys and values
-    level: str  # the corrections that the rows justified: file, base and tool, zeros, ratios, lengths or twists
-    before: Array  # (M,) [mm] the file's error on each row
-    after: Array  # (M,) [mm] the calibrated arm's error on each row, fitted without it
-    flagged: NDArray[np.intp]  # rows that do not fit the others, from 0
-    noise: float  # [mm] of a measured coordinate
-    corrections: list[tuple[str, float, float, str]]  # name, value, deviation (nan: few rows), unit (mm, rad, 1)
-    unseen: list[str]  # corrections that the rows do not show; they stay with the file
-    held: list[str]  # kinds that were not corrected
+    data: dict[str, Any]
+    level: str
+    before: Array
+    after: Array
+    flagged: NDArray[np.intp]
+    noise: float
+    corrections: list[tuple[str, float, float, str]]
+    unseen: list[str]
+    held: list[str]
 
     @property
     def text(self) -> str:
@@ -61,7 +74,14 @@ class Calibration:
         return list(dict.fromkeys(p.kind for p in model(self.arm).parameters if p.name in names))
 
     def rms(self, which: str) -> float:
-        """Root mean square [mm] of `before` or `after`, flagged rows apart."""
+        """Root mean square of the rows' errors, flagged rows apart.
+
+        Args:
+            which: "before" or "after".
+
+        Returns:
+            The error [mm].
+        """
         errors = np.delete(self.before if which == "before" else self.after, self.flagged)
         return float(np.sqrt(np.mean(errors**2)))
 

@@ -28,20 +28,35 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Workspace:
-    """What the samples and the volume say; lengths in mm."""
+    """What the samples and the volume say; lengths in mm.
+
+    Attributes:
+        arm: the arm that was surveyed.
+        samples: how many poses there were.
+        low: (3,) [mm] smallest x, y, z of the tip among the samples.
+        high: (3,) [mm] greatest.
+        reach: [mm] distance of the tip from the base's origin, least and greatest.
+        extent: volume [mm3] or area [mm2] and its error; None if it was not asked for.
+        measures: name -> least and greatest among the samples.
+        seconds: [s] that it took.
+        joints: (K, n) [rad | mm] a random choice of the samples, for pictures.
+        tips: (K, 3) [mm] of these.
+        values: name -> (K,) their measures.
+        free: samples that hit nothing; None: the arm has no keep-outs.
+    """
 
     arm: Arm
     samples: int
-    low: Array  # (3,) smallest x, y, z of the tip among the samples
-    high: Array  # (3,)
-    reach: tuple[float, float]  # distance of the tip from the base's origin, least and greatest
-    extent: Extent | None  # volume or area; None if it was not asked for
-    measures: dict[str, tuple[float, float]]  # least and greatest among the samples
+    low: Array
+    high: Array
+    reach: tuple[float, float]
+    extent: Extent | None
+    measures: dict[str, tuple[float, float]]
     seconds: float
-    joints: Array  # (K, n) [rad | mm] a random choice of the samples, for pictures
-    tips: Array  # (K, 3)
-    values: dict[str, Array]  # (K,) their measures
-    free: int | None = None  # samples that hit nothing; None: the arm has no keep-outs
+    joints: Array
+    tips: Array
+    values: dict[str, Array]
+    free: int | None = None
 
 
 def workspace(

@@ -90,10 +90,16 @@ class Trace:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Stretches one after another; the arm is at rest between them."""
+    """Stretches one after another; the arm is at rest between them.
+
+    Attributes:
+        arm: the arm that moves.
+        start: (n,) [rad | mm] joint values at the beginning.
+        stretches: the motions between two rests, in order.
+    """
 
     arm: Arm
-    start: Array  # (n,) [rad | mm]
+    start: Array
     stretches: tuple[Stretch, ...]
 
     def __post_init__(self) -> None:
@@ -105,12 +111,12 @@ class Trajectory:
 
     @property
     def end(self) -> Array:
-        """Joint values at the end: (n,)."""
+        """(n,) [rad | mm] joint values at the end."""
         return self.stretches[-1].end if self.stretches else self.start
 
     @cached_property
     def begins(self) -> Array:
-        """When every stretch begins, and the end: (stretches + 1,) [s]."""
+        """(stretches + 1,) [s] when every stretch begins, and the end."""
         return np.concatenate([[0.0], np.cumsum([stretch.duration for stretch in self.stretches])])
 
     @property
@@ -120,11 +126,17 @@ class Trajectory:
 
     @property
     def top_speed(self) -> Array:
-        """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
+        """(n,) [rad/s | mm/s] greatest speed of every joint."""
         return np.max([s.top_speed for s in self.stretches], axis=0) if self.stretches else np.zeros(self.arm.n)
 
     def q(self, t: ArrayLike) -> Array:
-        """Joint values at times t [s], those at the ends outside: (...,) -> (..., n) [rad | mm].
+        """Joint values at times; before and behind the motion those at its ends.
+
+        Args:
+            t: (...) [s] times since the motion began.
+
+        Returns:
+            (..., n) [rad | mm].
 
         >>> import armkin, numpy as np
         >>> from armkin.motion.joint_moves import plan
@@ -136,15 +148,37 @@ class Trajectory:
         return self._at(t, 0)
 
     def qd(self, t: ArrayLike) -> Array:
-        """Joint speeds at times t [s]: (...,) -> (..., n) [rad/s | mm/s]."""
+        """Joint speeds at times.
+
+        Args:
+            t: (...) [s] times since the motion began.
+
+        Returns:
+            (..., n) [rad/s | mm/s].
+        """
         return self._at(t, 1)
 
     def qdd(self, t: ArrayLike) -> Array:
-        """Joint accelerations at times t [s]: (...,) -> (..., n) [rad/s2 | mm/s2]."""
+        """Joint accelerations at times.
+
+        Args:
+            t: (...) [s] times since the motion began.
+
+        Returns:
+            (..., n) [rad/s2 | mm/s2].
+        """
         return self._at(t, 2)
 
     def trace(self, step: float = 0.01) -> Trace:
-        """The path in time, sampled every `step` seconds, with the end of every stretch."""
+        """The path in time, evenly sampled, with the end of every stretch.
+
+        Args:
+            step: [s] between samples.
+
+        Returns:
+            A `Trace`: `time` (T,) [s], `joints` (T, n) [rad | mm], `position` (T, n + 2, 3) [mm] of base, joints and
+            tool.
+        """
         times, joints = [np.zeros(1)], [self.start[None]]
         for stretch, began in zip(self.stretches, self.begins, strict=False):
             t = np.append(np.arange(step, stretch.duration - step / 4, step), stretch.duration)
