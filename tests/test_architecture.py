@@ -281,7 +281,7 @@ def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     from armkin.board import kinds
     from armkin.model.build import build
     from armkin.robot_file import parse
-    from armkin.robot_file.schema import json_schema
+    from armkin.robot_file.robot_schema import json_schema
 
     text = (SOURCE / "armkin/board/kinds/grbl.py").read_text()
     (tmp_path / "gcode_box.py").write_text(text.replace('ForeignBoard("grbl"', 'ForeignBoard("gcode_box"'))

@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
+from armkin.formula.array_shapes import Figures, Frames, Jacobians, Joints, Points, Poses
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
-from armkin.formula.shapes import Figures, Frames, Jacobians, Joints, Points, Poses
 from armkin.formula.trace import SMALL, LazyCode
 
 if TYPE_CHECKING:

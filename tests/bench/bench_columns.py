@@ -24,7 +24,7 @@ import numpy as np
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.targets import targets_out
+from armkin.model.target_numbers import targets_out
 
 LABELS = ("x", "y", "z", "roll", "pitch", "yaw")
 BARS = {"csv": 6.0, "npz": 3.0, "parquet": 3.0, "all branches": 20.0}  # [us] a row

@@ -353,8 +353,8 @@ def _path() -> None:
 
 def _curve(arm: Arm, corners: Array) -> Trajectory:
     """One curve of 10,000 cells through postures: smooth between them."""
-    from armkin.motion.timing.cubics import Knots
-    from armkin.motion.timing.curve import Curve
+    from armkin.motion.timing.cubic_knots import Knots
+    from armkin.motion.timing.curved_stretch import Curve
 
     u = np.linspace(0.0, len(corners) - 1.0, 10_001)
     i = np.minimum(u.astype(int), len(corners) - 2)

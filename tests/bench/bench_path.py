@@ -30,8 +30,8 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.motion.branches.branch_chains import Chain, chains, fewest
 from armkin.motion.branches.linked_branches import linked
 from armkin.motion.plan.path_plan import PathPlan
-from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.profile import seven_phases
 from armkin.motion.timing.time_optimal import Bounds, finer, optimal
 from armkin.motion.tool_path.path_pieces import spot

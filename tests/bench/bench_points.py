@@ -28,7 +28,7 @@ from lines import random_line
 
 import armkin
 from armkin.forward import condition
-from armkin.motion.tool_path.placing import placing
+from armkin.motion.tool_path.drawing_frame import placing
 from armkin.path_file import gcode
 from armkin.path_file.drawing import DrawingOptions
 from armkin.robot_file import catalogue

@@ -16,7 +16,7 @@ from armkin.board.kinds import board_of
 from armkin.board.path_run import follow, parts
 from armkin.board.sim.segment_queue import intervals
 from armkin.formula.arrays import Array
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.curved_stretch import Curve
 
 
 def some_path(seed: int) -> dict[str, object]:

@@ -12,7 +12,7 @@ import pytest
 import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import Machine
-from armkin.board.firmware.segments.rest_of_plan import onwards, places_on
+from armkin.board.firmware.segments.remaining_plan import onwards, places_on
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
 from armkin.board.firmware.wire.protocol import HALF, STEP
 from armkin.board.ports import note_path
@@ -258,7 +258,7 @@ def test_a_way_of_less_than_a_step_is_taken() -> None:
 
 @pytest.mark.parametrize("begin", [0.3, 0.5, 0.8, 0.95])
 def test_what_is_left_of_a_curve_keeps_to_the_joints_limits(begin: float) -> None:
-    from armkin.motion.rest_of_stretch import remainder
+    from armkin.motion.remaining_stretch import remainder
 
     one = armkin.load(ROOT / THREE_DOF)
     corners = np.array([[390, 80, 300], [390, 160, 300], [340, 160, 280], [340, 20, 300]])

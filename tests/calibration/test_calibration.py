@@ -14,7 +14,7 @@ from workshop import built, commands, measured, rms
 import armkin
 from armkin import robot_file
 from armkin.calibration import dropped_rows, robust_fit
-from armkin.calibration.calibrate import next_poses
+from armkin.calibration.calibrate_arm import next_poses
 from armkin.calibration.corrected_chain import KINDS, model
 from armkin.errors import UsageError
 from armkin.model.build import build

@@ -17,7 +17,7 @@ import armkin
 from armkin import robot_file
 from armkin.export import conventions
 from armkin.model.build import build
-from armkin.robot_file.writing import text
+from armkin.robot_file.robot_file_text import text
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from armkin.board.kinds import board_of
 from armkin.board.ports import note_path
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.board.sim.sim_servo_bus import Servo, ServoBus
-from armkin.robot_file.edit import replaced
+from armkin.robot_file.replace_values import replaced
 from command_line import ROOT, THREE_DOF, run
 from pty_port import PtyPort
 

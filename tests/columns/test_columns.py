@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armkin.cli import batch, csv_rows
-from armkin.cli.csv_rows import Columns
+from armkin.cli import batch_answers, csv_to_numbers
+from armkin.cli.csv_to_numbers import Columns
 from armkin.columns import csv_and_json_lines, finished_chunks, ik_columns
 from armkin.columns.csv_cells import csv_line
 from armkin.columns.table import Table, Words, part
@@ -92,7 +92,7 @@ def test_a_number_is_read_as_python_reads_it(row: list[float], form: str) -> Non
 @pytest.fixture
 def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A batch of ten pieces for three_dof; some rows have no branch within limits."""
-    monkeypatch.setattr(csv_rows, "ROWS", 30)
+    monkeypatch.setattr(csv_to_numbers, "ROWS", 30)
     values = np.random.default_rng(2).uniform(-420, 420, (290, 3)).round(3)
     path = tmp_path / "in.csv"
     path.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in values.tolist()) + "\n")
@@ -162,7 +162,7 @@ def test_processes_without_rows_leave_nothing(tmp_path: Path) -> None:
 def stop_after(pieces: int, monkeypatch: pytest.MonkeyPatch, error: BaseException) -> list[int]:
     """Let a run end when so many pieces are kept; returns the numbers of the pieces that are answered."""
     answered: list[int] = []
-    work = batch.work
+    work = batch_answers.work
 
     def counted(job: Any, piece: Any) -> Any:
         if len(answered) == pieces:
@@ -170,7 +170,7 @@ def stop_after(pieces: int, monkeypatch: pytest.MonkeyPatch, error: BaseExceptio
         answered.append(piece.number)
         return work(job, piece)
 
-    monkeypatch.setattr(batch, "work", counted)
+    monkeypatch.setattr(batch_answers, "work", counted)
     return answered
 
 

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.cli import csv_rows
-from armkin.engines import cluster
+from armkin.cli import csv_to_numbers
+from armkin.engines import dask_cluster
 from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ClusterError
 from command_line import ROOT, THREE_DOF, run
@@ -85,7 +85,7 @@ def test_a_killed_command_leaves_no_process(tmp_path: Path) -> None:
 
 
 def test_a_batch_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(csv_rows, "ROWS", 30)
+    monkeypatch.setattr(csv_to_numbers, "ROWS", 30)
     values = np.random.default_rng(2).uniform(-420, 420, (290, 3)).round(3)
     rows, one, two = tmp_path / "in.csv", tmp_path / "one.csv", tmp_path / "two.csv"
     rows.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in values.tolist()) + "\n")
@@ -160,7 +160,7 @@ def test_no_scheduler_and_another_version_are_told(address: str, monkeypatch: py
     with pytest.raises(ClusterError, match="has armkin "):
         list(in_order(Engine(cluster=address), square, "", range(3)))
     monkeypatch.undo()
-    monkeypatch.setattr(cluster, "SECONDS", 0.5)
+    monkeypatch.setattr(dask_cluster, "SECONDS", 0.5)
     with pytest.raises(ClusterError, match="no scheduler answers"):
         list(in_order(Engine(cluster="tcp://127.0.0.1:9"), square, "", range(3)))
 

@@ -15,12 +15,12 @@ import armkin
 from armkin import robot_file
 from armkin.errors import UsageError
 from armkin.export import conventions
-from armkin.export.urdf import urdf as write_urdf
+from armkin.export.urdf_writer import urdf as write_urdf
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.arm import actual, from_links
 from armkin.model.build import build
-from armkin.robot_file import urdf
-from armkin.robot_file.writing import text
+from armkin.robot_file import urdf_reader
+from armkin.robot_file.robot_file_text import text
 from command_line import ROOT, run
 
 FILES = sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests/robots").glob("*.yaml"))
@@ -74,7 +74,7 @@ def test_a_table_is_the_same_arm(path: Path) -> None:
 def test_out_to_urdf_and_back_is_the_same_arm(path: Path) -> None:
     arm = armkin.load(path)
     turned = actual(arm)
-    other = again(urdf.parse(write_urdf(arm).encode()).data)
+    other = again(urdf_reader.parse(write_urdf(arm).encode()).data)
     q = values(arm)
     off = np.abs(armkin.fk(other, q) - armkin.fk(turned, q))
     assert off[:, :3, 3].max() < 1e-9

@@ -21,7 +21,7 @@ from armkin.board.firmware.segments.trajectory_to_counts import cut
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import HALF, STEP, Segment, State
 from armkin.formula.arrays import Array
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.trajectory import Trajectory
 
 CIRCLE: dict[str, Any] = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]}

@@ -13,7 +13,7 @@ from armkin.errors import UsageError
 from armkin.inverse.answers.rounding import of_targets, printed
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LABELS
-from armkin.model.targets import targets_out
+from armkin.model.target_numbers import targets_out
 from command_line import run
 
 DIGITS = ("6f", "8f", "12f", "7g", "float32")  # decimals, significant digits

@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array
 from armkin.keep_out.shapes.box import Box
 from armkin.keep_out.shapes.capsule import Capsule
 from armkin.keep_out.shapes.floor import Floor
-from armkin.keep_out.shapes.segments import between
+from armkin.keep_out.shapes.segment_distances import between
 from armkin.model.rotation import transform
 
 MANY = 4000

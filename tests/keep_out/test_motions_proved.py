@@ -13,7 +13,7 @@ import armkin
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.keep_out.body_pairs import guard
-from armkin.keep_out.levers import levers
+from armkin.keep_out.displacement_bounds import levers
 from armkin.keep_out.motion_geometry import Cubics
 from armkin.keep_out.motion_proof import hit_samples
 from armkin.model.arm import Arm

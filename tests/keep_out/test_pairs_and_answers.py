@@ -192,7 +192,7 @@ def test_the_refusal_has_fields() -> None:
 
 
 def test_the_shipped_schema_is_the_models() -> None:
-    from armkin.robot_file.schema import scene_schema
+    from armkin.robot_file.robot_schema import scene_schema
 
     assert json.loads(Path("robots/scene.schema.json").read_text()) == scene_schema()
     assert run("schema", "--scene").json == scene_schema()

@@ -13,8 +13,8 @@ import armkin
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
 from armkin.motion.branches import branch_path
-from armkin.motion.plan import playback
-from armkin.motion.timing.curve import Curve
+from armkin.motion.plan import playback_times
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.tool_path import fit_points
 from armkin.motion.tool_path.b_spline import banded
 from armkin.plot import path_picture as picture
@@ -296,9 +296,9 @@ def test_an_empty_cell_of_blend_or_speed_leaves_it_to_what_is_said_of_all(three_
 def test_a_way_shown_with_too_few_samples_is_shown_best_where_it_bends_most(three_dof: Arm) -> None:
     plan = armkin.path(three_dof, np.concatenate([[CENTRE - [0, 240, 0]], circle(60, 20.0)]), corners="tolerance")
     begins = plan.motion.begins.tolist()
-    whole, off = playback.times(three_dof, plan, begins, 0.02, 10_000)
+    whole, off = playback_times.times(three_dof, plan, begins, 0.02, 10_000)
     assert off <= 0.02
-    few, worse = playback.times(three_dof, plan, begins, 0.02, len(whole) // 2)
+    few, worse = playback_times.times(three_dof, plan, begins, 0.02, len(whole) // 2)
     assert len(few) == len(whole) // 2
     assert worse <= 6 * off  # halves are off by a quarter as much
 

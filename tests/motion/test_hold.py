@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motors import motor_accel
 
 CIRCLE = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]}

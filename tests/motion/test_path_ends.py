@@ -11,7 +11,7 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError
 from armkin.model.arm import Arm
-from armkin.motion.branches import boundary
+from armkin.motion.branches import boundary_chains
 from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Samples
 
@@ -68,7 +68,7 @@ def test_a_singular_home_is_left_or_the_wrist_turns_first(name: str) -> None:
 
 def test_many_boundaries_in_a_row_do_not_multiply_the_chains(monkeypatch: pytest.MonkeyPatch) -> None:
     """A myCobot 280 straight down from home: eight boundaries within 3 micrometres took all memory there is."""
-    joined = boundary._joined
+    joined = boundary_chains._joined
     count = 0
 
     def counted(a: Chain, b: Chain) -> Chain:
@@ -77,7 +77,7 @@ def test_many_boundaries_in_a_row_do_not_multiply_the_chains(monkeypatch: pytest
         assert count <= 100
         return joined(a, b)
 
-    monkeypatch.setattr(boundary, "_joined", counted)
+    monkeypatch.setattr(boundary_chains, "_joined", counted)
     arm = moving("mycobot_280")
     plan = armkin.path(arm, {"start": "home", "moves": [{"offset": {"xyz": [0, 0, -20]}}]})
     down = armkin.fk(arm, arm.home)[:3, 3] - np.array([0, 0, 20])

@@ -12,8 +12,8 @@ import pytest
 import armkin
 from armkin.errors import PathFileError, UsageError
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.model.targets import targets_in
-from armkin.motion.tool_path.placing import placing
+from armkin.model.target_numbers import targets_in
+from armkin.motion.tool_path.drawing_frame import placing
 from armkin.path_file import gcode, gcode_arcs
 from armkin.path_file.drawing import DrawingOptions, Placing
 from command_line import run

@@ -13,7 +13,7 @@ from served import Page, served
 import armkin
 from armkin import path_file
 from armkin.errors import ArmkinError
-from armkin.teach.playing import played
+from armkin.teach.plan_samples import played
 from armkin.teach.recorded_program import Program
 from command_line import ROOT, run
 

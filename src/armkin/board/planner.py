@@ -16,7 +16,7 @@ from armkin.forward import fk
 from armkin.model import units
 from armkin.motion.path_planner import HOLD
 from armkin.motion.rounded_waypoints import rounded
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motors import joints, motor_names, pulse_units, pulses
 
 if TYPE_CHECKING:

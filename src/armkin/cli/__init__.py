@@ -1,9 +1,9 @@
 """The command line: one file a command; each parses, calls, renders and exits.
 
-app.py               the group of commands, and what runs a command line; exit_codes.py: errors -> exit codes
-advice.py            the next step after an error
-commands/            one file a command, and the table of them
-answers/             the JSON of every command, as types
+app.py     the group of commands, and what runs a command line; exit_codes.py: errors -> exit codes
+advice.py  the next step after an error
+commands/  one file a command, and the table of them
+answers/   the JSON of every command, as types
 
 What the words come to:
 
@@ -12,7 +12,8 @@ options.py           options that several commands share; completion.py: what Ta
 number_parsing.py    numbers as people write them; unit_notes.py: those that look like metres or radians
 arguments.py         the arm, a pose, a target; lock_and_sweep.py: joints held or swept
 drawing_path.py      drawings as paths: G-code and SVG
-row_chunks.py        many of them in chunks; csv_rows.py: from CSV; batch_pieces.py: shared out; batch.py: their answers
+row_chunks.py        many of them in chunks; csv_to_numbers.py: from CSV
+batch_pieces.py      such chunks shared out; batch_answers.py: their answers
 piped_answers.py     answers on standard input; send_goals.py: all that `send` can be told
 default_port.py      the port; board_link.py: an open machine, signals; link_trace.py: what is said on it
 lerobot_zero.py      `zero --from`
@@ -22,9 +23,9 @@ keep_outs.py         radii that are assumed, the scene of a port, hits that are 
 
 What is printed:
 
-output.py            where it goes
-progress_bar.py      how far a long command has come, with rate and time left
-render.py            JSON and aligned columns; ik_answer.py: ik's JSON; ik_text.py, info_text.py, path_text.py: as text
+output.py        where it goes
+progress_bar.py  how far a long command has come, with rate and time left
+render.py        JSON and aligned columns; ik_answer.py: ik's JSON; ik_text.py, info_text.py, path_text.py: as text
 
 A command is a function of the same name in a module of the same name, written for Typer:
 `armkin.cli.commands.fk.fk`. A module is imported when its command runs, and imports nothing but typer and its

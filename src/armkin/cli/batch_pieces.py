@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armkin import files
-from armkin.cli import csv_rows
-from armkin.cli.csv_rows import Columns
+from armkin.cli import csv_to_numbers
+from armkin.cli.csv_to_numbers import Columns
 from armkin.cli.number_parsing import LARGEST
 from armkin.cli.row_chunks import Chunk
 from armkin.errors import ArmkinError, UsageError
@@ -67,7 +67,7 @@ class Rows:
         text = not self.source.lower().endswith((".npz", ".parquet"))
         if not text or not os.path.isfile(self.source):
             return None
-        with csv_rows.opened(self.source) as file:
+        with csv_to_numbers.opened(self.source) as file:
             return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
 
     def __iter__(self) -> Iterator[Piece]:
@@ -82,28 +82,28 @@ class Rows:
         read = reader_of(self.source)
         if read is None:
             return self._of_text(self.source)
-        return self._of_values(read(self.source, self.names, csv_rows.ROWS))
+        return self._of_values(read(self.source, self.names, csv_to_numbers.ROWS))
 
     def empty(self, skipped: int) -> ArmkinError:
         """The error of an input without rows."""
         why = "has no row with values" if skipped else "is empty"
-        name = csv_rows.name_of(self.source or "-")
+        name = csv_to_numbers.name_of(self.source or "-")
         return UsageError(f"{name} {why}; it needs one row of {','.join(self.names)} per pose")
 
     def _of_values(self, chunks: Any) -> Iterator[Piece]:
         first = 1
         for number, values in enumerate(chunks):
-            yield Piece(number, first, csv_rows.name_of(self.source or "-"), self.names, values=values)
+            yield Piece(number, first, csv_to_numbers.name_of(self.source or "-"), self.names, values=values)
             first += len(values)
 
     def _of_text(self, source: str) -> Iterator[Piece]:
         learner = Columns(self.names, self.what, self.named)  # learns the heading, for the pieces after it
         number, first = 0, 1
-        with csv_rows.opened(source) as file:
-            for block in csv_rows.blocks(file, source):
+        with csv_to_numbers.opened(source) as file:
+            for block in csv_to_numbers.blocks(file, source):
                 columns = copy.copy(learner)
                 columns.skipped = 0
-                yield Piece(number, first, csv_rows.name_of(source), self.names, block, columns)
+                yield Piece(number, first, csv_to_numbers.name_of(source), self.names, block, columns)
                 for i, line in enumerate([] if learner.begun else block.split(b"\n"), first):
                     if learner.begun:
                         break
@@ -111,7 +111,7 @@ class Rows:
                         learner.row(line, i)
                     except UsageError:
                         break
-                number, first = number + 1, first + csv_rows.count(block)
+                number, first = number + 1, first + csv_to_numbers.count(block)
 
 
 def parsed(piece: Piece) -> Iterator[Chunk]:
@@ -120,7 +120,7 @@ def parsed(piece: Piece) -> Iterator[Chunk]:
         yield from _checked(piece, piece.values)
         return
     assert piece.columns is not None
-    yield from csv_rows.chunk_of(piece.lines, piece.first, piece.columns, piece.source)
+    yield from csv_to_numbers.chunk_of(piece.lines, piece.first, piece.columns, piece.source)
 
 
 def _checked(piece: Piece, values: Array) -> Iterator[Chunk]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from armkin.cli import render
 from armkin.cli.render import fixed
-from armkin.model.targets import label_units
+from armkin.model.target_numbers import label_units
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Branch, Ik

@@ -32,7 +32,7 @@ def record(
     from armkin.files import keep
     from armkin.robot_file import parse
     from armkin.robot_file.catalogue import locate
-    from armkin.robot_file.edit import replaced
+    from armkin.robot_file.replace_values import replaced
 
     arm = board.arm
     q = None if pose is None else units.joints_in(arm, arguments.joint_list(arm, pose, "--pose"))

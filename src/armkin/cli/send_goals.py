@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from armkin.cli import arguments, lock_and_sweep, piped_answers
-from armkin.cli.csv_rows import streamed_rows
+from armkin.cli.csv_to_numbers import streamed_rows
 from armkin.cli.number_parsing import decimals
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
-from armkin.model.targets import label_units, targets_in
+from armkin.model.target_numbers import label_units, targets_in
 
 if TYPE_CHECKING:
     from armkin.board.planner import Stream

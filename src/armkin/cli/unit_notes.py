@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from armkin.cli import output
-from armkin.model.targets import label_units
+from armkin.model.target_numbers import label_units
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

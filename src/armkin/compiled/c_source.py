@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from armkin.export.c import c_program, elimination, formulas, keep_outs, kernel
+from armkin.export.c import arm_formulas, c_elimination, c_functions, c_program, keep_out_tables
 from armkin.export.c.source_parts import part
 from armkin.formula.c_and_js_code import number
 from armkin.inverse.numeric.tolerances import (
@@ -76,23 +76,23 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         "lanes": str(LANES),
     }
     parts = [_part("head"), c_program.settings(), _fast_numbers()]
-    parts += [kernel.forward_kinematics(commanded), _of_joints("Poses", "arm_pose", 16)]
-    parts += [kernel.position(commanded), _of_joints("Positions of the tool", "arm_point", 3)]
+    parts += [c_functions.forward_kinematics(commanded), _of_joints("Poses", "arm_pose", 16)]
+    parts += [c_functions.position(commanded), _of_joints("Positions of the tool", "arm_point", 3)]
     if commanded.keep_out and commanded.whole is None:
-        parts += [keep_outs.clearances(commanded), _part("clearances")]
+        parts += [keep_out_tables.clearances(commanded), _part("clearances")]
         parts += [_of_joints("Least clearances and their pairs", "arm_clearance", 2)]
     if branches:
         assert task is not None
         accepted = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
-            accepted, level, fields["lanes"] = elimination.ACCEPTED, 2, str(BLOCK)  # its own criteria have been met
+            accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(BLOCK)  # its own criteria have been met
         fields |= _of_task(arm, task, branches, accepted)
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
         folds = _part("no_folds")
         if geometry is not None and _judges(arm, task, geometry) and branches <= LANES:
-            parts.append(kernel.jacobian(arm))
+            parts.append(c_functions.jacobian(arm))
             folds = c_program.filled(
                 _part("folds").replace("@followed@", _part("followed") + "\n"), _of_folds(arm, task) | fields
             )
@@ -116,7 +116,7 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
     return {
         "branches": str(branches),
         "target": str(c_program.target_size(task)),
-        "goal": str(formulas.goal_size(task)),
+        "goal": str(arm_formulas.goal_size(task)),
         "accepted": number(accepted),
         "room": number(ROOM * arm.reach),
         "coarse": number(COARSE * arm.reach),

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.compiled import c_source, elimination_rows, toolchain
+from armkin.compiled.batch_results import Results
 from armkin.compiled.joint_functions import WORTH, JointFunctions
 from armkin.compiled.one_target import Single
-from armkin.compiled.results import Results
 from armkin.errors import UsageError
 from armkin.export.c import c_program
 from armkin.formula import arrays

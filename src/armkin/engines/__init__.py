@@ -4,6 +4,6 @@ The work is a pure function of (job, chunk), so that every engine gives the same
 any size only a window of chunks is outstanding: nothing grows with the work.
 
 ordered_chunks.py  `in_order`: chunks in, results out
-pool.py            processes on this machine
-cluster.py         Dask distributed
+process_pool.py    processes on this machine
+dask_cluster.py    Dask distributed
 """

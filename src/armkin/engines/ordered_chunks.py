@@ -38,11 +38,11 @@ def in_order(
     if engine.cluster is not None and engine.workers != 1:
         raise UsageError("workers and a cluster: the cluster has workers of its own; leave one of the two away")
     if engine.cluster is not None:
-        from armkin.engines import cluster
+        from armkin.engines import dask_cluster
 
-        return cluster.in_order(engine.cluster, work, job, chunks)
+        return dask_cluster.in_order(engine.cluster, work, job, chunks)
     if engine.workers > 1:
-        from armkin.engines import pool
+        from armkin.engines import process_pool
 
-        return pool.in_order(engine.workers, work, job, chunks)
+        return process_pool.in_order(engine.workers, work, job, chunks)
     return (work(job, chunk) for chunk in chunks)

@@ -1,7 +1,7 @@
 """An arm in other words.
 
 conventions.py  robot files in another convention: screws, DH standard or modified
-urdf.py         URDF, with limits, speeds and visuals
+urdf_writer.py  URDF, with limits, speeds and visuals
 arm_json.py     plain numbers for JSON
 c/              C99 that needs nothing but libm
 js/             an ES module without imports

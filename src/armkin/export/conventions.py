@@ -15,7 +15,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.model.rotation import FLIP, inverse
-from armkin.robot_file.writing import pose, tidy
+from armkin.robot_file.robot_file_text import pose, tidy
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -260,7 +260,7 @@ def differences(arm: Arm, data: dict[str, Any]) -> list[str]:
 def _built(data: dict[str, Any]) -> Arm:
     from armkin import robot_file
     from armkin.model.build import build
-    from armkin.robot_file.writing import text
+    from armkin.robot_file.robot_file_text import text
 
     return build(robot_file.parse(text(data), str(data["name"])))
 

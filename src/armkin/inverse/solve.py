@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula import arrays
+from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of, stacked
 from armkin.forward import position
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, empty, pack, replaced

@@ -12,7 +12,7 @@ from armkin.errors import RobotFileError
 from armkin.formula.arrays import Array
 from armkin.keep_out.bodies import Bodies, bodies, ends
 from armkin.keep_out.shapes import Shape, shape_of
-from armkin.keep_out.shapes.segments import between
+from armkin.keep_out.shapes.segment_distances import between
 from armkin.robot_file.keep_out_keys import SELF, names, problems
 
 if TYPE_CHECKING:

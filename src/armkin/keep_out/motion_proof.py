@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.keep_out.levers import levers
+from armkin.keep_out.displacement_bounds import levers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

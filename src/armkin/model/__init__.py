@@ -6,5 +6,5 @@ chain.py     chains reversed, flipped, shortened
 rotation.py  matrices, roll pitch yaw, quaternions, rigid transforms
 limits.py    joint limits
 lock.py      arms with joints held at fixed values
-units.py     degrees and radians at the edge where people read and write them; targets.py: a target's numbers
+units.py     degrees and radians at the edge where people read and write them; target_numbers.py: a target's numbers
 """

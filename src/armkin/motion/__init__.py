@@ -2,21 +2,21 @@
 
 A path goes down this list, from the curve of the tool to the answer:
 
-timing/               the law of time: how fast along a way, within the limits of joints and motors
-tool_path/            the tool's way: lines, arcs, splines, blends, dense points, one after another
-plan/                 the answer, how it is drawn, and the proof that it hits nothing
-branches/             the joints' ways: every branch along the tool's way, and the one that is taken
-plan_moves.py         goes through the moves of a path; move_kinds.py says what each kind does
-path_planner.py       the best plan of all; branch_report.py: what is said of each branch
-path.py               `armkin.path`; path_redundant.py: of arms with a redundant joint; path_held.py: joints held
-drawings.py           `armkin.drawing`: G-code and SVG as such a path
-path_outline.py       where a path leads the tool, before a branch or a place of the arm is chosen
-jog_line.py           the line of one axis that a held button moves the tip along
+timing/          the law of time: how fast along a way, within the limits of joints and motors
+tool_path/       the tool's way: lines, arcs, splines, blends, dense points, one after another
+plan/            the answer, how it is drawn, and the proof that it hits nothing
+branches/        the joints' ways: every branch along the tool's way, and the one that is taken
+plan_moves.py    goes through the moves of a path; move_kinds.py says what each kind does
+path_planner.py  the best plan of all; branch_report.py: what is said of each branch
+path.py          `armkin.path`; path_redundant.py: of arms with a redundant joint; path_held.py: joints held
+drawings.py      `armkin.drawing`: G-code and SVG as such a path
+path_outline.py  where a path leads the tool, before a branch or a place of the arm is chosen
+jog_line.py      the line of one axis that a held button moves the tip along
 
 The way of waypoints:
 
 joint_moves.py        straight moves of all joints
 rounded_waypoints.py  waypoints without a stop
 time_law.py           `armkin.time_law`: the fastest law of time of joint values given
-rest_of_stretch.py    what is left of a stretch that was held
+remaining_stretch.py  what is left of a stretch that was held
 """

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
-from armkin.motion.tool_path.placing import placing
+from armkin.motion.tool_path.drawing_frame import placing
 from armkin.path_file import PathFile, foreign, read_drawing
 from armkin.path_file.drawing import DrawingOptions
 

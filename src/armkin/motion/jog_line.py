@@ -13,7 +13,7 @@ from armkin.inverse.numeric.newton import scaled
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import clearance
-from armkin.model.targets import targets_out
+from armkin.model.target_numbers import targets_out
 from armkin.model.units import radian_or_reach
 from armkin.motion.joint_moves import check_rates
 from armkin.motion.path import path

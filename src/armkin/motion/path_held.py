@@ -17,8 +17,8 @@ from armkin.motion.joint_moves import approach, check_jerk, check_rates, straigh
 from armkin.motion.path_planner import planned
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.proved_free import checked
-from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed
 from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import path_numbers

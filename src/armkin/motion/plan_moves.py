@@ -26,7 +26,7 @@ from armkin.motion.branches.route_grid import Missed, deviation, missed
 from armkin.motion.branches.wrist_window import detoured
 from armkin.motion.joint_moves import approach, straight
 from armkin.motion.plan.path_plan import Marker, PathPlan
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, way_of, ways_of
 from armkin.motion.timing.profile import at_rest
 from armkin.motion.timing.trajectory import Straight, Stretch
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
     from armkin.motion.branches.branch_chains import Run
-    from armkin.motion.timing.cubics import Knots
+    from armkin.motion.timing.cubic_knots import Knots
     from armkin.motion.tool_path.route import Route
     from armkin.path_file import Move, PathFile
 

@@ -13,9 +13,9 @@ from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.motion.branches.branch_path import coupled
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.curve import Curve
-from armkin.motion.timing.hold_cap import hold_cap
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.curved_stretch import Curve
+from armkin.motion.timing.hold_speed_limit import hold_cap
 from armkin.motion.timing.time_optimal import Bounds, optimal
 from armkin.motion.timing.trajectory import Trajectory
 

@@ -12,8 +12,8 @@ from armkin.formula.arrays import Array
 from armkin.forward import as_joints, position
 from armkin.motion.branches.branch_path import coupled
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.timing.curve import Curve
-from armkin.motion.timing.hold_cap import hold_cap
+from armkin.motion.timing.curved_stretch import Curve
+from armkin.motion.timing.hold_speed_limit import hold_cap
 from armkin.motion.timing.limit_jerk import Smoothed, window
 from armkin.motion.timing.time_optimal import Bounds, finer, knots, optimal
 from armkin.motion.timing.trajectory import Trajectory

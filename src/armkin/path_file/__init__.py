@@ -141,7 +141,7 @@ def _same(said: str, robot_file: str, folder: str) -> bool:
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema of a path file, for editors (`robots/path.schema.json`)."""
-    from armkin.robot_file.schema import made_from
+    from armkin.robot_file.robot_schema import made_from
 
     return made_from(PathFile, "armkin path file")
 

@@ -1,15 +1,15 @@
 """Robot files: YAML in, one validated, immutable model out, or an error with its line.
 
-strict_yaml.py    YAML without its traps
-robot_keys.py     keys, types, bounds, as pydantic has them; checks.py, drive_checks.py: rules between values
-robot.py          `RobotFile`: the two together; robot_key_errors.py: errors in the file's own words
-key_types.py      what all keys are made of
-keep_out_keys.py  floors, boxes, capsules; scene_file.py: such in a file of their own
-schema.py         JSON Schema, for editors
-catalogue.py      the shipped robots by name
-new_file.py       a robot file from a DH table
-edit.py           other values in a robot file's text; writing.py: a whole file's text
-urdf.py           a URDF as a robot file; urdf_document.py: its XML
+strict_yaml.py     YAML without its traps
+robot_keys.py      keys, types, bounds, as pydantic has them; cross_key_checks.py, drive_checks.py: rules between values
+robot.py           `RobotFile`: the two together; robot_key_errors.py: errors in the file's own words
+key_types.py       what all keys are made of
+keep_out_keys.py   floors, boxes, capsules; scene_file.py: such in a file of their own
+robot_schema.py    JSON Schema, for editors
+catalogue.py       the shipped robots by name
+new_file.py        a robot file from a DH table
+replace_values.py  other values in a robot file's text; robot_file_text.py: a whole file's text
+urdf_reader.py     a URDF as a robot file; urdf_document.py: its XML
 
 This package imports pydantic and yaml, and is itself imported only when a robot file is read.
 """
@@ -94,9 +94,9 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema of a robot file, for editors (see ``robots/robot.schema.json``)."""
-    from armkin.robot_file import schema
+    from armkin.robot_file import robot_schema
 
-    return schema.json_schema()
+    return robot_schema.json_schema()
 
 
 def _validated(data: dict[str, Any]) -> RobotFile:

@@ -1,4 +1,4 @@
-"""Rules between the values of one drive, and between a drive and its joint: ``(path, message)`` as in `checks`."""
+"""Rules between the values of one drive, and between a drive and its joint, as in `cross_key_checks`."""
 
 from __future__ import annotations
 

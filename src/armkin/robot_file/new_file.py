@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armkin.robot_file.writing import number, scalar
+from armkin.robot_file.robot_file_text import number, scalar
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The robot file whole: the keys of ``robot_keys``, held to the rules of ``checks``."""
+"""The robot file whole: the keys of ``robot_keys``, held to the rules of ``cross_key_checks``."""
 
 from collections.abc import Sequence
 from typing import Self
@@ -7,7 +7,7 @@ from pydantic import PrivateAttr, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from armkin.errors import UsageError
-from armkin.robot_file import checks
+from armkin.robot_file import cross_key_checks
 from armkin.robot_file.robot_keys import Pose, RobotKeys
 
 
@@ -37,6 +37,6 @@ class RobotFile(RobotKeys):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if problems := list(checks.problems(self)):
+        if problems := list(cross_key_checks.problems(self)):
             raise PydanticCustomError("problems", "{text}", {"text": problems[0][1], "problems": problems})
         return self

@@ -1,7 +1,7 @@
 """The robot file as pydantic sees it: every key, its unit, its bounds and its help text.
 
 Strict: no unknown keys, no text or booleans for numbers, finite numbers only; immutable. What needs
-several values to judge (limits against home, axes against the board) stands in ``checks``, and ``robot``
+several values to judge (limits against home, axes against the board) stands in ``cross_key_checks``, and ``robot``
 puts the two together.
 Angles are degrees and lengths millimetres here; ``armkin.model.arm`` turns them into radians, once.
 """
@@ -47,7 +47,7 @@ Rate = Annotated[float, Field(ge=1e-6, le=1e6)]  # less would take ages, and ove
 Unit = Annotated[float, Field(ge=-1e3, le=1e3)]  # a component of a direction
 # A name may stand in `J3=20` on the command line and in tables: no spaces, commas, colons or equal signs.
 Name = Annotated[str, Field(max_length=32, pattern="^[A-Za-z_][A-Za-z0-9_.-]*$")]
-# An int and not a Literal, which would take `true` for 1; 0 is for `checks` to find.
+# An int and not a Literal, which would take `true` for 1; 0 is for `cross_key_checks` to find.
 Sign = Annotated[int, Field(ge=-1, le=1, json_schema_extra={"enum": [1, -1]})]
 
 

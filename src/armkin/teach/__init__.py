@@ -5,7 +5,7 @@ page_key.py          who may ask: the key and the origin of a request
 request_checks.py    whether a request's fields are what they must be
 tabs.py              the open pages: which one holds control, what each has still to hear
 actions.py           every action by its name; program_actions.py: those on the program
-playing.py           a plan as the page plays it, by error
+plan_samples.py      a plan as the page plays it, by error
 recorded_program.py  moves recorded one after another, in the words of a path file
 arm_description.py   what the page draws: links, bodies, limits
 urdf_meshes.py       what the bodies look like, from a URDF; mesh_files.py: triangles of STL and Collada files

@@ -10,7 +10,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.model import units
 from armkin.model.arm import actual
-from armkin.model.targets import label_units
+from armkin.model.target_numbers import label_units
 from armkin.motors import pulse_range
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from armkin.export.js.es_module import module
 from armkin.teach.arm_description import scene
 from armkin.teach.browser_solver import about
-from armkin.teach.playing import played
+from armkin.teach.plan_samples import played
 from armkin.teach.reach_slice import reach_slice
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from armkin.keep_out.clearance import hits, hits_text
 from armkin.model import units
 from armkin.model.limits import outside, outside_text
 from armkin.model.rotation import rpy
-from armkin.model.targets import label_units, targets_in, targets_out
+from armkin.model.target_numbers import label_units, targets_in, targets_out
 from armkin.motors import best_pulses, motor_names, outside_travel, pulses, rounding
 
 if TYPE_CHECKING:

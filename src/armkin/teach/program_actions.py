@@ -11,7 +11,7 @@ from armkin.forward import fk
 from armkin.model import units
 from armkin.motors import joints as joints_of
 from armkin.teach import request_checks
-from armkin.teach.playing import played
+from armkin.teach.plan_samples import played
 from armkin.teach.recorded_program import Program
 
 if TYPE_CHECKING:

@@ -12,9 +12,9 @@ from armkin.forward import fk
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
-from armkin.model.targets import targets_out
+from armkin.model.target_numbers import targets_out
 from armkin.motion.tool_path.path_numbers import check_numbers
-from armkin.robot_file.writing import flow
+from armkin.robot_file.robot_file_text import flow
 from armkin.teach import request_checks
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model.rotation import inverse
-from armkin.robot_file import urdf
+from armkin.robot_file import urdf_reader
 from armkin.robot_file.urdf_document import Joint, Tree, document
 from armkin.teach.mesh_files import triangles
 
@@ -57,9 +57,11 @@ def _on_grid(body: Array, unit: float) -> Array:
 
 def _bodies(arm: Arm, path: str) -> list[Array]:
     """The triangles (N, 3, 3) of each body, in its frame [mm]."""
-    raw = urdf.load(path)
-    if len(raw) > urdf.MAX_BYTES:
-        raise UsageError(f"{path}: larger than {urdf.MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes")
+    raw = urdf_reader.load(path)
+    if len(raw) > urdf_reader.MAX_BYTES:
+        raise UsageError(
+            f"{path}: larger than {urdf_reader.MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes"
+        )
     _, tree = document(raw, path)
     first = tree.base(None)
     after = _frames(arm)
@@ -76,10 +78,12 @@ def _bodies(arm: Arm, path: str) -> list[Array]:
             if "mesh" in visual:
                 corners = _corners(path, link, visual) @ T[:3, :3].T + T[:3, 3]
                 way = arm.base if body == 0 else inverse(after[body - 1]) @ arm.base
-                found[body].append(corners * urdf.METRE @ way[:3, :3].T + way[:3, 3])
+                found[body].append(corners * urdf_reader.METRE @ way[:3, :3].T + way[:3, 3])
         for joint in tree.children[link]:
             child = str(joint.text("child", "link"))
-            stack.append((child, T @ urdf.origin(joint, path), chain.index(joint) + 1 if joint in chain else body))
+            stack.append(
+                (child, T @ urdf_reader.origin(joint, path), chain.index(joint) + 1 if joint in chain else body)
+            )
     return [np.concatenate(parts) for parts in found]
 
 
@@ -98,9 +102,9 @@ def _chain(arm: Arm, tree: Tree, first: str, after: list[Array]) -> list[Joint]:
     for leaf in tree.leaves(first):
         T, axes = np.eye(4), []
         for joint in tree.chain(first, leaf):
-            T = T @ urdf.origin(joint, tree.name)
+            T = T @ urdf_reader.origin(joint, tree.name)
             if joint.kind != "fixed":
-                axes.append((joint, T[:3, :3] @ urdf.axis(joint, tree.name), T[:3, 3] * urdf.METRE))
+                axes.append((joint, T[:3, :3] @ urdf_reader.axis(joint, tree.name), T[:3, 3] * urdf_reader.METRE))
         if len(axes) < arm.n:
             worst = worst or f"it has {len(axes)} moving joints on the way to {leaf}, the arm {arm.n}"
             continue
@@ -120,8 +124,8 @@ def _corners(path: str, link: str, visual: dict[str, dict[str, str]]) -> Array:
     """A mesh's triangles in its link's frame [m]."""
     where = f"{path}: visual of {link}"
     name = visual["mesh"].get("filename", "")
-    scale = urdf.triple(visual["mesh"].get("scale"), (1.0, 1.0, 1.0), f"{where}: mesh scale")
-    T = urdf.placed(visual.get("origin", {}), where)
+    scale = urdf_reader.triple(visual["mesh"].get("scale"), (1.0, 1.0, 1.0), f"{where}: mesh scale")
+    T = urdf_reader.placed(visual.get("origin", {}), where)
     return np.asarray(triangles(_file(path, name, where)) * scale @ T[:3, :3].T + T[:3, 3])
 
 

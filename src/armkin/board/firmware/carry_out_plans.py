@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, islice
 from typing import TYPE_CHECKING
 
-from armkin.board.firmware.segments.rest_of_plan import left_of
+from armkin.board.firmware.segments.remaining_plan import left_of
 from armkin.board.firmware.streaming import LEAD_BAD, LEAD_MOST, batches, pieces, seconds_of, stream
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.motion_frame import Batch

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware.segments.rest_of_plan import Place, onwards, places_on
+from armkin.board.firmware.segments.remaining_plan import Place, onwards, places_on
 from armkin.board.firmware.segments.trajectory_to_counts import Cut
 from armkin.board.ports import note_path, read_note, remove_note, write_note
 from armkin.errors import HeldError, LinkError, NothingHeldError

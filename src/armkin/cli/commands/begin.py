@@ -114,8 +114,8 @@ class _Session:
     def corrected(self, found: Found) -> str:
         """The file's text with what was found."""
         from armkin.robot_file import parse
-        from armkin.robot_file.edit import replaced
-        from armkin.robot_file.writing import flow
+        from armkin.robot_file.replace_values import replaced
+        from armkin.robot_file.robot_file_text import flow
 
         file = parse(self.text, self.path)
         motors = file.motor_list()

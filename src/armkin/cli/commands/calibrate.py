@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import arguments, output, render
-from armkin.cli.csv_rows import batch_rows
+from armkin.cli.csv_to_numbers import batch_rows
 from armkin.cli.options import Json, Out, Robot
 from armkin.errors import UsageError
 from armkin.model import units
-from armkin.model.targets import targets_in
+from armkin.model.target_numbers import targets_in
 
 if TYPE_CHECKING:
-    from armkin.calibration.calibrate import Calibration
+    from armkin.calibration.calibrate_arm import Calibration
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
@@ -103,7 +103,7 @@ def _fitted(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Calibration
 
 
 def _file(found: Calibration, arm: Arm) -> str:
-    from armkin.robot_file.writing import text
+    from armkin.robot_file.robot_file_text import text
 
     return text(
         found.data,
@@ -115,7 +115,7 @@ def _file(found: Calibration, arm: Arm) -> str:
 
 
 def _suggest(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: bool, out: str | None) -> None:
-    from armkin.calibration.calibrate import next_poses
+    from armkin.calibration.calibrate_arm import next_poses
     from armkin.columns.csv_cells import csv_line
 
     before = None if rows is None else units.joints_in(arm, rows[:, : arm.n])

@@ -92,7 +92,7 @@ def export(
 def _urdf(arm: Arm, out: str | None) -> None:
     import numpy as np
 
-    from armkin.export.urdf import urdf
+    from armkin.export.urdf_writer import urdf
 
     with output.destination(out) as write:
         write(urdf(arm))
@@ -102,7 +102,7 @@ def _urdf(arm: Arm, out: str | None) -> None:
 
 def _table(arm: Arm, convention: str, out: str | None) -> None:
     from armkin.export import conventions
-    from armkin.robot_file.writing import text
+    from armkin.robot_file.robot_file_text import text
 
     data = conventions.screws(arm) if convention == "screws" else conventions.dh(arm, modified=convention == "modified")
     lines = list(conventions.differences(arm, data))  # reads it: a number may be beyond what a robot file takes

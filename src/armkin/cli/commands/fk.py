@@ -59,7 +59,7 @@ def fk(
                 write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
             render.warn_of_limits(arm, answer["violations"], answer)
             return
-    from armkin.cli.batch import Batch as Run
+    from armkin.cli.batch_answers import Batch as Run
     from armkin.cli.batch_pieces import Rows
 
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)

@@ -35,7 +35,7 @@ from armkin.cli.options import (
 from armkin.cli.row_chunks import Chunk, one_row
 from armkin.errors import UsageError
 from armkin.model import units
-from armkin.model.targets import label_units, targets_in, targets_out
+from armkin.model.target_numbers import label_units, targets_in, targets_out
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Ik
@@ -109,7 +109,7 @@ def ik(
         request = _compiled(request, what.name)
     questions = Questions(request, what, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
-        from armkin.cli.batch import Batch as Run
+        from armkin.cli.batch_answers import Batch as Run
         from armkin.cli.batch_pieces import Rows
 
         arguments.no_numbers(target)

@@ -14,7 +14,7 @@ from armkin.errors import UsageError
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.robot_file.urdf import Imported
+    from armkin.robot_file.urdf_reader import Imported
 
 
 def import_(
@@ -38,15 +38,15 @@ def import_(
     from armkin import robot_file
     from armkin.export import conventions
     from armkin.model.build import build
-    from armkin.robot_file import catalogue, urdf
-    from armkin.robot_file.writing import text
+    from armkin.robot_file import catalogue, urdf_reader
+    from armkin.robot_file.robot_file_text import text
 
     if file.endswith((".yaml", ".yml")) or (catalogue.shipped(file) and not os.path.exists(file)):
         raise UsageError(f"{file} is a robot, and import reads URDFs: armkin info {file} says what it is")
     files.keep(file)
     try:
-        raw = urdf.load(file)  # once: a pipe can be read no second time
-        found = urdf.parse(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
+        raw = urdf_reader.load(file)  # once: a pipe can be read no second time
+        found = urdf_reader.parse(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
     except UsageError as error:
         option = next((o for o in ("base", "tip") if f"the {o} must be named" in str(error)), None)
         if option is None:
@@ -70,10 +70,10 @@ def _gain(raw: bytes, found: Imported, arm: Arm) -> str | None:
     import armkin
     from armkin import robot_file
     from armkin.model.build import build
-    from armkin.robot_file import urdf
-    from armkin.robot_file.writing import text
+    from armkin.robot_file import urdf_reader
+    from armkin.robot_file.robot_file_text import text
 
-    snapped = build(robot_file.parse(text(urdf.parse(raw, base=found.base, tip=found.tip, snap=True).data)))
+    snapped = build(robot_file.parse(text(urdf_reader.parse(raw, base=found.base, tip=found.tip, snap=True).data)))
     try:
         before, after = armkin.method(arm)[0], armkin.method(snapped)[0]
     except UsageError:

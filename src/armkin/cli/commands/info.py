@@ -8,7 +8,7 @@ from armkin.cli import arguments, output, render
 from armkin.cli.options import Json, Robot, Scene, TaskName, TextOut
 from armkin.errors import UsageError
 from armkin.model import units
-from armkin.model.targets import label_units
+from armkin.model.target_numbers import label_units
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Info, KeepOuts, Solving

@@ -115,9 +115,9 @@ def _targets(arm: Arm, source: str) -> Array:
     """The targets of a file, as the arm's task reads them."""
     import numpy as np
 
-    from armkin.cli.csv_rows import batch_rows
+    from armkin.cli.csv_to_numbers import batch_rows
     from armkin.inverse.tasks.choose_task import task_for
-    from armkin.model.targets import targets_in
+    from armkin.model.target_numbers import targets_in
 
     task = task_for(arm)
     rows = [chunk.values for chunk in batch_rows(source, task.labels, f"task {task.name} of {arm.name}")]

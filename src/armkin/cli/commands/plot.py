@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armkin.cli import arguments, lock_and_sweep, piped_answers, render
-from armkin.cli.csv_rows import batch_rows
+from armkin.cli.csv_to_numbers import batch_rows
 from armkin.cli.number_parsing import comma_separated
 from armkin.cli.options import Joints, Lock, RobotOrPipe, Scene, TaskName
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
-from armkin.model.targets import label_units, targets_in
+from armkin.model.target_numbers import label_units, targets_in
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -59,7 +59,7 @@ def pulses(
         for name in answer["outside_travel"]:
             output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
         return
-    from armkin.cli.batch import Batch as Run
+    from armkin.cli.batch_answers import Batch as Run
     from armkin.cli.batch_pieces import Rows
 
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)

@@ -18,7 +18,7 @@ def schema(
     import json
 
     from armkin import path_file, robot_file
-    from armkin.robot_file.schema import scene_schema
+    from armkin.robot_file.robot_schema import scene_schema
 
     if path and scene:
         raise UsageError("--path and --scene: give one of the two")

@@ -97,7 +97,7 @@ def _write(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[int, int] | 
     from armkin.motors import motor_names
     from armkin.robot_file import parse
     from armkin.robot_file.catalogue import locate
-    from armkin.robot_file.edit import replaced
+    from armkin.robot_file.replace_values import replaced
 
     where: dict[tuple[str | int, ...], int] = {
         ("joints", arm.joint_names.index(name), "drive", "zero"): count

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from armkin import __version__
 from armkin.errors import UsageError
-from armkin.export.c import elimination, formulas, keep_outs, kernel
-from armkin.export.c.golden import golden_test
+from armkin.export.c import arm_formulas, c_elimination, c_functions, keep_out_tables
+from armkin.export.c.golden_values import golden_test
 from armkin.export.c.source_parts import part
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number
@@ -59,13 +59,13 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "joints_are": in_comment(joints),
     }
     fields = {
-        "keep_outs": keep_outs.declared(arm) if arm.keep_out else "",
+        "keep_outs": keep_out_tables.declared(arm) if arm.keep_out else "",
         "guard": f"ARMKIN_{prefix.upper()}_H",
         "real": "float" if single else "double",
         "joints": str(arm.n),
         "branches": str(branches),
         "target": str(target_size(task)),
-        "goal": str(formulas.goal_size(task)),
+        "goal": str(arm_formulas.goal_size(task)),
         "target_is": _target_is(task),
         "names": ",\n    ".join(f'"{name}"' for name in names),
         "position": str(task.position),
@@ -86,15 +86,15 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         part("source_head"),
         part("numbers_float" if single else "numbers_double"),
         settings(single),
-        kernel.forward_kinematics(arm, single),
-        kernel.jacobian(arm, single),
-        kernel.target(arm, task, single),
+        c_functions.forward_kinematics(arm, single),
+        c_functions.jacobian(arm, single),
+        c_functions.target(arm, task, single),
         solve,
         part("copies"),
         part({"full": "read_pose", "axis": "read_axis"}.get(task.orientation, "read_numbers")),
         part("ik"),
         part("source_tail"),
-        *([keep_outs.clearances(arm, single), keep_outs.free(arm)] if arm.keep_out else []),
+        *([keep_out_tables.clearances(arm, single), keep_out_tables.free(arm)] if arm.keep_out else []),
     ]
     texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, numbered))
     return Program(*(filled(_named(filled(text, fields), prefix), words) for text in texts))
@@ -128,7 +128,7 @@ def candidates(
     it. Raises UsageError if the class has no form in C, or none in single precision.
     """
     if geometry.pairs is not None:
-        return kernel.candidates(arm, task, geometry, single, prefer)
+        return c_functions.candidates(arm, task, geometry, single, prefer)
     if not has_form(geometry):
         raise UsageError(
             f"{arm.name}: {geometry.name} has no form in C: {why_no_form(arm, geometry)}; task {task.name} is solved "
@@ -136,7 +136,7 @@ def candidates(
         )
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
-    return elimination.candidates(arm, task, geometry.elimination, lanes=lanes, held=held), elimination.BRANCHES
+    return c_elimination.candidates(arm, task, geometry.elimination, lanes=lanes, held=held), c_elimination.BRANCHES
 
 
 def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
@@ -161,7 +161,7 @@ def why_no_form(arm: Arm, geometry: Geometry) -> str:
 def has_form(geometry: Geometry) -> bool:
     """Whether a class of arms can be written in C."""
     found = geometry.elimination
-    return geometry.pairs is not None or (found is not None and elimination.has_form(found))
+    return geometry.pairs is not None or (found is not None and c_elimination.has_form(found))
 
 
 def settings(single: bool = False) -> str:

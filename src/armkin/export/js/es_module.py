@@ -12,10 +12,10 @@ import numpy as np
 
 from armkin import __version__, forward, motors
 from armkin.errors import UsageError
-from armkin.export.c import formulas
+from armkin.export.c import arm_formulas
 from armkin.export.c.c_program import has_form, plain_form, why_no_form
-from armkin.export.c.keep_outs import tables
-from armkin.export.js import elimination
+from armkin.export.c.keep_out_tables import tables
+from armkin.export.js import js_elimination
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.solvers.recognise import solver
@@ -72,7 +72,7 @@ def _of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
         *_keep_outs(arm, turned),
         _by_joint(turned, calibrated=bool((arm.ratio != 1.0).any())),
         *map(part, _SOLVER),
-        *(map(part, elimination.METHOD) if geometry.pairs is None else ()),
+        *(map(part, js_elimination.METHOD) if geometry.pairs is None else ()),
         solve,
         part("poses"),
         part("module").replace("@TARGET@", _target_is(task)),
@@ -122,16 +122,16 @@ def part(name: str) -> str:
 def candidates(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
     """The function `candidates` of an arm's class, and how many branches it has."""
     if geometry.pairs is None:
-        return elimination.candidates(arm, task, geometry.elimination), elimination.BRANCHES
-    n, entries = arm.n, formulas.goal_size(task)
+        return js_elimination.candidates(arm, task, geometry.elimination), js_elimination.BRANCHES
+    n, entries = arm.n, arm_formulas.goal_size(task)
     declared = [(f"g{k}", f"goal[{k}]") for k in range(entries)]
     for j in range(n):
         # what is preferred for a joint is asked where that is free, and computed there
         preferred = [f"near[{j}]"] if arm.prismatic[j] else [f"Math.cos(near[{j}])", f"Math.sin(near[{j}])"]
         declared += [(text, "") for text in preferred]
-    recorded = formulas.candidates(arm, task, geometry, measured=True)
+    recorded = arm_formulas.candidates(arm, task, geometry, measured=True)
     code = c_and_js_code.write(recorded, [name for name, _ in declared], c_and_js_code.JAVASCRIPT)
-    *values, miss, length, angle, _ = formulas.by_branch(recorded, code)
+    *values, miss, length, angle, _ = arm_formulas.by_branch(recorded, code)
     stores = [f"q[{b * n + j}] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
     stores += [f"miss[{k}] = {text};" for k, text in enumerate([*miss, *length, *angle])]
     doubts = dict.fromkeys(text for text in code.outputs[-1] if not text.startswith("0.0"))
@@ -164,7 +164,7 @@ def _kinematics(turned: Arm, task: Task) -> list[str]:
     return [
         _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), turned.n)),
         _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), turned.n)),
-        _of_joints("targetOf", formulas.target(turned, task)),
+        _of_joints("targetOf", arm_formulas.target(turned, task)),
     ]
 
 

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import widened
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import widened
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
+from armkin.formula.array_shapes import Joints
 from armkin.formula.arrays import Array, Truth, wrapped
-from armkin.formula.shapes import Joints
 from armkin.forward import one_pose
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.model.arm import Arm, actual

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of
 from armkin.inverse.elimination.polish import pose_error, tip
 from armkin.inverse.numeric.tolerances import ALIKE, EXAMINED, HALFWAY, ILL
 

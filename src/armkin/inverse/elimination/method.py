@@ -41,8 +41,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.elimination import three_prismatic
 from armkin.inverse.elimination.choose_variable import Elimination, Kind, kinds, prepare
 from armkin.inverse.elimination.closed_loop import Loop

@@ -6,8 +6,8 @@ See `method` for what leaves a pose open, and why.
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of
 from armkin.inverse.elimination import roots
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, difference, projection

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEAR, SAME_SEED
 from armkin.inverse.redundant.curve_points import Points, onto

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armkin.formula.array_tuples import stacked
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import stacked
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import PAIR_SETTLED, ROUGHLY

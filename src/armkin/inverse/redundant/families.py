@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula import arrays
+from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.formula.rows import rows_of
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.numeric.tolerances import SOLUTION
 from armkin.inverse.redundant.boundaries import boundaries, places
 from armkin.inverse.redundant.branch_ends import crossed_at, hidden_stretches, number_of, places_of

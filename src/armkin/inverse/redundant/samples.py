@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armkin.formula.array_tuples import stacked
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.formula.rows import stacked
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.redundant.boundaries import on_both_sides
 from armkin.inverse.redundant.interval_pieces import Int, best_samples, holding_none, runs, turning

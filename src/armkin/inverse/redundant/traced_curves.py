@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Bool, wrapped
-from armkin.formula.rows import rows_of, stacked
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import SAME_SEED, SHORTEST_ARC, TINY
 from armkin.inverse.redundant.answers_on_planes import Nodes, answered, once

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, wrapped
-from armkin.formula.rows import rows_of
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged

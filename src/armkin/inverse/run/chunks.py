@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula import arrays
+from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool, Truth
-from armkin.formula.rows import rows_of, stacked
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status

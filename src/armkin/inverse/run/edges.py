@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of, stacked
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows

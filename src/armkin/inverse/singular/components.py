@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import rows_of, widened
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of, widened
 from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton

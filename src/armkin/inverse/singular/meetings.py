@@ -13,8 +13,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import rows_of
 from armkin.forward import fk
 from armkin.inverse.answers.batch import OWN, Goals
 from armkin.inverse.numeric import newton

@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import stacked, widened
 from armkin.formula.arrays import Array, Bool
-from armkin.formula.rows import stacked, widened
 from armkin.forward import fk
 from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded

@@ -1,8 +1,8 @@
 """What stands around an arm: one file a shape, each with the function `read` that takes a keep-out's entry.
 
-floor.py, box.py, capsule.py; segments.py: how far segments are from each other
+floor.py, box.py, capsule.py; segment_distances.py: how far segments are from each other
 
-floor.py, box.py, capsule.py; segments.py: how far segments are from each other
+floor.py, box.py, capsule.py; segment_distances.py: how far segments are from each other
 
 A shape tells its signed distance to segments (negative inside), its corners for pictures, and its numbers for C.
 Another shape is one more file, a line in `_OF`, its keys in `armkin.robot_file.keep_out_keys` and its distance in C.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.keep_out.shapes.segments import between
+from armkin.keep_out.shapes.segment_distances import between
 
 if TYPE_CHECKING:
     from armkin.robot_file.keep_out_keys import Entry

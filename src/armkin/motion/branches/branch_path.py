@@ -15,7 +15,7 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find
-from armkin.motion.branches.boundary import through_boundaries
+from armkin.motion.branches.boundary_chains import through_boundaries
 from armkin.motion.branches.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import change
@@ -23,9 +23,9 @@ from armkin.motion.branches.linked_branches import ENDS, linked
 from armkin.motion.branches.route_grid import fine_enough
 from armkin.motion.branches.wrist_turn import ASIDE, has_wrist, through_wrists
 from armkin.motion.branches.wrist_window import detoured
-from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.curve import Curve
-from armkin.motion.timing.hold_cap import hold_cap
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.curved_stretch import Curve
+from armkin.motion.timing.hold_speed_limit import hold_cap
 from armkin.motion.timing.limit_jerk import Smoothed, window
 from armkin.motion.timing.time_optimal import Bounds, finer, optimal
 from armkin.motion.tool_path.route import Route

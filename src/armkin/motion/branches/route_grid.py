@@ -10,8 +10,8 @@ from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.motion.branches.joint_steps import chord_bound, levers
 from armkin.motion.branches.solve_on_route import DAMPING, corrected, exact_cubics
-from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.scan import Int
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.speed_scan import Int
 from armkin.motion.timing.time_optimal import knots
 
 if TYPE_CHECKING:

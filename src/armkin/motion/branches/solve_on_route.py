@@ -10,8 +10,8 @@ from armkin.formula.arrays import Array
 from armkin.forward import tip_and_jacobian
 from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.model.units import radian_or_reach
-from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.scan import Int
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.speed_scan import Int
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

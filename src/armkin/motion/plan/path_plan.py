@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula.arrays import Array
 from armkin.forward import condition, jacobian
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, way_of
 from armkin.motion.timing.trajectory import Stretch, Trajectory, grouped
 from armkin.motion.tool_path.route import Reduced

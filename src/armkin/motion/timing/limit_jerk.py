@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.formula.arrays import Array
-from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.curved_stretch import Curve
 
 # Gauss-Legendre, four points on [0, 1]: exact for polynomials up to degree 7, and q is of degree 6 in time.
 _X = np.array([0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263])

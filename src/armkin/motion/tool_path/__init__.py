@@ -1,9 +1,9 @@
 """The tool's way, each piece at unit speed.
 
-path_numbers.py  the moves of a path file, in degrees, as joint values and targets
-placing.py       where a drawing stands, and how the tool is held on it
-path_pieces.py   lines, arcs, helices, splines and blends
-dense_points.py  targets on lines, gathered; fit_points.py: one smooth curve of them; chords.py: what lies between them
-least_knots.py   splines of few knots; b_spline.py: their least squares
-route.py         one piece after another, with rests at corners
+path_numbers.py   the moves of a path file, in degrees, as joint values and targets
+drawing_frame.py  where a drawing stands, and how the tool is held on it
+path_pieces.py    lines, arcs, helices, splines and blends
+dense_points.py   targets on lines, gathered; fit_points.py: one smooth curve of them; chords.py: what lies between them
+least_knots.py    splines of few knots; b_spline.py: their least squares
+route.py          one piece after another, with rests at corners
 """

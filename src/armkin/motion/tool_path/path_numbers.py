@@ -13,7 +13,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
-from armkin.model.targets import label_scale, targets_in
+from armkin.model.target_numbers import label_scale, targets_in
 from armkin.motion.tool_path.path_pieces import Spot, spot
 
 if TYPE_CHECKING:

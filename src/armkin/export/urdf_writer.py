@@ -16,7 +16,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.model.arm import actual
-from armkin.robot_file.writing import angles, number
+from armkin.robot_file.robot_file_text import angles, number
 from armkin.view.skeleton import shape
 
 if TYPE_CHECKING:

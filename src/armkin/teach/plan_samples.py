@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.forward import fk
 from armkin.model import units
-from armkin.motion.plan.playback import times
+from armkin.motion.plan.playback_times import times
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -1,6 +1,6 @@
 """Rows of numbers from a CSV file or a pipe: columns by the heading's names, or in order without one.
 
-Targets [mm, deg] become what `armkin.ik` takes in `armkin.model.targets`.
+Targets [mm, deg] become what `armkin.ik` takes in `armkin.model.target_numbers`.
 """
 
 from __future__ import annotations

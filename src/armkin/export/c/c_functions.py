@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from armkin import forward
-from armkin.export.c import formulas
+from armkin.export.c import arm_formulas
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.closed.precision import DOUBLE, SINGLE, recorded_for
 
@@ -27,7 +27,7 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     prefer: joints that a target leaves free take their value from `near`; without, such a target is only in doubt, 3
     in place of 1.
     """
-    n, entries = arm.n, formulas.goal_size(task)
+    n, entries = arm.n, arm_formulas.goal_size(task)
     declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(entries)]
     if prefer:
         for j in range(n):
@@ -35,9 +35,9 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
             ways = [("c", f"ARM_COS({near})"), ("s", f"ARM_SIN({near})")]
             declared += [(f"p{j}", near)] if arm.prismatic[j] else [(f"{w}{j}", text) for w, text in ways]
     with recorded_for(SINGLE if single else DOUBLE):
-        recorded = formulas.candidates(arm, task, geometry, prefer)
+        recorded = arm_formulas.candidates(arm, task, geometry, prefer)
     code = c_and_js_code.write(recorded, [name for name, _ in declared], _language(single))
-    outputs = formulas.by_branch(recorded, code)
+    outputs = arm_formulas.by_branch(recorded, code)
     values, miss = outputs[:n], outputs[n]
     stores = [f"q[{b * n + j} * ARM_LANES + i] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
     stores += [f"miss[{b} * ARM_LANES + i] = {miss[b]};" for b in range(len(miss))]
@@ -71,7 +71,7 @@ def jacobian(arm: Arm, single: bool = False) -> str:
 
 def target(arm: Arm, task: Task, single: bool = False) -> str:
     """`arm_goal`, the target that joint values answer."""
-    return _recorded(formulas.target(arm, task), "arm_goal", "target", single)
+    return _recorded(arm_formulas.target(arm, task), "arm_goal", "target", single)
 
 
 def of_joints(arm: Arm, name: str, formula: forward.Formula, out: str, single: bool) -> str:

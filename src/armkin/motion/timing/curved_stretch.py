@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
-from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.cubic_knots import Knots
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.export.c import kernel
+from armkin.export.c import c_functions
 from armkin.export.c.source_parts import part
 from armkin.formula.c_and_js_code import number
 from armkin.keep_out.bodies import ends_formula
@@ -73,7 +73,7 @@ def clearances(arm: Arm, single: bool = False) -> str:
     text = part("keep_out")
     for name, value in fields.items():
         text = text.replace(f"@{name}@", value)
-    return kernel.of_joints(arm, "arm_ends", ends_formula, "e", single) + text
+    return c_functions.of_joints(arm, "arm_ends", ends_formula, "e", single) + text
 
 
 def free(arm: Arm) -> str:

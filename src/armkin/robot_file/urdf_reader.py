@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.errors import FileError, RobotFileError
+from armkin.robot_file.robot_file_text import pose, tidy
 from armkin.robot_file.urdf_document import Joint, Tree, document, is_xacro
-from armkin.robot_file.writing import pose, tidy
 
 MAX_BYTES = 8 * 2**20
 SNAP = 1e-4  # [rad] an angle this close to a right angle counts as one, with `snap`

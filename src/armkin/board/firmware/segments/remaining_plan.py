@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.board.firmware.wire.protocol import STEP
-from armkin.motion.rest_of_stretch import remainder
+from armkin.motion.remaining_stretch import remainder
 from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import joints, places
 

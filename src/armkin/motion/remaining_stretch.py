@@ -8,8 +8,8 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.motion.joint_moves import straight
-from armkin.motion.timing.cubics import Knots
-from armkin.motion.timing.curve import Curve
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.profile import at_rest, trapezoid
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import motor_accel, pulses

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.calibration import observability
 from armkin.calibration.corrected_chain import KINDS, model
 from armkin.calibration.dropped_rows import dropped
-from armkin.calibration.impossible_rows import check
+from armkin.calibration.measurement_checks import check
 from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
 from armkin.calibration.robust_fit import Measured
 from armkin.errors import UsageError
@@ -63,7 +63,7 @@ class Calibration:
     @property
     def text(self) -> str:
         """The corrected robot file."""
-        from armkin.robot_file.writing import text
+        from armkin.robot_file.robot_file_text import text
 
         return text(self.data)
 

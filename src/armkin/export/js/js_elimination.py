@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.export.c.elimination import BRANCHES, frame, moves_of, pencil_arrays, pencils_of, plans_of
+from armkin.export.c.c_elimination import BRANCHES, frame, moves_of, pencil_arrays, pencils_of, plans_of
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.elimination.merge import weights
 from armkin.inverse.elimination.method import Elimination

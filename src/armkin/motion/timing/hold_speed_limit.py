@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.motion.timing.cubics import Knots
+from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_bounds import TINY, in_parts
 from armkin.motion.timing.trajectory import BRAKE
 from armkin.motors import motor_accel

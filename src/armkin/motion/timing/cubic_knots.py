@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.motion.timing.scan import Int
+from armkin.motion.timing.speed_scan import Int
 
 
 @dataclass(frozen=True)
