@@ -79,7 +79,7 @@ if TYPE_CHECKING:
 _HOME = {
     "CompiledArm": "compiled.compiled_arm",
     "compile": "compiled.compiled_arm",
-    "calibrate": "calibration.calibrate",
+    "calibrate": "calibration.calibrate_arm",
     "ArmkinError": "errors",
     "FileError": "errors",
     "LinkError": "errors",
