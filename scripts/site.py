@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import armkin
-from armkin.calibration.calibrate import Calibration
+from armkin.calibration.calibrate_arm import Calibration
 from armkin.cli.app import load, run
 from armkin.cli.commands import COMMANDS
 from armkin.motion.timing.trajectory import Trajectory

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.sim.sim_board import SimBoard
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from pty_port import Patient, Pty
 
 

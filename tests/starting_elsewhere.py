@@ -20,7 +20,7 @@ from armkin.board.firmware.configuration import configure
 from armkin.board.kinds import board_of
 from armkin.board.klipper.extra_axes import axes_of
 from armkin.board.sim.sim_servo_bus import Servo
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.formula.arrays import Array
 from armkin.model.build import build
 from armkin.robot_file import parse

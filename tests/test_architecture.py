@@ -18,13 +18,12 @@ SOURCE = Path(__file__).parents[1] / "src"
 # The order is the way of the data: a room imports what stands above it.
 MAY_IMPORT: dict[str, str] = {
     "errors": "",
-    "board_kinds": "",
-    "installed_kinds": "board_kinds",
+    "board_catalogue": "",
     "signals": "",
     "user_folders": "",
     "files": "errors",
     "formula": "errors",
-    "robot_file": "errors files board_kinds installed_kinds",
+    "robot_file": "errors files board_catalogue",
     "model": "errors formula robot_file",
     "forward": "errors formula model",
     "view": "errors formula model forward",
@@ -74,18 +73,18 @@ MAY_IMPORT: dict[str, str] = {
     "board/firmware/wire": "errors board/ports board/backend",
     "board/firmware/segments": "errors formula model forward motors motion motion/timing board/backend"
     " board/firmware/wire",
-    "board/firmware": "board/backend errors board_kinds installed_kinds formula model forward motors motion motion/plan"
+    "board/firmware": "board/backend errors board_catalogue formula model forward motors motion motion/plan"
     " motion/timing board/ports robot_file board/firmware/wire board/firmware/segments",
-    "board/backend": "errors board_kinds installed_kinds formula robot_file model motion motion/plan motion/timing"
+    "board/backend": "errors board_catalogue formula robot_file model motion motion/plan motion/timing"
     " motors board/ports",
     "board/grbl": "errors formula robot_file model motors motion motion/timing board/ports board/backend",
     "board/feetech": "errors formula robot_file model motors motion board/ports board/backend",
     "board/klipper": "errors formula model motors motion motion/timing board/ports board/backend",
-    "board/sim": "errors board_kinds board/ports board/firmware board/grbl board/feetech board/firmware/wire",
-    "board/kinds": "errors board_kinds installed_kinds formula robot_file model motors motion motion/timing board/ports"
+    "board/sim": "errors board_catalogue board/ports board/firmware board/grbl board/feetech board/firmware/wire",
+    "board/kinds": "errors board_catalogue formula robot_file model motors motion motion/timing board/ports"
     " board/backend board/firmware board/grbl board/feetech board/klipper board/sim board/firmware/wire"
     " board/firmware/segments",
-    "flash": "errors board_kinds board/ports board/firmware board/firmware/wire",
+    "flash": "errors board_catalogue board/ports board/firmware board/firmware/wire",
     "board": "keep_out keep_out/shapes errors signals formula model forward motors motion motion/plan motion/timing"
     " board/ports board/backend",
     "teach": "keep_out keep_out/shapes errors files formula robot_file model forward inverse inverse/tasks"
@@ -277,7 +276,7 @@ def test_outside_board_nobody_knows_a_kind() -> None:
 
 def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file in board/kinds/ alone, and robot files, their schema and `board_of` know the kind."""
-    from armkin import installed_kinds
+    from armkin import board_catalogue
     from armkin.board import kinds
     from armkin.model.build import build
     from armkin.robot_file import parse
@@ -286,7 +285,7 @@ def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     text = (SOURCE / "armkin/board/kinds/grbl.py").read_text()
     (tmp_path / "gcode_box.py").write_text(text.replace('ForeignBoard("grbl"', 'ForeignBoard("gcode_box"'))
     monkeypatch.setattr(kinds, "__path__", [*kinds.__path__, str(tmp_path)])
-    installed_kinds.own_kinds.cache_clear()
+    board_catalogue.own_kinds.cache_clear()
     try:
         robot = (
             (SOURCE.parent / "tests/robots/three_dof_grbl.yaml").read_text().replace("kind: grbl", "kind: gcode_box")
@@ -295,4 +294,4 @@ def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         assert (board.kind, type(board).__module__) == ("gcode_box", "armkin.board.kinds.gcode_box")
         assert "gcode_box" in json_schema()["$defs"]["Board"]["properties"]["kind"]["enum"]
     finally:
-        installed_kinds.own_kinds.cache_clear()
+        board_catalogue.own_kinds.cache_clear()

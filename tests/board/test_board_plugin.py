@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 import armkin
-from armkin import installed_kinds
+from armkin import board_catalogue
 from armkin.board import conformance, path_run
 from armkin.board.backend.board import Board
 from armkin.board.kinds import board_of
@@ -38,9 +38,9 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installed(packages: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The package is installed here."""
     monkeypatch.syspath_prepend(str(packages))
-    installed_kinds._offered.cache_clear()
+    board_catalogue._entry_points.cache_clear()
     yield
-    installed_kinds._offered.cache_clear()
+    board_catalogue._entry_points.cache_clear()
 
 
 def robots(folder: Path) -> list[Path]:

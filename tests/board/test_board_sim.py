@@ -12,7 +12,7 @@ from armkin.board.firmware.segments.straight_lines import line
 from armkin.board.firmware.wire import motion_frame, protocol
 from armkin.board.firmware.wire.protocol import AxisImage, Error, Flag, GuardImage, Image, Segment, State, Status, whole
 from armkin.board.sim.sim_board import SimBoard
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 
 GOLDEN = Path(__file__).parents[2] / "firmware" / "golden"
 

@@ -21,7 +21,7 @@ from armkin.board.firmware.wire.reply_checks import BoardSaysError, ReplacedErro
 from armkin.board.kinds.firmware import Switches
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.errors import LinkError
 from armkin.model import build as arms
 from armkin.model.arm import Arm

@@ -20,7 +20,7 @@ from armkin.board.firmware.wire.protocol import State
 from armkin.board.firmware.wire.session import ReplacedError
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.errors import LinkError, UsageError
 from armkin.model import build as arms
 from armkin.model.arm import Arm

@@ -18,7 +18,7 @@ from armkin.board.firmware.wire.protocol import HALF, STEP
 from armkin.board.ports import note_path
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.motion.joint_moves import straight
 from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import joints, places

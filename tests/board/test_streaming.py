@@ -16,7 +16,7 @@ from armkin.board.firmware.wire import framing
 from armkin.board.firmware.wire.protocol import Type
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.errors import HeldError
 from armkin.model import build as arms
 

@@ -17,7 +17,7 @@ from armkin.board.firmware.segments import counts_to_segments, straight_lines
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import AxisImage, Image, Segment
 from armkin.board.sim.rate_checks import Velocity, times_valid
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import build as arms
 from armkin.model.arm import Arm

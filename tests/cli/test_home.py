@@ -9,7 +9,7 @@ import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.homing import switches
 from armkin.board.sim.sim_board import SimBoard
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from command_line import ROOT, THREE_DOF, run
 from pty_board import PtyBoard
 from sim_wire import plug_in

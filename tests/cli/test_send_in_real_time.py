@@ -19,7 +19,7 @@ import pytest
 
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.sim.sim_board import SimBoard
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, patiently, process, run
 from pty_board import PtyBoard
 from pty_port import Patient

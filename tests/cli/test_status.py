@@ -12,7 +12,7 @@ import pytest
 
 from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.sim.sim_board import SimBoard
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.cli.commands import status
 from command_line import ROOT, THREE_DOF, run
 from sim_wire import plug_in

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from emulator import MCU, EmulatedBoard, build_firmware
 
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.flash import images
 from command_line import run
 

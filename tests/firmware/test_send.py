@@ -143,7 +143,7 @@ def test_servos_ramp_from_the_pose_that_they_are_said_to_have(tmp_path: Path) ->
 
 def test_what_the_host_knows_of_the_boards_is_what_they_say() -> None:
     from armkin.board.firmware.wire.session import Session
-    from armkin.board_kinds import BOARDS
+    from armkin.board_catalogue import BOARDS
 
     for kind, known in BOARDS.items():
         with EmulatedBoard(kind) as board:

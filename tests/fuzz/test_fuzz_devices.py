@@ -22,7 +22,7 @@ from armkin.board.sim.sim_grbl import Grbl
 from armkin.board.sim.sim_klipper import Klipper
 from armkin.board.sim.sim_port import SimPort
 from armkin.board.sim.sim_servo_bus import Servo, ServoBus
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from command_line import ROOT
 
 GRBL_ARM = ROOT / "tests/robots/three_dof_grbl.yaml"

@@ -22,7 +22,7 @@ import yaml
 sys.path.append(str(Path(__file__).parents[1]))
 
 import armkin
-from armkin import installed_kinds
+from armkin import board_catalogue
 from armkin.board.backend.board import Board
 from armkin.board.backend.motion_start import Laid
 from armkin.board.firmware.wire.protocol import State
@@ -32,7 +32,7 @@ from armkin.board.kinds.klipper import KlipperBoard
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
 from armkin.board.stop_signals import Stop
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.keep_out.body_pairs import Guard, guard
 from armkin.motion.timing.trajectory import Trajectory
 from command_line import ROOT, Result, run
@@ -175,8 +175,8 @@ def arms() -> Iterator[Arms]:
         (offered / "entry_points.txt").write_text("[armkin.boards]\ndynamixel = armkin_dynamixel\n")
         packages = [str(offered.parent), str(ROOT / "examples/board_plugin/src"), *sys.path]
         stack.enter_context(mock.patch.object(sys, "path", packages))
-        installed_kinds._offered.cache_clear()
-        stack.callback(installed_kinds._offered.cache_clear)
+        board_catalogue._entry_points.cache_clear()
+        stack.callback(board_catalogue._entry_points.cache_clear)
         stack.enter_context(mock.patch.dict("os.environ", XDG_STATE_HOME=str(folder)))
         found, checked = Arms(folder), Laid.__post_init__
 

@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 from typing import NamedTuple
 
-from armkin.board_kinds import BOARDS
+from armkin.board_catalogue import BOARDS
 from armkin.errors import MissingExtraError
 
 FOLDER = Path(__file__).parent / "images"

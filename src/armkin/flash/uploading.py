@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from armkin.board.firmware.wire.session import Session
 from armkin.board.ports import SerialPort, list_ports
-from armkin.board_kinds import BOARDS, board_name
+from armkin.board_catalogue import BOARDS, board_name
 from armkin.errors import LinkError
 from armkin.flash import avrdude, boot_drive, intel_hex
 from armkin.flash.images import Image

@@ -10,13 +10,13 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from armkin import board_kinds, installed_kinds
-from armkin.board_kinds import BOARDS
+from armkin import board_catalogue
+from armkin.board_catalogue import BOARDS
 from armkin.robot_file.drive_checks import Path, Problem, of_drive, reach_of_drive
 from armkin.robot_file.robot_keys import Triple, dot
 
 if TYPE_CHECKING:
-    from armkin.board_kinds import ForeignBoard
+    from armkin.board_catalogue import ForeignBoard
     from armkin.robot_file.robot_keys import Board, Drive, Gripper, Joint, Motor, RobotKeys, Screw
 
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
@@ -256,7 +256,7 @@ def _servo_travel(gripper: Gripper, low: float, high: float) -> Iterator[Problem
 def _axes(robot: RobotKeys) -> Iterator[Problem]:
     """Each axis is used once, and the board has it."""
     board = robot.board
-    foreign = None if board is None else installed_kinds.foreign(board.kind)
+    foreign = None if board is None else board_catalogue.foreign_board(board.kind)
     used: set[tuple[str, object]] = set()
     for path, drive in _drives(robot, foreign):
         if board is not None and drive.kind == "bus" and board.kind in BOARDS:
@@ -313,7 +313,7 @@ def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
     yield from _inputs(robot, settings, board)
 
 
-def _inputs(robot: RobotKeys, settings: Board, board: board_kinds.Board) -> Iterator[Problem]:
+def _inputs(robot: RobotKeys, settings: Board, board: board_catalogue.Board) -> Iterator[Problem]:
     """The board senses what it is to sense."""
     if settings.power not in (None, board.power):
         yield ("board", "power"), f"{settings.kind} senses the motors' power at {board.power}, not {settings.power}"

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from armkin import installed_kinds
+from armkin import board_catalogue
 from armkin.robot_file.key_types import Angle, Length, Model
 
 MAX_JOINTS = 12
@@ -27,8 +27,8 @@ Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
 
 
 def _installed(kind: str) -> str:
-    if not installed_kinds.exists(kind):
-        *others, last = map(repr, installed_kinds.names())
+    if not board_catalogue.kind_exists(kind):
+        *others, last = map(repr, board_catalogue.kind_names())
         raise PydanticCustomError(
             "literal_error", "Input should be {expected}", {"expected": f"{', '.join(others)} or {last}"}
         )
@@ -36,7 +36,7 @@ def _installed(kind: str) -> str:
 
 
 def _kinds(schema: dict[str, Any]) -> None:
-    schema["enum"] = list(installed_kinds.names())
+    schema["enum"] = list(board_catalogue.kind_names())
 
 
 BoardKind = Annotated[str, AfterValidator(_installed), Field(json_schema_extra=_kinds)]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from armkin.board.backend.servo_arm import ServoArm, servo_ids
 from armkin.board.kinds.feetech import ServoBusBoard
 from armkin.board.ports import Port
-from armkin.board_kinds import ForeignBoard
+from armkin.board_catalogue import ForeignBoard
 from armkin.formula.arrays import Array
 from armkin.motors import pulses
 from armkin_dynamixel.bus import FAULT, LEAST, MOST, PROFILE, Bus

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armkin import installed_kinds
-from armkin.board_kinds import BOARDS, DRIVERS
+from armkin import board_catalogue
+from armkin.board_catalogue import BOARDS, DRIVERS
 from armkin.errors import UsageError
 from armkin.motion.joint_moves import missing_rates, rate_lines
 from armkin.motors import joints_per_pulse, undriven
 
 if TYPE_CHECKING:
-    from armkin.board_kinds import ForeignBoard
+    from armkin.board_catalogue import ForeignBoard
     from armkin.model.arm import Arm
     from armkin.robot_file.robot_keys import Board, Drive
 
@@ -87,7 +87,7 @@ def _drive_lines(arm: Arm, still: list[str], board: bool) -> list[str]:
 def _axes(arm: Arm) -> tuple[str, ...]:
     """Names of the stepper axes of the arm's board, or of the one that `without_board` proposes."""
     kind = _board_for(arm) if arm.board is None else arm.board.kind
-    other = installed_kinds.foreign(kind)
+    other = board_catalogue.foreign_board(kind)
     return BOARDS[kind].steppers if other is None else other.axes
 
 
@@ -104,9 +104,9 @@ def without_board(arm: Arm) -> list[Lack]:
     if arm.board is None:
         kind = _board_for(arm)
         driver = f", driver: {_DRIVER}" if any(m.kind == "stepper" for m in arm.motors) or undriven(arm) else ""
-        choice = f"kinds: {', '.join(installed_kinds.names())}; drivers: {', '.join(DRIVERS)}"
+        choice = f"kinds: {', '.join(board_catalogue.kind_names())}; drivers: {', '.join(DRIVERS)}"
         return [("it has no board", [f"board: {{kind: {kind}{driver}}}   # for example; {choice}"])]
-    foreign = installed_kinds.foreign(arm.board.kind)
+    foreign = board_catalogue.foreign_board(arm.board.kind)
     return _without_driver(arm, arm.board) if foreign is None else _without_foreign_axes(arm, foreign)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from armkin.board.backend import missing_keys
 from armkin.board.firmware.gripper_counts import Grip, as_axis
 from armkin.board.firmware.wire.protocol import AxisImage, GuardImage, Image, RowImage
-from armkin.board_kinds import BOARDS, DRIVERS, Board, Driver
+from armkin.board_catalogue import BOARDS, DRIVERS, Board, Driver
 from armkin.errors import UsageError
 from armkin.motors import motor_accel, pulse_range, pulses
 

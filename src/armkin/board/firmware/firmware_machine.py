@@ -18,7 +18,7 @@ from armkin.board.firmware.segments import trajectory_to_counts
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Flag, Status
 from armkin.board.firmware.wire.session import DeviceError, Session, probe
-from armkin.board_kinds import board_name
+from armkin.board_catalogue import board_name
 from armkin.errors import LinkError, PositionKnownError
 from armkin.model.units import joints_out
 from armkin.motors import pulses

@@ -1,15 +1,15 @@
 """The kinds of boards, one file a kind, found by its name: what stands behind `board: {kind: ...}`.
 
-A module has KIND, its data (`armkin.board_kinds.ForeignBoard`), and BOARD, its class (`armkin.board.backend.board`);
-boards with armkin's own firmware are rows of `armkin.board_kinds.BOARDS`, and `firmware.py` serves them all.
+A module has KIND, its data (`board_catalogue.ForeignBoard`), and BOARD, its class (`armkin.board.backend.board`);
+boards with armkin's own firmware are rows of `board_catalogue.BOARDS`, and `firmware.py` serves them all.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armkin import installed_kinds
-from armkin.board_kinds import BOARDS
+from armkin import board_catalogue
+from armkin.board_catalogue import BOARDS
 
 if TYPE_CHECKING:
     from armkin.board.backend.board import Board
@@ -24,5 +24,5 @@ def board_of(arm: Arm, *, rehearsal: bool = False) -> Board:
     Raises UsageError, naming what is missing, if the arm cannot be driven.
     """
     kind = "firmware" if arm.board is None or arm.board.kind in BOARDS else arm.board.kind
-    board: Board = installed_kinds.module(kind).BOARD(arm, rehearsal=rehearsal)
+    board: Board = board_catalogue.kind_module(kind).BOARD(arm, rehearsal=rehearsal)
     return board

@@ -13,7 +13,7 @@ from armkin.board.feetech import registers, servo_gripper
 from armkin.board.feetech.bus import Bus
 from armkin.board.feetech.feetech_machine import ServoMachine, job, servo_ids
 from armkin.board.feetech.lerobot import Calibrated, calibrated
-from armkin.board_kinds import ForeignBoard
+from armkin.board_catalogue import ForeignBoard
 from armkin.motors import pulses
 
 if TYPE_CHECKING:

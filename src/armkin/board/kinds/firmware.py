@@ -21,7 +21,7 @@ from armkin.errors import HomingIncompleteError
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin import board_kinds
+    from armkin import board_catalogue
     from armkin.board.backend import Planned, StoppedError
     from armkin.board.firmware.gripper_counts import Grip
     from armkin.board.ports import Port
@@ -35,7 +35,7 @@ Switches = Callable[[int, Sequence[int]], bool]  # number of an input, net steps
 def open_port(
     name: str,
     *,
-    board: board_kinds.Board,
+    board: board_catalogue.Board,
     baud: int = BAUD,
     switches: Switches | None = None,
     reset: bool = True,

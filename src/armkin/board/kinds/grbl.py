@@ -14,7 +14,7 @@ from armkin.board.grbl.grbl_session import Session
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import wanted
 from armkin.board.grbl.trajectory_to_gcode import job
-from armkin.board_kinds import ForeignBoard
+from armkin.board_catalogue import ForeignBoard
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.motors import pulses

@@ -14,7 +14,7 @@ from armkin.board.klipper.api import Api
 from armkin.board.klipper.extra_axes import SOCKETS, axes_of, printer_cfg, settings_of
 from armkin.board.klipper.klipper_machine import KlipperMachine, job
 from armkin.board.ports import SIM, SocketPort, is_socket
-from armkin.board_kinds import ForeignBoard
+from armkin.board_catalogue import ForeignBoard
 
 if TYPE_CHECKING:
     from armkin.board.backend import Planned

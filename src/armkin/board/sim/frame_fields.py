@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import AxisImage, Error, Image, RowImage, Segment
-from armkin.board_kinds import Board
+from armkin.board_catalogue import Board
 
 
 class RefusedError(Exception):

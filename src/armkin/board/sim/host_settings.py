@@ -6,7 +6,7 @@ import zlib
 
 from armkin.board.firmware.wire.protocol import AxisImage, Error, Image
 from armkin.board.sim.frame_fields import RefusedError, image_valid
-from armkin.board_kinds import Board
+from armkin.board_catalogue import Board
 
 
 class Setup:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from armkin.board.firmware.wire.protocol import Error, Image, Segment
 from armkin.board.sim.frame_fields import RefusedError
-from armkin.board_kinds import Board
+from armkin.board_catalogue import Board
 
 _ALL = 0xFFFF
 _UNCHECKED = 1 << 23  # change in a window from which on an acceleration is not checked

@@ -17,7 +17,7 @@ from armkin.board.sim.digital_inputs import Inputs
 from armkin.board.sim.frame_fields import RefusedError
 from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.sim_motors import Motors
-from armkin.board_kinds import Board
+from armkin.board_catalogue import Board
 
 _SILENCE = 0.5  # [s]
 

@@ -61,7 +61,7 @@ def _text(found: dict[str, object]) -> str:
 
 
 def _kind(robot: str | None, board: str | None) -> str:
-    from armkin.board_kinds import BOARDS
+    from armkin.board_catalogue import BOARDS
 
     named = board
     if robot is not None:

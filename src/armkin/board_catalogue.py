@@ -1,13 +1,23 @@
-"""What the host must know of each board before it is connected: one entry a board, one a driver.
+"""The boards that armkin knows before one is connected: data of each board and driver, and which kinds are installed.
 
 A new board for our firmware is a row of BOARDS; a new kind, with somebody else's firmware, is a file in `board/kinds/`
-with KIND, a `ForeignBoard`, and BOARD, its class: `installed_kinds` finds it by its name. CONTRIBUTING.md has the walk.
-The pin maps are the firmware's (`firmware/src/boards/`); a test holds the two tables together.
+with KIND, a `ForeignBoard`, and BOARD, its class (`armkin.board.backend.board`), and is found by its name.
+CONTRIBUTING.md has the walk. Another package offers a kind as an entry point of the group `armkin.boards`, looked up
+when a file names a kind that armkin has not. The pin maps are the firmware's (`firmware/src/boards/`); a test holds
+the two tables together.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from pkgutil import iter_modules
+from typing import Any, NamedTuple
+
+GROUP = "armkin.boards"
+_KINDS = "armkin.board.kinds"  # above this room: found by name, as other packages are
+_FIRMWARE = "firmware"  # the module of all of BOARDS
 
 
 class Board(NamedTuple):
@@ -112,3 +122,39 @@ DRIVERS = {
     "TMC2208": Driver(1, 1, 1, 1),
     "TMC2209": Driver(1, 1, 1, 1),
 }
+
+
+@cache
+def own_kinds() -> tuple[str, ...]:
+    """Names of armkin's own kinds, as in a robot file: firmware's boards, then others."""
+    folder = import_module(_KINDS).__path__
+    return (*BOARDS, *sorted(name for _, name, _ in iter_modules(folder) if name != _FIRMWARE))
+
+
+@cache
+def _entry_points() -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=GROUP) if point.name not in own_kinds()}
+
+
+def kind_names() -> tuple[str, ...]:
+    """Names of all kinds that are installed."""
+    return (*own_kinds(), *sorted(_entry_points()))
+
+
+def kind_exists(kind: str) -> bool:
+    """Whether a kind is installed; other packages are asked only for what armkin has not."""
+    return kind in own_kinds() or kind in _entry_points()
+
+
+def kind_module(kind: str) -> Any:
+    """The module of a kind with other firmware; `firmware`: of armkin's own."""
+    ours = kind == _FIRMWARE or kind in own_kinds()
+    return import_module(f"{_KINDS}.{kind}") if ours else _entry_points()[kind].load()
+
+
+def foreign_board(kind: str) -> ForeignBoard | None:
+    """The data of a kind with other firmware; None for armkin's own, and for what is not installed."""
+    if kind in BOARDS or not kind_exists(kind):
+        return None
+    found: ForeignBoard = kind_module(kind).KIND
+    return found
