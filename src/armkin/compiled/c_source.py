@@ -94,10 +94,10 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         if geometry is not None and _judges(arm, task, geometry) and branches <= LANES:
             parts.append(c_functions.jacobian(arm))
             folds = c_program.filled(
-                _part("folds").replace("@followed@", _part("followed") + "\n"), _of_folds(arm, task) | fields
+                _part("folds").replace("@followed@", _part("branch_to_fold") + "\n"), _of_folds(arm, task) | fields
             )
-        parts += [_part("sizes"), solve, part("copies"), _choose(arm, branches), _part(gather), folds, _part("batch")]
-        parts += [_part("rows")] if has_rows(task, geometry) else []
+        parts += [_part("lane_sizes"), solve, part("whole_turns"), _choose(arm, branches), _part(gather), folds, _part("batch")]
+        parts += [_part("elimination_rows")] if has_rows(task, geometry) else []
     text = c_program.filled("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
     return Library(text.replace("@content@", content), content, branches, level)
@@ -176,7 +176,7 @@ def _part(name: str) -> str:
 
 def _of_joints(what: str, formula: str, size: int) -> str:
     """A loop over a batch of joint values."""
-    return c_program.filled(_part("of_joints"), {"what": what, "formula": formula, "size": str(size)})
+    return c_program.filled(_part("joint_batches"), {"what": what, "formula": formula, "size": str(size)})
 
 
 def _fast_numbers() -> str:
@@ -206,7 +206,7 @@ def _choose(arm: Arm, branches: int) -> str:
         choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, turned, positive), strict=True)
         loops.append(f"wide = {wide};\n" + " ".join(f"{when} {{\n{loop}\n}}" for when, loop in choices))
     body = "\n".join(f"        {line}" for line in "\n".join(loops).splitlines())
-    return f"""{_part("wide")}
+    return f"""{_part("half_turn_in_limits")}
 static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,
     int count)
 {{

@@ -23,7 +23,7 @@ SETTLED = 2  # what `arm_rows` says is less where a target's branches are all, a
 
 
 class InC:
-    """A class whose rows come from `arm_rows` of parts/rows.c; what that does not settle, from Python."""
+    """A class whose rows come from `arm_rows` of parts/elimination_rows.c; what that does not settle, from Python."""
 
     def __init__(
         self, geometry: Geometry, plain: Geometry, call: Callable[..., Any], branches: int, joints: int

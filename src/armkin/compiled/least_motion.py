@@ -15,7 +15,7 @@ from armkin.compiled import toolchain
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import EQUAL
 
-SOURCE = Path(__file__).parent / "parts" / "nearest.c"
+SOURCE = Path(__file__).parent / "parts" / "least_motion.c"
 MOST = 7  # joints that numpy adds up from left to right
 
 
@@ -33,7 +33,7 @@ def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[
 
 @cache
 def _library() -> Any:
-    """`arm_nearest` of parts/nearest.c. Raises MissingExtraError without a C compiler."""
+    """`arm_nearest` of parts/least_motion.c. Raises MissingExtraError without a C compiler."""
     text = SOURCE.read_text(encoding="utf-8")
     content = hashlib.sha256(text.encode()).hexdigest()
     found = toolchain.load(text.replace("@content@", content), content, 3).arm_nearest

@@ -73,7 +73,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "reach": number(arm.reach, single),
         "orientation": _orientation(arm, task, single),
         "most": "arm_most(target)" if task.orientation == "full" else "ARM_SOLUTION",
-        "elsewhere": part("elsewhere").replace("@reach@", number(arm.reach, single))
+        "other_held_values": part("other_held_values").replace("@reach@", number(arm.reach, single))
         if geometry.pairs is not None
         else "",
         "lower": _numbers(turned.lower, single),
@@ -90,7 +90,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         c_functions.jacobian(arm, single),
         c_functions.target(arm, task, single),
         solve,
-        part("copies"),
+        part("whole_turns"),
         part({"full": "read_pose", "axis": "read_axis"}.get(task.orientation, "read_numbers")),
         part("ik"),
         part("source_tail"),

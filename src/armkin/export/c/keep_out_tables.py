@@ -80,7 +80,7 @@ def free(arm: Arm) -> str:
     """`arm_free`, and the names of pairs."""
     names = tables(arm).pairs or [("", "")]
     pairs = ",\n    ".join("{" + ", ".join(f'"{_quoted(name)}"' for name in pair) + "}" for pair in names)
-    return part("free").replace("@pairs@", pairs)
+    return part("free_posture").replace("@pairs@", pairs)
 
 
 def _quoted(name: str) -> str:

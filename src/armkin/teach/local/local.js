@@ -5,7 +5,7 @@ import * as arm from "armkin/arm.js";
 // @ts-ignore
 import { plan, slice, solver, arm as scene } from "armkin/data.js";
 import { absent, get, make } from "../static/js/dom.js";
-import { solving } from "../static/js/solving.js";
+import { solving } from "../static/js/browser_answers.js";
 
 /** An action that is refused. */
 export class Refused extends Error {}

@@ -92,7 +92,7 @@ int arm_ik(const arm_real *target, const arm_real *near, arm_solution *out, int 
     for (b = 0; b < ARM_BRANCHES; b++)
         *edge |= !(miss[b] <= ARM_ACCEPTED) & !(miss[b] > ARM_NEARBY);
     *edge = *edge != 0;
-@elsewhere@    for (b = 0; b < ARM_BRANCHES; b++) {
+@other_held_values@    for (b = 0; b < ARM_BRANCHES; b++) {
         arm_solution *one = &out[count];
         int inside = 1, again = 0;
         if (!(miss[b] <= ARM_SOLUTION))

@@ -2,7 +2,7 @@
 /** The board: where the arm stands, and what it is told to do. Nothing here moves it but a button. */
 import { fixed, get } from "./dom.js";
 import { Jog } from "./jog.js";
-import { Live } from "./live.js";
+import { Live } from "./live_motion.js";
 import { act } from "./server.js";
 
 const WORDS = /** @type {Object<string, string>} */ ({

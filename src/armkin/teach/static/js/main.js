@@ -3,17 +3,17 @@
 import { Board } from "./board.js";
 import { isFlat } from "./chain.js";
 import { get } from "./dom.js";
-import { Held } from "./held.js";
+import { Held } from "./held_joint.js";
 import { Joints } from "./joints.js";
 import { keys } from "./keys.js";
-import { Latest } from "./latest.js";
+import { Latest } from "./latest_request.js";
 import { Motors } from "./motors.js";
 import { Program } from "./program.js";
 import { act, enter } from "./server.js";
-import { ownSolver } from "./solving.js";
+import { ownSolver } from "./browser_answers.js";
 import { theme } from "./theme.js";
-import { Tip } from "./tip.js";
-import { begun, trouble } from "./trouble.js";
+import { Tip } from "./tip_target.js";
+import { begun, trouble } from "./error_line.js";
 
 /** @typedef {import("./types.js").Look} Look */
 

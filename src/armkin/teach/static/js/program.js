@@ -1,8 +1,8 @@
 // @ts-check
 /** The program: record, name, reorder, delete, undo; save and load the path file. */
 import { fixed, get, make } from "./dom.js";
-import { Latest } from "./latest.js";
-import { Rows } from "./moves.js";
+import { Latest } from "./latest_request.js";
+import { Rows } from "./move_list.js";
 import { Player } from "./player.js";
 import { act } from "./server.js";
 

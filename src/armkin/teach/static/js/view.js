@@ -6,14 +6,14 @@ import {
 } from "three";
 import { OrbitControls } from "/vendor/three/OrbitControls.js";
 import { Figure, Shapes } from "./bodies.js";
-import { POSTURES, cloud } from "./cloud.js";
+import { POSTURES, cloud } from "./workspace_cloud.js";
 import { get } from "./dom.js";
 import { Ghosts } from "./ghosts.js";
 import { Gizmo } from "./gizmo.js";
-import { Pointing } from "./pointing.js";
+import { Pointing } from "./ghost_pointing.js";
 import { printing } from "./printing.js";
 import { Floor, glass, light } from "./scenery.js";
-import { Slice } from "./slice.js";
+import { Slice } from "./reach_slice.js";
 
 const EYES = { space: [1.25, -1.5, 0.85], front: [2.1, 0, 0.12], side: [0, -2.1, 0.12], top: [0, -0.001, 2.3] };
 

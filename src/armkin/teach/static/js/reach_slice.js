@@ -3,7 +3,7 @@
 import { BoxGeometry, Color, InstancedMesh, Matrix4, MeshBasicMaterial } from "three";
 import { get } from "./dom.js";
 import { act } from "./server.js";
-import { trouble } from "./trouble.js";
+import { trouble } from "./error_line.js";
 
 const COLOURS = [0x440154, 0x3b528b, 0x21918c, 0x5ec962, 0xfde725]; // viridis: a share of 0 to 1
 

@@ -46,7 +46,7 @@ export class Pointing {
     });
   }
 
-  /** Tell the list of branches. @param {import("./tip.js").Tip} tip */
+  /** Tell the list of branches. @param {import("./tip_target.js").Tip} tip */
   with(tip) {
     this.pointed = (name) => tip.point(name);
     this.chose = (name) => tip.choose(tip.rows.findIndex(({ branch, chosen }) => branch.name === name && !chosen));
