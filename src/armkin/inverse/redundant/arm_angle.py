@@ -26,7 +26,7 @@ from armkin.model.rotation import inverse, rotation_about
 
 TURN = 2 * np.pi
 EVEN = 24  # samples of a turn besides the roots
-STEPS = 20  # of the golden section: the kinks of the motion from near are samples
+STEPS = 8  # of the golden section: the kinks of the motion from near are samples, and a parabola ends it
 JOINTS = (0, 1, 2), (4, 5, 6)  # of the shoulder and of the wrist
 
 

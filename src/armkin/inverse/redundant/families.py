@@ -27,7 +27,7 @@ from armkin.inverse.redundant.answers_on_planes import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
 from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
-from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion
+from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion, vertex
 from armkin.inverse.redundant.other_joints import Follower, Ik
 from armkin.inverse.redundant.traced_families import Traced, traced
 from armkin.inverse.solvers.redundant import Redundancy, moved, nearly_closed, redundancy
@@ -38,7 +38,7 @@ from armkin.model.arm import Arm, actual
 from armkin.model.limits import outside
 
 AT_ONCE = 96_000  # targets of the other joints solved together
-CIRCLES = 64  # targets whose arm angles are worked on together
+CIRCLES = 256  # targets whose arm angles are worked on together
 TRACED = 250  # and whose curves are traced together
 FREE = np.deg2rad(0.1)  # [rad] step of the parameter between postures that are asked whether they are free
 
@@ -251,13 +251,15 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
     beside = [costs(some, p.at + PROBE * (end - p.at)) for end in (p.low, p.high)]
     some = some[np.minimum(*beside) < motion(arm, p.start, near[some])]
     p = rows_of(curves.pieces, some)
-    low, high, *_ = golden_section(lambda t: costs(some, t), p.low, p.high, curves.steps)
-    if len(some):  # where a joint passes its near in what is left the motion has a kink: by a secant
-        ends = [curves.at(p, t)[0] - near[some] for t in (low, high)]
+    low, high, middle, value = golden_section(lambda t: costs(some, t), p.low, p.high, curves.steps)
+    if len(some):  # in what is left: by a secant where a joint passes its near, a kink of the motion; by a parabola
+        q = [curves.at(p, t)[0] for t in (low, high)]
+        ends = [end - near[some] for end in q]
         passes = np.where(ends[0] * ends[1] < 0, np.abs(ends[1] - ends[0]), 0.0)
         index = np.arange(len(some)), passes.argmax(axis=1)
         a, b = (end[index] for end in ends)
         costs(some, np.where(a * b < 0, low + (high - low) * a / np.where(a == b, 1.0, a - b), low))
+        costs(some, vertex(low, middle, high, *(motion(arm, end, near[some]) for end in q), value))
     return best
 
 

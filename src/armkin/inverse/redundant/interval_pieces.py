@@ -137,3 +137,11 @@ def golden_section(
         left, right = np.where(go, new, right), np.where(go, left, new)
         at_left, at_right = np.where(go, at_new, at_right), np.where(go, at_left, at_new)
     return low, high, np.where(at_left <= at_right, left, right), np.minimum(at_left, at_right)
+
+
+def vertex(low: Array, middle: Array, high: Array, at_low: Array, at_high: Array, at_middle: Array) -> Array:
+    """Where the parabola through a cost at low, middle and high (M,) is least; middle where that is not between."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        a, b = (middle - low) * (at_middle - at_high), (middle - high) * (at_middle - at_low)
+        t = middle - 0.5 * ((middle - low) * a - (middle - high) * b) / (a - b)
+        return np.asarray(np.where((t > low) & (t < high), t, middle))
