@@ -87,6 +87,15 @@ class _Buffers:
         for x in nodes:
             self._free.setdefault(self._kinds[id(x)], []).append(self.names[id(x)])
 
+    def follow(self, node: Node, over: list[Node]) -> None:
+        """A buffer for a value that is the last to read some others: one of theirs, unless a flip would read it."""
+        if node.op in FLIPS:
+            self.take(node)
+            self.release(over)
+        else:
+            self.release(over)
+            self.take(node)
+
 
 def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]]:
     """One numpy call a line, its result in a buffer that is free again after its last use.
@@ -97,31 +106,15 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
     """
     terms = {id(node): _term(node) for node in recording.nodes}
     both_signs, buffers = _both_signs(recording, terms), _Buffers(recording)
-    reads = {
-        id(node): [y for x in node.args for y in (x.args if id(x) in both_signs else [x]) if isinstance(y, Node)]
-        for node in recording.nodes
-    }
-    last = {id(x): k for k, node in enumerate(recording.nodes) if id(node) not in both_signs for x in reads[id(node)]}
-    last |= {id(x): len(recording.nodes) for x in recording.outputs}
-    lines = []
-    for k, node in enumerate(recording.nodes):
-        if id(node) in both_signs:
-            continue
-        term = terms[id(node)]
-        signed = term if id(term) in both_signs else None
+    written = [node for node in recording.nodes if id(node) not in both_signs]
+    reads = [_read(node, both_signs) for node in written]
+    last = _last_lines([*reads, recording.outputs])
+    lines: list[str] = []
+    for k, node in enumerate(written):
+        signed = term if id(term := terms[id(node)]) in both_signs else None
         arguments = [buffers.name(x) for x in node.args] if signed is None else []
-        over = [x for x in {id(x): x for x in reads[id(node)]}.values() if x.op != "input" and last[id(x)] == k]
-        if node.op not in FLIPS:  # a flip must not write where it reads
-            buffers.release(over)
-        buffers.take(node)
-        if node.op in FLIPS:
-            buffers.release(over)
-        if signed is None:
-            # numpy deprecates a positional third argument of minimum and maximum
-            out = "out=" if node.op in ("minimum", "maximum") else ""
-            lines.append(f"{node.op}({', '.join(arguments)}, {out}{buffers.names[id(node)]})")
-        else:
-            lines += _halves(buffers, node, signed)
+        buffers.follow(node, [x for x in reads[k] if x.op != "input" and last[id(x)] == k])
+        lines += [_call(buffers, node, arguments)] if signed is None else _halves(buffers, node, signed)
     parameters = [buffers.names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers.all))]
     outputs = list(map(buffers.name, recording.outputs))
     return function_of(parameters, lines, outputs, buffers.constants | _functions(recording, scalar)), buffers.all
@@ -134,6 +127,23 @@ def _functions(recording: Recording, scalar: bool) -> dict[str, Any]:
     if scalar:
         found |= {op: partial(_one_by_one, function) for op, function in _ROUNDED.items()}
     return found | {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in found}
+
+
+def _read(node: Node, both_signs: set[int]) -> list[Node]:
+    """The values that a node's line reads, each once: of a value with both signs those that it is made of."""
+    arguments = [y for x in node.args for y in (x.args if id(x) in both_signs else [x])]
+    return list({id(y): y for y in arguments if isinstance(y, Node)}.values())
+
+
+def _last_lines(reads: list[list[Node]]) -> dict[int, int]:
+    """The last line that reads each value, by node; outputs are read behind all lines."""
+    return {id(x): k for k, nodes in enumerate(reads) for x in nodes}
+
+
+def _call(buffers: _Buffers, node: Node, arguments: list[str]) -> str:
+    """The line of a function of arguments."""
+    out = "out=" if node.op in ("minimum", "maximum") else ""  # numpy deprecates a positional third argument of these
+    return f"{node.op}({', '.join(arguments)}, {out}{buffers.names[id(node)]})"
 
 
 def _halves(buffers: _Buffers, node: Node, signed: Node) -> Iterator[str]:

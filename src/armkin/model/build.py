@@ -43,17 +43,9 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
         link,
         [j.type == "prismatic" for j in file.joints],
         name=file.name,
-        joint_names=tuple(j.name for j in file.joints),
         frame=frame,
         base=base,
-        limits=[(-math.inf, math.inf) if j.limits is None else j.limits for j in file.joints] * unit[:, None],
-        home=np.array([j.home for j in file.joints]) * unit,
-        max_speed=_numbers(j.max_speed for j in file.joints) * unit,
-        max_accel=_numbers(j.max_accel for j in file.joints) * unit,
-        max_jerk=_numbers(j.max_jerk for j in file.joints) * unit,
-        dh_sign=[float(j.sign) for j in file.joints],
-        dh_theta=[0.0 if j.dh is None else math.radians(j.dh.theta) for j in file.joints],
-        ratio=[j.ratio for j in file.joints],
+        **_of_joints(file.joints, unit),
         pitch_offset=math.radians(file.pitch_offset),
         task=file.task,
         motor_gain=gain,
@@ -62,8 +54,6 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
         motors=file.motor_list(),
         **_keep_outs(file, scene),
         tool=None if tool is None else tuple(map(float, tool)),
-        homing=tuple(j.homing for j in file.joints),
-        hard_limits=tuple(j.homing is not None and j.hard_limits is not False for j in file.joints),
         gripper=file.gripper,
         board=file.board,
         path=file.path,
@@ -72,6 +62,23 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
         source=file.source,
         file=file,
     )
+
+
+def _of_joints(joints: Sequence[Joint], unit: Array) -> dict[str, Any]:
+    """The arm's fields that have an entry for each joint; unit: (n,) rad | mm of the file's degree | mm."""
+    return {
+        "joint_names": tuple(j.name for j in joints),
+        "limits": [(-math.inf, math.inf) if j.limits is None else j.limits for j in joints] * unit[:, None],
+        "home": np.array([j.home for j in joints]) * unit,
+        "max_speed": _numbers(j.max_speed for j in joints) * unit,
+        "max_accel": _numbers(j.max_accel for j in joints) * unit,
+        "max_jerk": _numbers(j.max_jerk for j in joints) * unit,
+        "dh_sign": [float(j.sign) for j in joints],
+        "dh_theta": [0.0 if j.dh is None else math.radians(j.dh.theta) for j in joints],
+        "ratio": [j.ratio for j in joints],
+        "homing": tuple(j.homing for j in joints),
+        "hard_limits": tuple(j.homing is not None and j.hard_limits is not False for j in joints),
+    }
 
 
 def _chain(file: RobotFile, base: Array) -> tuple[list[Array], list[Array]]:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from armkin.errors import NoSolutionError, UsageError
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
-from armkin.inverse.answers.solutions import Status
+from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.solve import isolated as ik
 from armkin.inverse.tasks.choose_task import task_for
@@ -334,15 +334,20 @@ def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
     free = found.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
     good = found.valid & found.within_limits & (True if free is None else free)
     postures = tuple(found.q[b] for b in found.order if good[b] and (meant is None or found.branch[b] in meant))
-    if postures:
-        return postures
+    if not postures:
+        raise _no_posture(found, goal, wanted, free)
+    return postures
+
+
+def _no_posture(found: Solutions, goal: Spot, wanted: str | None, free: Bool | None) -> NoSolutionError:
+    """Why a target has none: it is out of reach, or of its branches (those `wanted`) none is free or within limits."""
     what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
     if found.status == Status.UNREACHABLE:
-        raise NoSolutionError(f"{what} is out of reach: nothing was moved")
+        return NoSolutionError(f"{what} is out of reach: nothing was moved")
     on = f" on branch '{wanted}'" if wanted else ""
     if free is not None and (found.within_limits & ~free).any():
-        raise NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
-    raise NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
+        return NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
+    return NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
 
 
 def _kept(state: dict[str, Any]) -> dict[str, Any]:

@@ -56,30 +56,26 @@ def plot_poses(
     alone = len(poses) == 1
     shown = poses if names is not None else poses[_spread(len(poses))]
     bones = [skeleton(arm, pose) for pose in shown]
-    with_frames = alone if frames is None else frames
-    legal = [not outside(arm, pose).any() for pose in shown]
-    hit = [_briefly(found) for _, found in hits(arm, shown)] if arm.keep_out else [""] * len(shown)
+    legal: list[bool] = np.logical_not(outside(arm, shown).any(axis=1)).tolist()
+    hit = _hit(arm, shown)
     legend = ["start", "end"] if names is None else _legend(names, legal, hit)
     with picture(out, 8.0 if alone else 9.6, 5.8) as figure:
         track = None if alone or names is not None else fk(arm, _way(poses))[:, :3, 3]
         drawing = _Drawing(arm, figure, bones, view, track)
         drawing.keep_outs()
+        notes = []
         if alone:
             drawing.single(bones[0], _HIT if hit[0] else PALETTE[0])
+            drawing.name_joints(bones[0])
+            notes = _of_one(bones[0], legal[0], hit[0])
         else:
             _several(drawing, bones, legend, legal, hit, in_turn=names is None)
         if track is not None:
             drawing.track(track)
-        if with_frames:
-            for pose in shown:
-                drawing.frames(pose)
+        if alone if frames is None else frames:
+            notes.append(drawing.frames(shown))
         if target is not None:
             drawing.mark(np.asarray(target, dtype=float))
-        notes = _of_one(bones[0], legal[0], hit[0]) if alone else []
-        if with_frames:
-            notes.append("frames: x red, y green" + ("" if drawing.dimensions == 2 else ", z blue"))
-        if alone:
-            drawing.name_joints(bones[0])
         drawing.finish(arm.name if title is None else title, ";  ".join(notes), None if alone else legend)
 
 
@@ -127,6 +123,11 @@ def _legend(names: Sequence[str], legal: Sequence[bool], hit: Sequence[str]) -> 
     """Names of poses, with what is wrong with them."""
     legend = [name + ("" if ok else " (outside limits)") for name, ok in zip(names, legal, strict=True)]
     return ["\n".join([name, *wrap(what, _WIDE)]) for name, what in zip(legend, hit, strict=True)]
+
+
+def _hit(arm: Arm, poses: Array) -> list[str]:
+    """What each pose hits, in words: nothing where there are no keep-outs."""
+    return [_briefly(found) for _, found in hits(arm, poses)] if arm.keep_out else [""] * len(poses)
 
 
 def _briefly(found: list[Hit]) -> str:
@@ -232,13 +233,14 @@ class _Drawing:
         dots = {"marker": "o", "linestyle": "none", "markeredgecolor": colour, "markeredgewidth": 1.4}
         self.line(bone.joints, color="white", markersize=size, zorder=4, **dots)
 
-    def frames(self, pose: Array) -> None:
-        """The base's, every joint's and the tool's frame as short x, y and z axes."""
+    def frames(self, poses: Array) -> str:
+        """The base's, every joint's and the tool's frame as short x, y and z axes; returns what is noted of them."""
         length = 0.1 * self.size
-        for T in joint_frames(self.robot, pose):
+        for T in joint_frames(self.robot, poses).reshape(-1, 4, 4):
             for k, colour in enumerate(_AXES[: self.dimensions]):
                 ends = np.array([T[:3, 3], T[:3, 3] + length * T[:3, k]])
                 self.line(ends, color=colour, linewidth=1.6, zorder=6)
+        return "frames: x red, y green" + ("" if self.dimensions == 2 else ", z blue")
 
     def track(self, tips: Array) -> None:
         """The tip's way along a path."""

@@ -175,18 +175,8 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
     places = [count * protocol.STEP + protocol.HALF for count in at]
     source = (s.of(moving) for s in move.segments)
     todo: list[Segment] = list(islice(source, _SEEN))
-    pause, sizes = _start(session, todo, room, clock, least) if todo else (0.0, list[int]())
-    # Behind a rest, for which it may wait until less is left there: the queue is filled while that lasts.
-    waits = _soonest(seconds_of(todo[: _fit(todo, _BATCH[1], room)], clock)) if todo else 0.0
-    begins = not line.damaged and min(_left(session), waits) >= pause
-    if begins:
-        sizes = []
-    elif todo and (longer := later(todo[0], pause, clock)):
-        todo[0] = longer
-    elif todo:
-        ticks = math.ceil(pause * clock / _TICK)
-        todo.insert(0, Segment(ticks, math.ceil(pause * clock / ticks), 0, (0,) * len(moving)))
-        sizes[0] += 1
+    sizes = _paused(session, todo, room, clock, least) if todo else []
+    begins = not sizes
     while todo := todo + list(islice(source, max(0, _BATCH[1] + 1 - len(todo)))):
         fits = _BATCH[1] if begins else max(_BATCH[0], session.pending[1])  # more would wait for room
         most = sizes.pop(0) if sizes else _BATCH[0] if line.noisy else min(fits, _BATCH[1])
@@ -199,6 +189,22 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
         end = [p // protocol.STEP for p in places]
         yield Batch([axes[k] for k in moving], at, end, part, not todo, clock, move.brake)
         at = end
+
+
+def _paused(session: Session, todo: list[Segment], room: int, clock: int, least: float) -> list[int]:
+    """Put the pause before a motion into its segments; how many of them its first frames have, none for no pause."""
+    pause, sizes = _start(session, todo, room, clock, least)
+    # Behind a rest, for which it may wait until less is left there: the queue is filled while that lasts.
+    waits = _soonest(seconds_of(todo[: _fit(todo, _BATCH[1], room)], clock))
+    if not session.line.damaged and min(_left(session), waits) >= pause:
+        return []
+    if longer := later(todo[0], pause, clock):
+        todo[0] = longer
+    else:
+        ticks = math.ceil(pause * clock / _TICK)
+        todo.insert(0, Segment(ticks, math.ceil(pause * clock / ticks), 0, (0,) * len(todo[0].rates)))
+        sizes[0] += 1
+    return sizes
 
 
 def seconds_of(segments: Sequence[Segment], clock: int) -> float:

@@ -6,7 +6,7 @@ there, which is linked to one of them. The other one's chain ends a few micromet
 
 from __future__ import annotations
 
-from itertools import islice
+from itertools import islice, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,23 +33,33 @@ def through_boundaries(
 ) -> list[Chain]:
     """Chains, and those that more of them make where they meet; fixed: (n,) the posture at the start, or None."""
     s, end = columns.s, len(columns.s) - 1
-    all_ = _across(s, all_, tolerance)
+    found = all_ = _across(s, all_, tolerance)
+    if not end:
+        return found
+    postures = columns.q[0][columns.valid[0]] if fixed is None else fixed[None]
+    found = _with(found, [one for c in all_ for one in _leaving(s, c, 0, postures, tolerance)])
+    for j in _inner(columns, all_):
+        postures = columns.q[j][columns.valid[j]]
+        to = [one for c in found for one in _arriving(s, c, j, postures, tolerance)]
+        # Beyond it, what was joined at one before it is what its last part was: `all_` has that.
+        on = [one for c in all_ for one in _leaving(s, c, j, postures, tolerance)]
+        ways = (_joined(a, b) for a, b in product(to, on) if _meet(a, b))
+        found += islice(ways, max(_WAYS - len(found), 0))
+    postures = columns.q[end][columns.valid[end]]
+    return _with(found, [one for c in found for one in _arriving(s, c, end, postures, tolerance)])
+
+
+def _inner(columns: Columns, all_: list[Chain]) -> list[int]:
+    """Samples between start and end on a boundary beside which a chain ends; none where they are many."""
     ends = np.unique([at for c in all_ for at in (c.first, c.last)])
     inner = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
-    rows = [j for j in inner.tolist() if len(ends) and np.abs(s[ends] - s[j]).min() <= _NEAR]
-    found = list(all_)
-    for j in [0, *(rows if len(rows) <= _MOST else []), end]:
-        postures = fixed[None] if j == 0 and fixed is not None else columns.q[j][columns.valid[j]]
-        to = [one for c in found for one in _arriving(s, c, j, postures, tolerance)] if j > 0 else []
-        # Beyond an inner boundary, what was joined at one before it is what its last part was: `all_` has that.
-        after = found if j == 0 else all_
-        on = [one for c in after for one in _leaving(s, c, j, postures, tolerance)] if j < end else []
-        if j in (0, end):
-            found += [c for c in (*to, *on) if c not in found]
-        else:
-            ways = (_joined(a, b) for a in to for b in on if _meet(a, b))
-            found += islice(ways, max(_WAYS - len(found), 0))
-    return found
+    rows = [j for j in inner.tolist() if len(ends) and np.abs(columns.s[ends] - columns.s[j]).min() <= _NEAR]
+    return rows if len(rows) <= _MOST else []
+
+
+def _with(found: list[Chain], more: list[Chain]) -> list[Chain]:
+    """Chains, and more that are not among them."""
+    return found + [c for c in more if c not in found]
 
 
 def _across(s: Array, all_: list[Chain], tolerance: float) -> list[Chain]:

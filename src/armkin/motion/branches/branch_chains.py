@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
 from armkin.motion.branches.branch_columns import Columns, Int
@@ -186,25 +186,34 @@ def fewest(all_: list[Chain], N: int, allowed: list[Chain] | None = None) -> lis
     the least motion: the sum over the samples of the greatest |dq| / max_speed.
     """
     runs: list[Run] = []
-    i = 0
-    alive = np.zeros(N + 1, bool)  # samples at which some run may begin
-    alive[N] = True
-    for chain in all_:
-        i0, i1 = min(chain.first, N), min(chain.last + 1, N)
-        alive[i0:i1] |= chain.reach[: i1 - i0] >= np.arange(i0, i1)
+    i, alive = 0, _alive(all_, N)
     while i < N:
         choices = allowed if allowed is not None and not runs and i == 0 else all_
-        reach = {chain: chain.carries(i) for chain in choices}
-        far = max(reach.values(), default=i - 1)
+        far = max((chain.carries(i) for chain in choices), default=i - 1)
         if far < i or (far == i and i < N - 1 and runs and runs[-1].last == i):
             i += 1 + int(alive[i + 1 :].argmax())
             continue
-        best = min((c for c, e in reach.items() if e == far), key=lambda c: least_time(c, i, far))
-        runs.append(Run(best, i, far))
+        runs.append(_least_motion(choices, i, far))
         if far >= N - 1:
             break
         i = far if any(c.carries(far) > far for c in all_) else far + 1
     return runs
+
+
+def _alive(all_: list[Chain], N: int) -> Bool:
+    """Samples at which some run may begin, and the end: (N + 1,)."""
+    alive = np.zeros(N + 1, bool)
+    alive[N] = True
+    for chain in all_:
+        i0, i1 = min(chain.first, N), min(chain.last + 1, N)
+        alive[i0:i1] |= chain.reach[: i1 - i0] >= np.arange(i0, i1)
+    return alive
+
+
+def _least_motion(choices: list[Chain], i: int, far: int) -> Run:
+    """Of the chains that carry from sample i so far the one with the least motion, as a run."""
+    best = min((c for c in choices if c.carries(i) == far), key=lambda c: least_time(c, i, far))
+    return Run(best, i, far)
 
 
 def least_time(chain: Chain, i: int, e: int) -> float:

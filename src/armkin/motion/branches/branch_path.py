@@ -20,7 +20,7 @@ from armkin.motion.branches.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import change
 from armkin.motion.branches.linked_branches import ENDS, linked
-from armkin.motion.branches.route_grid import fine_enough
+from armkin.motion.branches.route_grid import Way, fine_enough
 from armkin.motion.branches.wrist_turn import ASIDE, has_wrist, through_wrists
 from armkin.motion.branches.wrist_window import detoured
 from armkin.motion.timing.cubic_knots import Knots
@@ -114,24 +114,24 @@ def carry(
     if route.task.orientation == "full" and has_wrist(arm):
         aside = 0.0 if len(route.given[0]) else ASIDE * tolerance  # a curve of points has little tolerance left
         all_ = through_wrists(arm, route, columns, all_, pace.turn, aside)
-    starts = [c for c in all_ if c.first == 0]
-    if fixed is not None:
-        starts = [c for c in starts if stands(c, fixed)]
-        if not starts:  # it stands where no branch goes on: a wrist that has to turn first, at rest
-            starts = [Chain(arm, 0, fixed[None], np.full(1, -1))]
+    starts = _starts(arm, all_, fixed)
     if branch is not None:
         wanted = find(columns.names, branch)
         starts = [c for c in starts if c.labels[0] in wanted]
     end = len(columns.s) - 1
-    complete = [c for c in starts if c.carries(0) == end]
-    if len(complete) == 1:
-        return Carried(route, columns, all_, [Run(complete[0], 0, end)])
-    if complete:
-        timed = [(_seconds(arm, route, columns, c, near, pace), _approach(c, end, near, fixed), k, c)
-                 for k, c in enumerate(complete)]  # fmt: skip
-        fastest = min(t for t, *_ in timed)
-        return Carried(route, columns, all_, [Run(min(x[1:] for x in timed if x[0] <= fastest * 1.0005)[2], 0, end)])
-    return Carried(route, columns, all_, fewest(all_, end + 1, starts))
+    complete = [Run(c, 0, end) for c in starts if c.carries(0) == end]
+    if len(complete) > 1:
+        complete = [_fastest(arm, route, columns.s, complete, near, pace, fixed)]
+    return Carried(route, columns, all_, complete or fewest(all_, end + 1, starts))
+
+
+def _starts(arm: Arm, all_: list[Chain], fixed: Array | None) -> list[Chain]:
+    """The chains that may begin a route; fixed: (n,) where the arm stands, if it has no choice."""
+    starts = [c for c in all_ if c.first == 0]
+    if fixed is None:
+        return starts
+    # where no branch goes on it stands by itself: a wrist has to turn first, at rest
+    return [c for c in starts if stands(c, fixed)] or [Chain(arm, 0, fixed[None], np.full(1, -1))]
 
 
 def stands(chain: Chain, q: Array) -> bool:
@@ -139,18 +139,26 @@ def stands(chain: Chain, q: Array) -> bool:
     return float(np.abs(change(chain.arm, chain.q[0], q)).max()) < 1e-4
 
 
-def _approach(chain: Chain, end: int, near: Array, fixed: Array | None) -> float:
+def _fastest(arm: Arm, route: Route, s: Array, runs: list[Run], near: Array, pace: Pace, fixed: Array | None) -> Run:
+    """Of runs that take nearly the least time the one that is soonest begun; of equals the first."""
+    seconds = np.array([_seconds(arm, route, s, run, near, pace) for run in runs])
+    return min(
+        (run for run, t in zip(runs, seconds, strict=True) if t <= seconds.min() * 1.0005),
+        key=lambda run: _approach(run, near, fixed),
+    )
+
+
+def _approach(run: Run, near: Array, fixed: Array | None) -> float:
     """How far the joints are from where the arm comes from, in seconds at least."""
-    speed = np.where(np.isnan(chain.arm.max_speed), 1.0, chain.arm.max_speed)
-    return float((np.abs(chain.run(0, end, near, fixed)[0] - near) / speed).max())
+    speed = np.where(np.isnan(run.chain.arm.max_speed), 1.0, run.chain.arm.max_speed)
+    return float((np.abs(run.chain.run(0, run.last, near, fixed)[0] - near) / speed).max())
 
 
-def _seconds(arm: Arm, route: Route, columns: Columns, chain: Chain, near: Array, pace: Pace) -> float:
-    """Time that a chain takes for the whole route, on its own samples."""
+def _seconds(arm: Arm, route: Route, s: Array, run: Run, near: Array, pace: Pace) -> float:
+    """Time that a run takes for the whole route, on its own samples."""
     if np.isnan(arm.max_speed).any() or np.isnan(arm.max_accel).any():
-        return float(np.abs(np.diff(chain.q, axis=0)).sum())
-    run = Run(chain, 0, len(columns.s) - 1)
-    return sum(stretch.duration for stretch in stretches(arm, route, columns.s, run, near, pace, grid=300))
+        return float(np.abs(np.diff(run.chain.q, axis=0)).sum())
+    return sum(stretch.duration for stretch in stretches(arm, route, s, run, near, pace, grid=300))
 
 
 def stretches(
@@ -178,7 +186,8 @@ def stretches(
         here = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
         solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
-        path, off = fine_enough(arm, route, s[here], q[here], a, b, number, kept, run.chain.windows, inner)
+        way = Way(route, s[here], q[here], a, b, run.chain.windows, inner)
+        path, off = fine_enough(arm, way, number, kept)
         _check_kept(path, off + route.aside, pace)
         if made:  # the stop is the same to the last digit
             path.q[0] = made[-1].end

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -37,52 +37,50 @@ _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the
 Missed = tuple[float, float] | None  # the greatest distance of a given point from the motion, and where [mm]
 
 
-def fine_enough(
-    arm: Arm,
-    route: Route,
-    s: Array,
-    q: Array,
-    a: float,
-    b: float,
-    number: int,
-    tolerance: float | None,
-    windows: tuple[Window, ...] = (),
-    stops: Array | None = None,
-    exact: bool = True,
-) -> tuple[Knots, Array]:
-    """A grid from length a to b: cubics, and how far they may leave the route.
+class Way(NamedTuple):
+    """A branch along a route between two lengths, at rest at both ends."""
 
-    s, q: samples (N,), (N, n) of the branch. The grid has `number` points, and more in the intervals that may leave
-    the route by more than `tolerance` [mm]; None: whatever they do. windows: where the wrist passes a singularity;
-    stops: (k,) lengths at which it rests; exact: whether a route of many sections may have the slopes of its targets.
+    route: Route
+    s: Array  # (N,) [mm] samples
+    q: Array  # (N, n) [rad | mm] the branch there
+    begin: float  # [mm]
+    end: float
+    windows: tuple[Window, ...] = ()  # where the wrist passes a singularity
+    stops: Array = np.zeros(0)  # (k,) [mm] where it rests on the way
+
+
+def fine_enough(arm: Arm, way: Way, number: int, tolerance: float | None, exact: bool = True) -> tuple[Knots, Array]:
+    """A grid along a way: cubics, and how far they may leave the route.
+
+    The grid has `number` points, and more in the intervals that may leave the route by more than `tolerance` [mm];
+    None: whatever they do. exact: whether a route of many sections may have the slopes of its targets.
     The last: (M,) [mm] for each interval.
     """
-    stops = np.zeros(0) if stops is None else stops
-    exact = exact and len(route.spans) > 0 and not windows
-    where, breaks = _places(arm, route, s, q, a, b, number, windows, stops, _FEWEST if exact else _EACH[0])
+    route = way.route
+    exact = exact and len(route.spans) > 0 and not way.windows
+    where, breaks = _places(arm, way, number, _FEWEST if exact else _EACH[0])
     if exact:
         where, breaks = _graded(where, breaks)
-    resting = _nearest(where[breaks], stops)
+    resting = _nearest(where[breaks], way.stops)
     most = _TIMES * len(where)
     for damping in DAMPING:
         known, before = None, None
         for _ in range(_ROUNDS):
-            values = _solved(arm, route, s, q, where, damping, known, windows)
+            values = _solved(arm, way, where, damping, known)
             rests = breaks[resting]
             found = exact_cubics(arm, route, where, values, rests, known) if exact else None
             if exact and found is None:
-                return fine_enough(arm, route, s, q, a, b, number, tolerance, windows, stops, exact=False)
+                return fine_enough(arm, way, number, tolerance, exact=False)
             path = known = found or knots(where, values, breaks.tolist(), rests.tolist())
             if tolerance is None:
                 return path, np.zeros(len(path.h))
-            every, steps = interval_deviations(arm, route, path, before), _steps(arm, path)
+            every = interval_deviations(arm, route, path, before)
             before = path, every
-            off, steps, h = (np.delete(each, path.rests) for each in (every, steps, path.h))
-            needed = _too_long(off, steps, h, tolerance, exact)
+            needed = _too_long(arm, path, every, tolerance, exact)
             if needed.max() <= 1.0 or len(where) > most:
                 break
             where, breaks = _divided(where, breaks, _parts(needed, exact))
-        if off.max() <= tolerance:
+        if np.delete(every, path.rests).max() <= tolerance:
             break
     return path, every
 
@@ -97,11 +95,9 @@ def _nearest(sorted_: Array, values: Array) -> Int:
     return np.asarray(np.where(values - sorted_[i - 1] < sorted_[i] - values, i - 1, i))
 
 
-def _places(
-    arm: Arm, route: Route, s: Array, q: Array, a: float, b: float, number: int, windows: tuple[Window, ...],
-    stops: Array, fewest: int,
-) -> tuple[Array, Int]:  # fmt: skip
+def _places(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, Int]:
     """Grid points that follow way and joints, and which of them are breaks."""
+    route, s, q, a, b, windows, stops = way
     bends = np.sort(np.concatenate([route.breaks, *([one.begin, one.end] for one in windows)]))
     first, last = np.searchsorted(bends, [a + 1e-9, b - 1e-9])
     edges = np.concatenate([[a], np.unique(bends[first:last]), [b]])
@@ -130,8 +126,10 @@ def _places(
     return _divided(where, begin[1:], np.where(inside > 1, inside + 1, 1))
 
 
-def _too_long(off: Array, steps: Array, h: Array, tolerance: float, exact: bool) -> Array:
-    """How many times too long intervals are, by their distance from the route and the way from their chord (M,)."""
+def _too_long(arm: Arm, path: Knots, every: Array, tolerance: float, exact: bool) -> Array:
+    """How many times too long intervals without rests are (M,), by their distance from the route, `every`, and the way
+    from their chord."""
+    off, steps, h = (np.delete(each, path.rests) for each in (every, _steps(arm, path), path.h))
     coarse = np.sqrt(steps / max(tolerance, _COARSE))  # of second order in h
     if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
         coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
@@ -167,23 +165,15 @@ def _divided(where: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
     return np.append(new, where[-1]), begin[breaks]
 
 
-def _solved(
-    arm: Arm,
-    route: Route,
-    s: Array,
-    q: Array,
-    where: Array,
-    damping: float,
-    known: Knots | None,
-    windows: tuple[Window, ...],
-) -> Array:
+def _solved(arm: Arm, way: Way, where: Array, damping: float, known: Knots | None) -> Array:
     """Joint values at the points, exact to the inverse kinematics; known: a grid whose points are among them."""
+    route, windows = way.route, way.windows
     values, new = np.empty((len(where), arm.n), order="F"), np.ones(len(where), bool)  # long runs of numbers
     if known is not None:
         old = np.searchsorted(where, known.s)
         values[old], new[old] = known.q, False
     if known is None or windows:
-        guess = np.stack([np.interp(where[new], s, q[:, j]) for j in range(arm.n)], axis=1)
+        guess = np.stack([np.interp(where[new], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
     else:  # they are nearer than chords of samples
         guess, _ = known.at(where[new])
     values[new] = corrected(arm, route.task, guess, route.targets(where[new]), damping)
