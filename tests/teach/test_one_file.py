@@ -112,7 +112,8 @@ def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(drawn: Page)
     repainted(page)
     assert page.locator("#canvas").screenshot() != before
     tips = page.evaluate(
-        "import('armkin/js/workspace_cloud.js').then(({tips}) => import('armkin/data.js').then((d) => [...tips(d.arm)]))"
+        "import('armkin/js/workspace_cloud.js')"
+        ".then(({tips}) => import('armkin/data.js').then((d) => [...tips(d.arm)]))"
     )
     place = np.array(tips).reshape(-1, 3)
     arm = armkin.load("ur5e")

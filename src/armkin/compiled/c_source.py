@@ -96,7 +96,8 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
             folds = c_program.filled(
                 _part("folds").replace("@followed@", _part("branch_to_fold") + "\n"), _of_folds(arm, task) | fields
             )
-        parts += [_part("lane_sizes"), solve, part("whole_turns"), _choose(arm, branches), _part(gather), folds, _part("batch")]
+        parts += [_part("lane_sizes"), solve, part("whole_turns"), _choose(arm, branches)]
+        parts += [_part(gather), folds, _part("batch")]
         parts += [_part("elimination_rows")] if has_rows(task, geometry) else []
     text = c_program.filled("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
