@@ -233,6 +233,20 @@ def _lines(module: str, node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     return (node.end_lineno or 0) - node.lineno + 1 - docstring
 
 
+NAMES_ARE_GIVEN = {"cli/commands", "board/kinds"}  # by the command line and by robot files: CONTRIBUTING.md
+SAME_THING_TWICE = {"roots"}  # of the elimination's polynomial, and of a residual along a curve
+
+
+def test_no_two_files_share_a_name() -> None:
+    rooms: dict[str, list[str]] = {}
+    for path in MODULES.values():
+        folder = path.parent.relative_to(SOURCE / "armkin").as_posix()
+        if folder not in NAMES_ARE_GIVEN and path.stem != "__init__":
+            rooms.setdefault(path.stem, []).append(folder)
+    twice = {name: folders for name, folders in rooms.items() if len(folders) > 1}
+    assert twice.keys() == SAME_THING_TWICE, twice
+
+
 PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))
 LISTED_ELSEWHERE = {  # the table of commands in docs/architecture.md; a kind is one file and no line elsewhere
     SOURCE / "armkin/cli/commands",

@@ -13,7 +13,7 @@ from armkin import errors
 from armkin.cli import output
 from armkin.cli.commands import COMMANDS
 
-RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK = 1, 2, 3, 4, 5  # of a batch: `cli.batch.Tally`
+RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK = 1, 2, 3, 4, 5  # of a batch: `cli.batch_answers.Tally`
 
 EXIT_CODES: dict[type[errors.ArmkinError], int] = {
     errors.FileError: RUNTIME,
