@@ -17,6 +17,7 @@ from armkin.errors import UsageError
 
 Array = NDArray[np.float64]
 Bool = NDArray[np.bool_]
+Int = NDArray[np.intp]
 Truth = Bool | bool  # what a comparison of entries gives
 
 

@@ -11,11 +11,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, empty, pack, replaced
@@ -198,9 +198,7 @@ def _commanded(arm: Arm, found: Solutions) -> Solutions:
     return replace(found, arm=arm, task=task_for(arm, found.task.name), near=near, q=q)
 
 
-def _otherwise(
-    goals: Goals, geometry: Geometry | None, out: Batch, left: NDArray[np.intp], examine: bool, workers: int
-) -> Batch:
+def _otherwise(goals: Goals, geometry: Geometry | None, out: Batch, left: Int, examine: bool, workers: int) -> Batch:
     """The same with what a closed form leaves in doubt solved the other way that it names."""
     assert geometry is not None
     some = arm, task, target, near = goals.of(left)
@@ -240,7 +238,7 @@ def _rows(
         found = q[doubted] if guesses is None else np.concatenate([q[doubted], guesses[doubted]], axis=1)
         seeds = Seeds.of(found, np.arange(found.shape[1]) % max(B, 1))
 
-        def others(target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64], Bool]:
+        def others(target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
             """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.
 
             They say nothing of an end of the workspace, beside which no target is reached, and of self-motions.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import widened
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -24,7 +24,7 @@ class Goals(NamedTuple):
     target: Array
     near: Array
 
-    def of(self, rows: NDArray[np.intp]) -> Goals:
+    def of(self, rows: Int) -> Goals:
         return Goals(self.arm, self.task, self.target[rows], self.near[rows])
 
 
@@ -38,12 +38,12 @@ class Seeds(NamedTuple):
 
     q: Array
     loose: Bool
-    label: NDArray[np.int64]
+    label: Int
     sure: Bool
     simple: Bool
 
     @classmethod
-    def of(cls, q: Array, label: NDArray[np.int64], loose: Bool | None = None, simple: Bool | None = None) -> Seeds:
+    def of(cls, q: Array, label: Int, loose: Bool | None = None, simple: Bool | None = None) -> Seeds:
         """Candidates of which no self-motion is known; by default none is loose, and none is simple."""
         none, label = np.zeros(q.shape[:2], bool), np.broadcast_to(label, q.shape[:2])
         sure = np.zeros(q.shape, bool)
@@ -61,7 +61,7 @@ class Examined(NamedTuple):
 
     q: Array
     valid: Bool
-    label: NDArray[np.int64]
+    label: Int
     status: NDArray[np.int8]
     free: Bool
     again: Bool
@@ -99,9 +99,7 @@ def empty(N: int, B: int, n: int) -> Batch:
     )
 
 
-def write(
-    arm: Arm, out: Batch, rows: NDArray[np.intp], q: Array, valid: Bool, label: NDArray[np.int64], near: Array
-) -> None:
+def write(arm: Arm, out: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> None:
     """Write branches (K, W, n) of some targets, with labels (K, W) as `named`, at their nearest legal copies, nan
     behind."""
     width, label = q.shape[1], np.where(valid, label, -1)
@@ -116,7 +114,7 @@ def write(
     out.branch[rows, :width] = label
 
 
-def named(label: NDArray[np.int64], valid: Bool) -> NDArray[np.int64]:
+def named(label: Int, valid: Bool) -> Int:
     """Labels (K, W) with the smallest free number for branches that have none, or one of another."""
     out = np.where(valid, label, -1)
     for row in np.flatnonzero(((label < 0) & valid).any(axis=1) | (np.diff(np.sort(out, axis=1)) == 0).any(axis=1)):
@@ -134,7 +132,7 @@ def wider(out: Batch, width: int) -> Batch:
     return out._replace(q=q, valid=valid, within=within, branch=branch)
 
 
-def replaced(out: Batch, rows: NDArray[np.intp], by: Batch) -> Batch:
+def replaced(out: Batch, rows: Int, by: Batch) -> Batch:
     """The same with other results for some rows, in as many columns as both need."""
     width = max(out.q.shape[1], by.q.shape[1])
     out, by = wider(out, width), wider(by, width)
@@ -144,7 +142,7 @@ def replaced(out: Batch, rows: NDArray[np.intp], by: Batch) -> Batch:
     return out
 
 
-def pack(part: Batch, count: NDArray[np.integer]) -> None:
+def pack(part: Batch, count: Int) -> None:
     """Move the branches of targets, count (N,) of them, to the front, nan behind."""
     B, most = part.valid.shape[1], int(count.max(initial=0))
     rows = np.flatnonzero(count < most)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk, one_pose
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
@@ -185,12 +185,12 @@ def _downhill(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     return downhill
 
 
-def _stopped(arm: Arm, q: Array, downhill: Array) -> NDArray[np.bool_]:
+def _stopped(arm: Arm, q: Array, downhill: Array) -> Bool:
     """Joints that stand on a limit and would go beyond."""
     return ((q <= arm.lower) & (downhill < 0)) | ((q >= arm.upper) & (downhill > 0))
 
 
-def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]:
     """Newton's method with the full Hessian (differences of the gradient), and whether a minimum was reached.
 
     Far beyond the reach the residual is large and Levenberg-Marquardt alone creeps.

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
 from armkin.formula import arrays
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, FLOAT32, SOLUTION
 from armkin.inverse.tasks.task import ROUNDED, Task
 from armkin.model.arm import Arm
@@ -138,7 +138,7 @@ def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLi
 _HALF = np.where(np.arange(300) < FEWEST, 0.0, 0.5 * 10.0 ** -np.arange(300.0))
 
 
-def _needed(values: Array) -> NDArray[np.intp]:
+def _needed(values: Array) -> Int:
     """How many decimals numbers (N, m) need: 0 below FEWEST, and for numbers that need MOST, which are not rounded."""
     found = np.zeros(values.size, np.intp)
     number = values.ravel()

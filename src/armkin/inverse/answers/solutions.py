@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
@@ -71,15 +71,15 @@ class Solutions:
     target: Array
     near: Array
     q: Array
-    valid: NDArray[np.bool_]
-    within_limits: NDArray[np.bool_]
+    valid: Bool
+    within_limits: Bool
     branch: NDArray[np.int8]
     status: NDArray[np.int8]
-    free: NDArray[np.bool_]
+    free: Bool
     names: tuple[str, ...]
     method: str
     why: str
-    complete: NDArray[np.bool_]
+    complete: Bool
     rounding: Array
     angle: Array | None = None
     interval: Array | None = None
@@ -103,12 +103,12 @@ class Solutions:
         return np.broadcast_to(np.arange(self.q.shape[-2], dtype=float), self.valid.shape)
 
     @cached_property
-    def clear(self) -> NDArray[np.bool_]:
+    def clear(self) -> Bool:
         """(..., B) branches that hit no keep-out, limits apart; all, where the arm has no keep-outs."""
         return clear(self.arm, self.q) & self.valid if self.arm.keep_out else self.valid
 
     @cached_property
-    def order(self) -> NDArray[np.intp]:
+    def order(self) -> Int:
         """(..., B) branches by rank: within limits first, of them free ones, then by motion, missing ones last."""
         key = _rounded(np.where(self.valid, self._rank, np.inf))
         by_motion = np.argsort(key, axis=-1, kind="stable")
@@ -120,7 +120,7 @@ class Solutions:
         return np.take_along_axis(by_motion, by_limits, axis=-1)
 
     @cached_property
-    def best(self) -> NDArray[np.intp]:
+    def best(self) -> Int:
         """(...) index of the branch within limits and free that moves the joints least, the first of several, or -1."""
         legal = self.within_limits & self.clear if self.arm.keep_out else self.within_limits
         key = np.where(legal, self._rank, np.inf)

@@ -8,14 +8,11 @@ that has moved least, as long as the targets are so close that this is beyond do
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-
-Int = NDArray[np.int64]
 
 CHUNK = 2048  # targets linked at once
 

@@ -6,11 +6,11 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
 from armkin.formula.array_shapes import Joints
-from armkin.formula.arrays import Array, Truth, wrapped
+from armkin.formula.arrays import Array, Bool, Truth, wrapped
 from armkin.forward import one_pose
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.model.arm import Arm, actual
@@ -130,7 +130,7 @@ def nearest_number(  # noqa: C901 - of every joint and branch of a pose alone: a
     return principal, False
 
 
-def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, NDArray[np.bool_]]:
+def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
     """Rows (..., n) with every joint at its nearest legal copy, and whether all are within limits: (...)."""
     if (turned := actual(arm)) is not arm:
         rows, legal = nearest_row(turned, q * arm.ratio, near * arm.ratio)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Bool, Entry, Int
 from armkin.formula.trace import StraightLineCode
 from armkin.forward import fk
 from armkin.inverse.closed import crossings, four_bars
@@ -109,7 +109,7 @@ class Recorded:
         *_, miss, edge, _ = rows = np.moveaxis(as_rows(found, N), 2, 0)
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
-    def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, NDArray[np.int64], Bool]:
+    def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
         """More candidates of targets that leave joints free or seem to have no branch: (N, M, n), and branches (M,).
 
         Where branches seem lost (N,): with other values for the joints that are free, and for targets moved a little,
@@ -128,8 +128,7 @@ class Recorded:
         more = [_each_once(np.where((kept & lost[:, None, None])[..., None], q, np.nan))]
         on = np.where((miss < SEED**2)[..., None], q, np.nan)
         meeting = crossings.beside(self.arm, self.task, on, target)
-        with np.errstate(invalid="ignore"):
-            off = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
+        off = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
         same = np.where(np.isnan(off), 0.0, off).max(axis=3) < TURNED
         meeting[np.any(same & known[:, None], axis=2)] = np.nan  # on a self-motion of which all circuits are known
         more.append(meeting)

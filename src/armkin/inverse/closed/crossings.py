@@ -48,8 +48,7 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         found |= changes
         second[changes] *= RATHER  # there, not at a step beside it
     for b in range(1, B):  # double roots are there twice
-        with np.errstate(invalid="ignore"):
-            twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME
+        twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME
         found[:, :, b] &= ~twin.any(axis=2)
     at = _apart(arm, place.reshape(N, -1, n), np.where(found, second, np.inf).reshape(N, -1)).reshape(-1, n)
     out = np.full((len(at), 8, n), np.nan)

@@ -10,15 +10,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, cross_rows
+from armkin.formula.arrays import Array, Bool, Int, cross_rows
 from armkin.forward import jacobian
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import NEAR, NO_AREA, PARALLEL, SAME, SOLUTION, TINY
 from armkin.model.arm import Arm
-
-Int = NDArray[np.int64]
 
 
 class _Linkages(NamedTuple):
@@ -78,8 +75,7 @@ def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
     N, _, B, n = q.shape
     there = ~np.isnan(q[..., 0])
     first = np.take_along_axis(q, there.argmax(axis=1)[:, None, :, None], axis=1)
-    with np.errstate(invalid="ignore"):
-        joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > SAME).any(axis=1))
+    joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > SAME).any(axis=1))
     k, b = np.nonzero(joints.sum(axis=2) == 4)
     known, joint = dead_points(arm, first[k, 0, b], joints[k, b])
     k, b, joint = k[known], b[known], joint[known]

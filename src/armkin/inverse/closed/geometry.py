@@ -6,10 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Bool, Entry, Int
 from armkin.inverse.closed.subproblems import Candidates, Prefer
 
 
@@ -50,5 +47,5 @@ class Geometry:
     elimination: Any = None  # of `rows`: the prepared elimination that they come from, if they do
     ends: tuple[int, ...] = ()  # of `pairs`: joints that, where they are free, may leave others few solutions or more
     doubts: Geometry | None = None  # of `pairs`: a slower way for the targets that are in doubt
-    places: Callable[[Array, Array], NDArray[np.intp]] | None = None  # of an elimination's branches: their indices
+    places: Callable[[Array, Array], Int] | None = None  # of an elimination's branches: their indices
     branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered

@@ -14,9 +14,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination import closed_loop, roots
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.joint_order import Role, roles
@@ -71,7 +70,7 @@ class Elimination:
         return {Kind.PLAIN: self.plans}
 
 
-def kinds(closed: Loop, goal: Array) -> NDArray[np.int64]:
+def kinds(closed: Loop, goal: Array) -> Int:
     """The `Kind` of poses (N, 4, 4) of the loop's chain, (N,): all but parallel counts as parallel."""
     out = np.zeros(len(goal), np.int64)
     if closed.prismatic[[0, 5]].any():

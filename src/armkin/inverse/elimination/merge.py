@@ -3,14 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination.polish import pose_error, tip
 from armkin.inverse.numeric.tolerances import ALIKE, EXAMINED, HALFWAY, ILL
-
-Int = NDArray[np.int64]
 
 MOST = 16  # isolated answers a 6-joint chain can have (Primrose 1986)
 

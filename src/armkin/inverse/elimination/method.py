@@ -39,7 +39,6 @@ Three prismatic joints leave the orientation to the three others: `slides`, in c
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool
@@ -53,7 +52,6 @@ from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING, SHAKES
 
 __all__ = ["Branches", "Elimination", "left_open", "prepare", "solve"]
 
-Int = NDArray[np.int64]
 
 CHUNK = 512  # poses worked on at once: long enough to hide the calls, and in 13 MB
 BLOCK = 12288  # poses whose answers are kept unmerged: enough to fill the chunks of later passes

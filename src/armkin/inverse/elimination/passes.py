@@ -4,10 +4,9 @@ See `method` for what leaves a pose open, and why.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination import roots
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, difference, projection
@@ -32,8 +31,6 @@ from armkin.inverse.numeric.tolerances import (
     UPRIGHT,
 )
 from armkin.model.rotation import inverse
-
-Int = NDArray[np.int64]
 
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
 REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination import equal_roots, line_features
 from armkin.inverse.elimination.end_joints import eliminate
 from armkin.inverse.elimination.pencil import Pencil
@@ -28,7 +28,6 @@ from armkin.inverse.numeric.tolerances import (
 )
 from armkin.model.rotation import inverse
 
-Int = NDArray[np.int64]
 STEADY = 1e5  # entries up to which a pencil's simple roots and their vectors are known far better than that
 ONE = 1e3  # sine of the angle between their vectors over that distance, up to which they have one vector
 _ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # a right-hand side that no arm is made for

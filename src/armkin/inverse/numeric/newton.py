@@ -6,9 +6,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.forward import fk, tip_and_jacobian
 from armkin.inverse.numeric.tolerances import CONVERGING, FOLDED, LEFT_OUT, NOISE, ROUNDING, TINY, WEAK
 from armkin.inverse.tasks.residuals import residual, task_jacobian
@@ -122,14 +121,14 @@ def distances(arm: Arm, a: Array, b: Array) -> Array:
     return out
 
 
-def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array, Int]:
     """Smallest singular value (M,) of the task's Jacobian, right vectors (M, n, n), and nullity (M,) below 1e-6."""
     at = Linear.at(arm, task, q, target)
     sigma, nullity = _smallest(arm, task, at.S)
     return sigma, at.V, nullity
 
 
-def _smallest(arm: Arm, task: Task, S: Array) -> tuple[Array, NDArray[np.int64]]:
+def _smallest(arm: Arm, task: Task, S: Array) -> tuple[Array, Int]:
     """Of singular values (M, k) the one that decides (M,), and how many directions are lost (M,)."""
     full = np.zeros((len(S), arm.n))
     full[:, : S.shape[1]] = S
@@ -160,10 +159,10 @@ class Lost(NamedTuple):
     (K, M) says, -1 for the others."""
 
     sigma: Array
-    nullity: NDArray[np.int64]
+    nullity: Int
     V: Array
     weak: Linear
-    place: NDArray[np.intp]
+    place: Int
 
 
 def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) -> Lost:

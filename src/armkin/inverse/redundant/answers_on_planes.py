@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACCEPTED, NEAR, SAME_SEED
 from armkin.inverse.redundant.curve_points import Points, onto
-from armkin.inverse.redundant.interval_pieces import Int, turning
+from armkin.inverse.redundant.interval_pieces import turning
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.inverse.solvers.redundant import Redundancy, nearly_closed
 

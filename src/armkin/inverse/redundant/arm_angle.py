@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.wrist import meeting_point
 from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
-from armkin.inverse.redundant.interval_pieces import Int, Pieces, best_samples, holding_none, none, runs
+from armkin.inverse.redundant.interval_pieces import Pieces, best_samples, holding_none, none, runs
 from armkin.model.arm import Arm
 from armkin.model.rotation import inverse, rotation_about
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Int
 from armkin.inverse.numeric.tolerances import BEFORE_MERGING, BESIDE_CROSSING, JOINED, NO_ROOM, SAME_END, TINY
-from armkin.inverse.redundant.interval_pieces import Int, golden_section, margin
+from armkin.inverse.redundant.interval_pieces import golden_section, margin
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
 

@@ -11,11 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import stacked
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import PAIR_SETTLED, ROUGHLY
-from armkin.inverse.redundant.interval_pieces import Int
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 

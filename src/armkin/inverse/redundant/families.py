@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
@@ -165,7 +165,7 @@ class _Rows:
         """near: (N, n); stands: (N,) it is within limits and solves its target."""
         self.arm, self.joint, self.near, self.stands = arm, joint, near, stands
         self.complete, self.short = (np.zeros(len(near), bool) for _ in range(2))
-        self.parts: list[tuple[NDArray[np.intp], Array, Array, Bool, NDArray[np.intp]]] = []
+        self.parts: list[tuple[Int, Array, Array, Bool, Int]] = []
 
     def add(self, begin: int, curves: Curves) -> None:
         """Those of targets from begin on."""
@@ -233,7 +233,7 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
     best = curves.pieces.start.copy()
     least = motion(arm, best, near)
 
-    def costs(some: NDArray[np.intp], t: Array) -> Array:
+    def costs(some: Int, t: Array) -> Array:
         """Of legal postures; better ones are kept."""
         q, legal = curves.at(rows_of(curves.pieces, some), t)
         cost = np.where(legal, motion(arm, q, near[some]), np.inf)

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric.tolerances import SOLUTION
 from armkin.inverse.redundant.boundaries import boundaries, places
 from armkin.inverse.redundant.branch_ends import crossed_at, hidden_stretches, number_of, places_of
-from armkin.inverse.redundant.interval_pieces import Int, Pieces, none
+from armkin.inverse.redundant.interval_pieces import Pieces, none
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.inverse.redundant.samples import Changes, Runs, Seen, place_between, seen, value_at
 from armkin.inverse.tasks.task import distance

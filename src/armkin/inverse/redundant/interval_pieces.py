@@ -6,12 +6,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.model.arm import Arm
-
-Int = NDArray[np.intp]
 
 
 class Pieces(NamedTuple):

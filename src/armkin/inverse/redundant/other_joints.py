@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, Entry
+from armkin.formula.arrays import Array, Bool, Entry, Int
 from armkin.formula.trace import StraightLineCode
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
@@ -39,7 +39,7 @@ class Sampled(NamedTuple):
     cost: Array  # (S, K, B) motion from near
     missed: Array  # (S, K, B) squared, by candidates of a closed form; else nan
 
-    def postures(self, row: NDArray[np.intp], k: NDArray[np.intp]) -> Array:
+    def postures(self, row: Int, k: Int) -> Array:
         """All branches (M, B, n) at samples k (M,) of targets (M,), nan where there is none."""
         some = row * self.valid.shape[1] + k
         shape = math.prod(self.axes), len(some)
@@ -76,11 +76,11 @@ class Follower(NamedTuple):
     target: Array
     near: Array
 
-    def of(self, some: NDArray[np.intp]) -> Follower:
+    def of(self, some: Int) -> Follower:
         """For some of the targets."""
         return self._replace(target=self.target[some], near=self.near[some])
 
-    def found(self, rows: NDArray[np.intp], t: Array) -> Array:
+    def found(self, rows: Int, t: Array) -> Array:
         """Branches (M, B, n) of targets (M,) at values t (M,), of a closed form each in the column of its index, nan
         where there is none."""
         if not self.free.by_formula:
@@ -91,7 +91,7 @@ class Follower(NamedTuple):
         np.copyto(q, np.nan, where=~(missed <= ACCEPTED)[..., None])
         return q
 
-    def candidates(self, rows: NDArray[np.intp], t: Array) -> tuple[Array, Array]:
+    def candidates(self, rows: Int, t: Array) -> tuple[Array, Array]:
         """Of a closed form all branches (M, B, n), real or not, and what they miss (M, B)."""
         axes = _recorded(self.arm, self.free)[1]
         out = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
@@ -106,7 +106,7 @@ class Follower(NamedTuple):
             missed[:, some] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
         return out.transpose(2, 1, 0), np.sqrt(missed.T)
 
-    def _candidates(self, rows: NDArray[np.intp], t: Array, room: list[NDArray[Any]]) -> list[Any]:
+    def _candidates(self, rows: Int, t: Array, room: list[NDArray[Any]]) -> list[Any]:
         """The values of all joints and what they miss, squared, on their own branch axes before targets (M,); the
         workspace that they stand in, room if that is one for as many."""
         code, _ = _recorded(self.arm, self.free)
@@ -117,7 +117,7 @@ class Follower(NamedTuple):
         values.insert(self.free.joint, t)
         return [*values, miss, room]
 
-    def sampled(self, some: NDArray[np.intp], t: Array, more: Array | None = None) -> Sampled:
+    def sampled(self, some: Int, t: Array, more: Array | None = None) -> Sampled:
         """Some of the targets (S,), of a closed form, at all of t (K,) and at more values (S, M), inf where there are
         fewer; by default between those at which more may happen."""
         rows, values = np.repeat(some, len(t)), np.tile(t, len(some))
@@ -142,9 +142,7 @@ class Follower(NamedTuple):
         columns = [merged(*pair) for pair in zip(columns, others, strict=True)]
         return self._within(some, np.take_along_axis(every, order, axis=1), columns, merged(missed, other), axes)
 
-    def _within(
-        self, some: NDArray[np.intp], t: Array, columns: list[Array], missed: Array, axes: tuple[int, ...]
-    ) -> Sampled:
+    def _within(self, some: Int, t: Array, columns: list[Array], missed: Array, axes: tuple[int, ...]) -> Sampled:
         """Values of all joints on their own branch axes before samples of some of the targets, at legal copies."""
         there = missed <= ACCEPTED**2
         near = self.near[np.repeat(some, t.shape[1])].T
@@ -159,7 +157,7 @@ class Follower(NamedTuple):
         dense = (np.broadcast_to(x, shape).reshape(-1, *t.shape).transpose(1, 2, 0) for x in every)
         return Sampled(t, columns, axes, *dense)
 
-    def own(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> Array:
+    def own(self, rows: Int, branch: Int, t: Array) -> Array:
         """One branch each (M, n), as `found`."""
         *columns, miss, _ = self._candidates(rows, t, [])
         place = np.unravel_index(branch, _recorded(self.arm, self.free)[1])
@@ -173,7 +171,7 @@ class Follower(NamedTuple):
         q[~(picked(miss) <= ACCEPTED**2)] = np.nan
         return q
 
-    def one(self, rows: NDArray[np.intp], branch: NDArray[np.intp], t: Array) -> tuple[Array, Bool]:
+    def one(self, rows: Int, branch: Int, t: Array) -> tuple[Array, Bool]:
         """One branch each (M, n), at its nearest legal copy, nan where there is none; which are within limits (M,)."""
         own = self.own(rows, branch, t)
         there = ~np.isnan(own[:, 0])

@@ -11,10 +11,10 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Int
 from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
 from armkin.inverse.answers.closest import Closest
@@ -174,7 +174,7 @@ def _pool(arm: Arm) -> tuple[Array, Array]:
     return q, position(arm, q)
 
 
-def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, NDArray[np.intp]]:
+def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, Int]:
     """Postures (M, n) at the targets' positions, within limits, and whose target each is (M,)."""
     pool, tips = _pool(arm)
     point = target[:, :3, 3]

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import stacked
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.numeric.tolerances import REACH
 from armkin.inverse.redundant.boundaries import on_both_sides
-from armkin.inverse.redundant.interval_pieces import Int, best_samples, holding_none, runs, turning
+from armkin.inverse.redundant.interval_pieces import best_samples, holding_none, runs, turning
 from armkin.inverse.redundant.other_joints import Follower, Sampled
 
 AT_A_TIME = 8_000  # samples: they stay in the cache

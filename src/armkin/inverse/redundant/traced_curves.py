@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Bool, wrapped
+from armkin.formula.arrays import Bool, Int, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import SAME_SEED, SHORTEST_ARC, TINY
 from armkin.inverse.redundant.answers_on_planes import Nodes, answered, once
 from armkin.inverse.redundant.curve_points import Points, Ways, onto
-from armkin.inverse.redundant.interval_pieces import Int
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 

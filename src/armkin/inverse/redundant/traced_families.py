@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.numeric.tolerances import PAIR_SETTLED, REACH, TINY
 from armkin.inverse.redundant.curve_points import Points, Ways, onto
-from armkin.inverse.redundant.interval_pieces import Int, Pieces, best_samples, holding_none, margin, motion, none, runs
+from armkin.inverse.redundant.interval_pieces import Pieces, best_samples, holding_none, margin, motion, none, runs
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.traced_curves import Chains, curves_of
 from armkin.model.limits import SLACK

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric.tolerances import ROUNDING
 
 TERMS = 12  # of a Taylor series
@@ -30,7 +30,7 @@ STEPS = 8  # of Newton's method in a cell in which a polynomial is monotone
 class Roots(NamedTuple):
     """Roots (R,) in no order: which polynomial, where [rad]; of each polynomial whether all are known (F,)."""
 
-    which: NDArray[np.intp]
+    which: Int
     at: Array
     decided: Bool
 

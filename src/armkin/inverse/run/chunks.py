@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool, Truth
+from armkin.formula.arrays import Array, Bool, Int, Truth
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
@@ -41,7 +41,7 @@ class Solved(NamedTuple):
     columns: int
     target: Array
     rounding: Array
-    left: NDArray[np.intp]
+    left: Int
 
 
 def solve(  # noqa: C901 - one pass over a batch's arrays
@@ -100,7 +100,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
 
 
 def _keep(  # noqa: C901 - one pass over a chunk's arrays
-    goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], near: Array, there: NDArray[np.intp] | None
+    goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], near: Array, there: Int | None
 ) -> Doubted:
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
     targets on an edge.
@@ -149,7 +149,7 @@ def _keep(  # noqa: C901 - one pass over a chunk's arrays
     return doubted
 
 
-def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> NDArray[np.intp]:
+def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> Int:
     """Which targets are in doubt, or have a branch that is nearly there; miss, valid: (B, N); valid None: all are."""
     N = miss.shape[1]
     if np.shape(doubt)[-1:] != (N,):
@@ -173,7 +173,7 @@ class Columns(NamedTuple):
     values: list[Array]
     miss: Array
     valid: Bool
-    left: NDArray[np.intp]
+    left: Int
 
 
 def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool = False) -> Iterator[Columns]:

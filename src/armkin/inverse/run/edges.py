@@ -6,10 +6,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
@@ -29,7 +28,7 @@ class _Doubts(NamedTuple):
     are on no edge, of targets that `near` does not solve.
     """
 
-    rows: NDArray[np.intp]
+    rows: Int
     tight: Array
     first: Array
     other: Array
@@ -40,7 +39,7 @@ class _Doubts(NamedTuple):
     simple: Bool
 
 
-def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) -> Batch:
+def decided(goals: Goals, runner: Recorded, out: Batch, rows: Int) -> Batch:
     """Decide what the targets `rows` are, which are on an edge: at most `AT_ONCE`.
 
     Where a joint is free, the candidates are not all.
@@ -78,9 +77,9 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: NDArray[np.intp]) 
     return examined(goals, out, rows[np.concatenate([part for part, _ in parts])], seeds, runner.others, unsettled)
 
 
-def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[NDArray[np.intp], Seeds]]:
+def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:
     """Those of the targets whose self-motions are known in closed form, with their seeds."""
-    out: list[tuple[NDArray[np.intp], Seeds]] = []
+    out: list[tuple[Int, Seeds]] = []
     if not (goals.task.constraints == goals.arm.n and goals.task.orientation == "full"):
         return out
     part = np.flatnonzero(doubts.free & ~doubts.ends)
@@ -120,7 +119,7 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
     return out
 
 
-def _doubts(goals: Goals, runner: Recorded, rows: NDArray[np.intp]) -> _Doubts:
+def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     """The targets `rows`, with preferred values for joints that are free; what is on no edge and misses is nan."""
     arm, task, target, near = goals.arm, goals.task, goals.target[rows], goals.near[rows]
     # what is singular hangs on the last digit
@@ -171,9 +170,9 @@ def _at_two(runner: Recorded, target: Array, values: Array, others: Array) -> tu
 def examined(
     goals: Goals,
     out: Batch,
-    doubted: NDArray[np.intp],
+    doubted: Int,
     seeds: Seeds,
-    others: Callable[[Array, Array, Bool], tuple[Array, NDArray[np.int64], Bool]],
+    others: Callable[[Array, Array, Bool], tuple[Array, Int, Bool]],
     unsettled: Bool | None = None,
 ) -> Batch:
     """Examine the doubted targets and write what is found: branches first, nan behind.
@@ -186,7 +185,7 @@ def examined(
         some = goals.of(rows)
         incomplete = np.zeros(len(rows), bool) if unsettled is None else unsettled[rows] & ~out.complete[rows]
 
-        def more(which: NDArray[np.int64], lost: Bool, some: Goals = some, incomplete: Bool = incomplete) -> Any:
+        def more(which: Int, lost: Bool, some: Goals = some, incomplete: Bool = incomplete) -> Any:
             return others(some.target[which], some.near[which], lost | incomplete[which])
 
         part = rows_of(seeds, slice(start, start + AT_ONCE))

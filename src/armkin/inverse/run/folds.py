@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import tip_and_jacobian
 from armkin.inverse.answers.batch import Batch, Goals, write
 from armkin.inverse.answers.solutions import Status
@@ -47,14 +46,14 @@ class Doubted(NamedTuple):
     plain: (K,) whether no joint is free, and `near` is elsewhere.
     """
 
-    rows: NDArray[np.intp]
+    rows: Int
     q: Array
     miss: Array
     edge: Bool
     plain: Bool
 
 
-def tell(goals: Goals, runner: Recorded, out: Batch, at: Doubted) -> NDArray[np.intp]:
+def tell(goals: Goals, runner: Recorded, out: Batch, at: Doubted) -> Int:
     """Write what the doubted targets are that can be told; returns the rows of those that are left.
 
     What stands alone is in the batch already, but for what misses a little; of two branches that meet the first is

@@ -8,9 +8,8 @@ The arm cannot go from one to the other without leaving its target.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.closed import four_bars
 from armkin.inverse.singular import curves
 from armkin.inverse.singular.curves import Curves
@@ -44,7 +43,7 @@ def on_one(arm: Arm, task: Task, q: Array, joints: Bool, others: Array, asked: B
     return on
 
 
-def _met(arm: Arm, walk: Curves, who: NDArray[np.intp], posture: Array) -> Bool:
+def _met(arm: Arm, walk: Curves, who: Int, posture: Array) -> Bool:
     """Which postures (P, n) the who-th of these curves meet, until each has met all of its own: (P,).
 
     The second half of `walk` are the same curves the other way: they tell nothing more once the first half has closed.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import rows_of, widened
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
@@ -43,7 +43,6 @@ AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one 
 FEW = 24  # candidates of a target that are compared all with all
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
 
-Int = NDArray[np.int64]
 # For targets (rows of those examined) and whether branches seem lost: more postures to start from (rows, M, n), their
 # branches (M,), and of which targets (rows,) these may not lead to all.
 More = Callable[[Int, Bool], tuple[Array, Int, Bool]]

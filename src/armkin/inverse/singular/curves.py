@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import fk
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import ACROSS, CROSSING, OFF_CURVE, SHORTEST_STEP, TINY
@@ -34,12 +33,12 @@ class Step(NamedTuple):
     unsure: (A,) nobody knows where the curve goes on: another crosses it, it is too long, or steps become too short.
     """
 
-    rows: NDArray[np.intp]
+    rows: Int
     before: Array
     chord: Array
     unsure: Bool
 
-    def passes(self, arm: Arm, posture: Array, place: NDArray[np.intp]) -> Bool:
+    def passes(self, arm: Arm, posture: Array, place: Int) -> Bool:
         """Which postures (P, n) the place-th of these steps pass: (P,)."""
         way, chord = newton.difference(arm, posture, self.before[place]), self.chord[place]
         size = (chord * chord).sum(axis=1)

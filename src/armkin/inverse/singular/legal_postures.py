@@ -7,9 +7,8 @@ double root at a limit is off it by as much as arithmetic can tell its halves ap
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
 from armkin.inverse.answers.closest import thorough
 from armkin.inverse.branches.whole_turns import nearest_row
@@ -20,7 +19,7 @@ from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 
-def with_legal_postures(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Batch:
+def with_legal_postures(goals: Goals, out: Batch, rows: Int) -> Batch:
     """The same branches, with legal ones for targets rows on an edge that have none, where such a posture is found.
 
     goals, out: N targets and their branches. The legal posture takes the place of the one that it shares a self-motion
@@ -61,7 +60,7 @@ def _at_limits(arm: Arm, q: Array) -> Bool:
     return np.asarray(beyond < SAME)
 
 
-def _may_be_legal(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> Bool:
+def _may_be_legal(goals: Goals, out: Batch, rows: Int) -> Bool:
     """Which targets have a posture at a limit, or on a self-motion that may lead within limits: (len(rows),)."""
     arm, task, target, _ = goals
     k, b = np.nonzero(out.valid[rows])

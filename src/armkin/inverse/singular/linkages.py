@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.closed import four_bars
 from armkin.inverse.numeric import newton
@@ -21,8 +20,6 @@ from armkin.inverse.numeric.tolerances import APART_ROOTS, CLOSED, FOLDED, SAME,
 from armkin.model.arm import Arm
 
 PLACES = np.arange(1.0, 5.0)[:, None]  # [rad] along a line; zero is the fifth
-
-Int = NDArray[np.int64]
 
 
 class Linkages(NamedTuple):
@@ -80,8 +77,7 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     known &= ~half
     # of each circuit the posture with the least motion is listed
     q = q.reshape(K, S * B, n).copy()
-    with np.errstate(invalid="ignore"):
-        motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
+    motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
     order = np.lexsort((motion, key))
     first, listed = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1) != 0, np.zeros(key.shape, bool)
     np.put_along_axis(listed, order, first, axis=1)
@@ -99,12 +95,11 @@ def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _M
     """What the loose candidates that solve their targets, there (K, S, B), move on; known: (K,) if it is all known."""
     arm, task, target, _ = goals
     base = np.take_along_axis(q, there.argmax(axis=1)[:, None, :, None], axis=1)[:, 0]
-    with np.errstate(invalid="ignore"):
-        moving: Bool = np.asarray(
-            ((np.abs(newton.difference(arm, q, base[:, None])) > SAME) & there[..., None]).any(axis=1)
-        )
-        way = newton.difference(arm, q[:, 1], q[:, 0])
-        even = ((np.abs(np.abs(way) - 1.0) < SAME) & ~arm.prismatic | ~moving).all(axis=2)
+    moving: Bool = np.asarray(
+        ((np.abs(newton.difference(arm, q, base[:, None])) > SAME) & there[..., None]).any(axis=1)
+    )
+    way = newton.difference(arm, q[:, 1], q[:, 0])
+    even = ((np.abs(np.abs(way) - 1.0) < SAME) & ~arm.prismatic | ~moving).all(axis=2)
     first, last, count = moving.argmax(axis=2), arm.n - 1 - moving[:, :, ::-1].argmax(axis=2), moving.sum(axis=2)
     line: Bool = np.asarray(loose & there[:, 0] & there[:, 1] & even & (count == 2) & (last - first == 2))
     d = np.where(line[:, :, None], np.where(moving, np.sign(way), 0.0), moving)
@@ -123,15 +118,14 @@ def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _M
 
 def _held(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Array:
     """How far postures (..., n) differ besides a way along self-motions d (..., n), lines or four bars: (...)."""
-    with np.errstate(invalid="ignore"):
-        way = newton.difference(arm, a, b)
-        held = np.abs(np.where(d != 0.0, 0.0, way)).max(axis=-1)
-        if line.any():
-            # what the two that turn differ by, besides a way along the line; before and behind the first of them
-            first = (np.cumsum(np.abs(d), axis=-1) == 1.0) & (d != 0.0)
-            left = np.abs(wrapped(np.where(first, d * way, -d * way).sum(axis=-1)))
-            held = np.where(line, np.maximum(held, left), held)
-        return np.asarray(held)
+    way = newton.difference(arm, a, b)
+    held = np.abs(np.where(d != 0.0, 0.0, way)).max(axis=-1)
+    if line.any():
+        # what the two that turn differ by, besides a way along the line; before and behind the first of them
+        first = (np.cumsum(np.abs(d), axis=-1) == 1.0) & (d != 0.0)
+        left = np.abs(wrapped(np.where(first, d * way, -d * way).sum(axis=-1)))
+        held = np.where(line, np.maximum(held, left), held)
+    return np.asarray(held)
 
 
 def _columns(arm: Arm, at: _Motions, loose: Bool) -> tuple[Int, Bool]:

@@ -12,9 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import fk
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
@@ -146,7 +145,7 @@ def _unknown(at: newton.Linear) -> Structure:
     )
 
 
-def leaves(arm: Arm, at: Structure, rows: NDArray[np.intp], q: Array, ahead: Array) -> tuple[Array, Array]:
+def leaves(arm: Arm, at: Structure, rows: Int, q: Array, ahead: Array) -> tuple[Array, Array]:
     """Where curves through q (m, n), those of rows (m,), leave their spans, and the way there, (m, n).
 
     ahead: (m, n) which way they are followed. nan where a curve comes to an end before.
@@ -159,7 +158,7 @@ def leaves(arm: Arm, at: Structure, rows: NDArray[np.intp], q: Array, ahead: Arr
 
 
 def _follow(
-    arm: Arm, task: Task, q: Array, target: Array, U: Array, V: Array, w: Array, out: Structure, rows: NDArray[np.intp]
+    arm: Arm, task: Task, q: Array, target: Array, U: Array, V: Array, w: Array, out: Structure, rows: Int
 ) -> Bool:
     """Follow the curves of some postures as far as their spans, and write what those tell that stay at hand (m,)."""
     n = q.shape[1]
@@ -339,7 +338,7 @@ def _ends(g: Array) -> tuple[Array, Bool]:
     return out.reshape(2, M), ends.reshape(2, M)
 
 
-def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
+def _decide(out: Structure, rows: Int) -> None:
     """Write what the polynomials of some postures tell: of a component that leaves a shortened span, nothing."""
     g, x, span = out.g[:, rows], out.x[:, rows], out.span[rows]
     (low, high), (below, above) = _ends(g)
@@ -360,7 +359,7 @@ def _decide(out: Structure, rows: NDArray[np.intp]) -> None:
     out.low[rows], out.high[rows] = low * span, high * span
 
 
-def members(at: Structure, rows: NDArray[np.intp], way: Array) -> Bool:
+def members(at: Structure, rows: Int, way: Array) -> Bool:
     """Which postures, way (m, M, n) [rad, reaches] from those of rows (m,), lie on their components: (m, M).
 
     As far as the curve is known; one that solves its target lies as close to it as the directions that are not lost
@@ -369,10 +368,9 @@ def members(at: Structure, rows: NDArray[np.intp], way: Array) -> Bool:
     t = (way * at.v[rows, None]).sum(axis=2)  # (m, M)
     span, slack = at.span[rows], 4.0 * SOLUTION / at.second[rows]
     x = _values(at.x[:, rows], np.clip(t / span[:, None], -1.0, 1.0).T).swapaxes(0, 1)
-    with np.errstate(invalid="ignore"):
-        off = np.abs(way - x).max(axis=2)
-        inside = (t >= (at.low[rows] - slack)[:, None]) & (t <= (at.high[rows] + slack)[:, None])
-        return np.asarray(at.known[rows, None] & inside & (off <= (4.0 * SMOOTH * span + slack)[:, None]))
+    off = np.abs(way - x).max(axis=2)
+    inside = (t >= (at.low[rows] - slack)[:, None]) & (t <= (at.high[rows] + slack)[:, None])
+    return np.asarray(at.known[rows, None] & inside & (off <= (4.0 * SMOOTH * span + slack)[:, None]))
 
 
 def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:

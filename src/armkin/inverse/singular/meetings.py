@@ -11,10 +11,9 @@ from functools import cache
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import fk
 from armkin.inverse.answers.batch import OWN, Goals
 from armkin.inverse.numeric import newton
@@ -31,8 +30,6 @@ ACROSS = 64  # along the edges of a cube whose sides hold directions in space
 ALL_ROUND = 5.0 * BENT  # [1/rad] curvature in all directions: a residual has passed `SOLUTION` 1e-3 rad away
 THIRD = 0.03  # singular value of the third direction, which bends the curves by its inverse
 SPREAD = 5.0  # times that in some direction: no surface of solutions, and the zeros are clear
-
-Int = NDArray[np.int64]
 
 
 def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost) -> tuple[Array, Int, Array, Bool]:

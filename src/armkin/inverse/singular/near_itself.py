@@ -7,9 +7,8 @@ was made from. Both solve it: the arm that stands there stays.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Int
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, named, wider
 from armkin.inverse.answers.solutions import Status
@@ -28,7 +27,7 @@ ROUNDED = 1.001 * SOLUTION  # residual that solves a rounded target, if it is mo
 
 def reached(
     arm: Arm, task: Task, target: Array, tip: Array, first: Array | None = None, room: Array | None = None
-) -> NDArray[np.intp]:
+) -> Int:
     """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`.
 
     tip: (3,) or (N, 3), its `position`; first: (N,) the targets' first coordinate, where it stands alone; room: (N,)
@@ -44,7 +43,7 @@ def reached(
     return rows
 
 
-def take(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+def take(goals: Goals, out: Batch, rows: Int) -> Int:
     """Put `near` in place of the branch that it is one with; returns the targets that have to be examined.
 
     goals, out: N targets and their branches; rows: those of `reached`. Two are one if the posture between them solves
@@ -54,14 +53,14 @@ def take(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.concatenate(left) if left else rows
 
 
-def _taken(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+def _taken(goals: Goals, out: Batch, rows: Int) -> Int:
     arm, task = goals.arm, goals.task
     rows = rows[~limits.outside(arm, goals.near[rows]).any(axis=1)]
     if not len(rows):
         return rows
     near, target = goals.near[rows], goals.target[rows]
     if not out.valid.shape[1]:  # an elimination that found nothing at all
-        alone: NDArray[np.intp] = rows[newton.missing(arm, task, near, target) <= SOLUTION]
+        alone: Int = rows[newton.missing(arm, task, near, target) <= SOLUTION]
         return alone
     away = newton.wrapped_distance(arm, out.q[rows], near[:, None])
     away = np.where(out.valid[rows], away, np.inf)
@@ -77,11 +76,11 @@ def _taken(goals: Goals, out: Batch, rows: NDArray[np.intp]) -> NDArray[np.intp]
         stays[some] = newton.missing(arm, task, between, target[some]) <= SOLUTION
     out.q[rows[stays], place[stays]] = near[stays]
     out.within[rows[stays], place[stays]] = True
-    left: NDArray[np.intp] = rows[solves & ~stays]
+    left: Int = rows[solves & ~stays]
     return left
 
 
-def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> NDArray[np.intp]:
+def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> Int:
     """Which targets (N, ...) are solved by `near` (n,) or (N, n), within limits, to within most (N,) [reaches, rad].
 
     Of those that are known better than to `SOLUTION` there are none: of these `take` has decided.
@@ -92,7 +91,7 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> N
     close = np.broadcast_to(near, (len(target), arm.n))
     rows = reached(arm, task, target, position(arm, near), room=np.where(known, most, -1.0))
     rows = rows[~limits.outside(arm, close[rows]).any(axis=1)]
-    there: NDArray[np.intp] = rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]]
+    there: Int = rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]]
     return there
 
 

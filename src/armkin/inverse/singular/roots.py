@@ -8,9 +8,8 @@ beside it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import CLOSE_BY, DOUBLE_ROOT, ERROR, HIGH, SAME, SOLUTION, TINY
 from armkin.inverse.tasks.task import Task
@@ -40,16 +39,15 @@ def joined(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array
 
 
 def alike(
-    arm: Arm, task: Task, q: Array, k: NDArray[np.int64], b: NDArray[np.int64], sigma: Array, size: Array, target: Array
+    arm: Arm, task: Task, q: Array, k: Int, b: Int, sigma: Array, size: Array, target: Array
 ) -> tuple[Bool, Array]:
     """Which candidates are one with the b-th of their target, and how far they are from it: (k, M).
 
     Those that rounding explains, and those between which and it the posture in the middle solves the target.
     """
-    with np.errstate(invalid="ignore"):
-        away = newton.wrapped_distance(arm, q[k], q[k, b][:, None])
-        same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
-        row, column = np.nonzero(~same & (away < CLOSE_BY))
+    away = newton.wrapped_distance(arm, q[k], q[k, b][:, None])
+    same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
+    row, column = np.nonzero(~same & (away < CLOSE_BY))
     if len(row):
         start = q[k[row], b[row]]
         way = newton.difference(arm, q[k[row], column], start)
@@ -61,9 +59,8 @@ def alike(
         same[row, column] = further
         for i in np.unique(row[further]):  # and those that rounding alone parts from these
             there, some = q[k[i]], np.flatnonzero(same[i])
-            with np.errstate(invalid="ignore"):
-                apart = newton.wrapped_distance(arm, there[:, None], there[some])
-                close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], some]))
+            apart = newton.wrapped_distance(arm, there[:, None], there[some])
+            close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], some]))
             same[i] |= close.any(axis=1)
     return np.asarray(same), away
 

@@ -10,9 +10,8 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.tolerances import (
     CLOSE_BY,
@@ -37,8 +36,6 @@ from armkin.model.units import radian_or_reach
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
 STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 STEPS = np.array([[STEP], [10 * STEP]])  # a short one and a long one
-
-Int = NDArray[np.int64]
 
 
 def drop_contained(

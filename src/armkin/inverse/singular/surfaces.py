@@ -11,9 +11,8 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric.many_starts import many_starts
@@ -37,7 +36,7 @@ def swept(goals: Goals, seen: Examined) -> Examined:
 def no_more(arm: Arm) -> More:
     """Further candidates: none, those that were found are all."""
 
-    def none(rows: NDArray[np.int64], lost: Bool) -> tuple[Array, NDArray[np.int64], Bool]:
+    def none(rows: Int, lost: Bool) -> tuple[Array, Int, Bool]:
         return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64), np.zeros(len(rows), bool)
 
     return none
@@ -71,12 +70,12 @@ class _Curves(NamedTuple):
     """A posture of each curve (M, n), its label (M,), the joints that move (n,) besides the surfaces' others."""
 
     q: Array
-    label: NDArray[np.int64]
+    label: Int
     free: Bool
     pair: Pair
 
 
-def _curves(goals: Goals, q: Array, label: NDArray[np.int64], pair: Pair) -> _Curves:
+def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> _Curves:
     """The curves that postures q (M, n) of one target lie on, and all others, with the second joint of a pair held."""
     arm, task, target, [near] = goals
     i, j, way = pair

@@ -54,8 +54,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     def rows(T: Array) -> Rows:
         q, doubt, settled, shaken, guesses = method.solve(prepared, T)
         n = arm.n
-        with np.errstate(invalid="ignore"):
-            hit = np.abs(q[:, :, n:]).max(axis=2) < AT_ZERO
+        hit = np.abs(q[:, :, n:]).max(axis=2) < AT_ZERO
         k, b = np.nonzero(hit)
         own = np.full((*q.shape[:2], n), np.nan)
         if len(k):

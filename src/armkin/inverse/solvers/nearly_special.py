@@ -21,10 +21,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import stacked, widened
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import fk
 from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
@@ -110,7 +109,7 @@ def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geome
     if method.left_open(general_.elimination) > SICK:
         return None
 
-    def places(q: Array, target: Array) -> NDArray[np.intp]:
+    def places(q: Array, target: Array) -> Int:
         starts = range(0, max(len(target), 1), NAMED_AT_ONCE)
         parts = [slice(k, k + NAMED_AT_ONCE) for k in starts]
         return np.concatenate([_places(arm, task, alike, off, q[some], target[some]) for some in parts])
@@ -145,16 +144,15 @@ def named(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array
     return rows
 
 
-def _places(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target: Array) -> NDArray[np.intp]:
+def _places(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target: Array) -> Int:
     """Indices (N, M) of branches (N, M, n): the similar arm's that each is nearest to, others count on, -1 of none."""
     seed, miss, _ = recorded(arm, task, alike).rows(target)
     B = seed.shape[1]
     there = ~np.isnan(q[:, :, 0])
     numbers = np.full(there.shape, -1)
     if q.size:
-        with np.errstate(invalid="ignore"):
-            away = newton.distances(arm, seed, q)  # (N, B, M)
-            real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
+        away = newton.distances(arm, seed, q)  # (N, B, M)
+        real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
         away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
         nearest, back = away.argmin(axis=2), away.argmin(axis=1)
         row, place = np.nonzero(
@@ -231,17 +229,15 @@ def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
     flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=20, patience=4)
     flat[size > SOLUTION] = np.nan
     q = _packed(flat.reshape(N, B, n), own)
-    with np.errstate(invalid="ignore"):
-        for i in range(1, q.shape[1]):
-            again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < ALIKE
-            q[again.any(axis=1), i] = np.nan
+    for i in range(1, q.shape[1]):
+        again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < ALIKE
+        q[again.any(axis=1), i] = np.nan
     return _packed(q, own)
 
 
 def _four(arm: Arm, q: Array) -> Bool:
     """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
-    with np.errstate(invalid="ignore"):
-        near = newton.distances(arm, q, q) < APART_ROOTS
+    near = newton.distances(arm, q, q) < APART_ROOTS
     there = ~np.isnan(q[:, :, 0])
     return np.asarray((there.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
 
@@ -267,8 +263,7 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     real = miss < limit
     for there in around(arm, task, target, AROUND * off_here):
         q, miss, doubt_there = source.rows(there)
-        with np.errstate(invalid="ignore"):
-            steady = newton.wrapped_distance(arm, q, seed) < AROUND * off_here[:, None] / weak
+        steady = newton.wrapped_distance(arm, q, seed) < AROUND * off_here[:, None] / weak
         doubt = doubt | doubt_there | (((miss < limit) | real) & ~steady).any(axis=1)
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)
@@ -281,7 +276,6 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
     for i in range(B):
         for j in range(i):
-            with np.errstate(invalid="ignore"):
-                same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < ALIKE
+            same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < ALIKE
             doubt |= same & good[:, i] & good[:, j]
     return _Corrected(branch, good, doubt)

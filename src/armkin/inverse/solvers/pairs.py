@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.closed.candidates import Recorded
 from armkin.inverse.closed.geometry import Rows
 from armkin.inverse.closed.newton_steps import ABSENT
@@ -59,9 +58,9 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
     q, guesses = np.full_like(seed, np.nan), np.full_like(seed, np.nan)
     better, size = newton.correct(arm, task, seed[row, place], target[row])
     q[row, place] = np.where((size <= ANSWERED)[:, None], better, np.nan)
-    with np.errstate(invalid="ignore"):  # what moves farther than half the way to its neighbour may not continue it
-        beside = (newton.distances(arm, seed, seed) + np.diag(np.full(seed.shape[1], np.inf))).min(axis=2)
-        jumped = newton.wrapped_distance(arm, q, seed) > 0.5 * beside
+    # what moves farther than half the way to its neighbour may not continue it
+    beside = (newton.distances(arm, seed, seed) + np.diag(np.full(seed.shape[1], np.inf))).min(axis=2)
+    jumped = newton.wrapped_distance(arm, q, seed) > 0.5 * beside
     bad = (np.isnan(q[:, :, 0]) & tried) | jumped | _merged(arm, q)
     doubt, complete = np.zeros((2, len(target)), bool)
     left = np.flatnonzero(bad.any(axis=1) & ~open_)
@@ -93,12 +92,11 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
 
 def _merged(arm: Arm, q: Array) -> Bool:
     """Which branches (N, B, n) all but meet another one: (N, B)."""
-    with np.errstate(invalid="ignore"):
-        near = newton.distances(arm, q, q) < APART_ROOTS
+    near = newton.distances(arm, q, q) < APART_ROOTS
     return np.asarray(near.sum(axis=2) > 1)
 
 
-def _others(source: Recorded) -> NDArray[np.intp]:
+def _others(source: Recorded) -> Int:
     """The branches' partners along each axis of two: (A, B)."""
     number = np.arange(np.prod(source.axes)).reshape(source.axes)
     flipped = [np.flip(number, axis).ravel() for axis, size in enumerate(source.axes) if size == 2]
@@ -106,7 +104,7 @@ def _others(source: Recorded) -> NDArray[np.intp]:
 
 
 def _along(
-    arm: Arm, task: Task, source: Recorded, where: tuple[NDArray[np.intp], ...], off: Array, target: Array, way: Array
+    arm: Arm, task: Task, source: Recorded, where: tuple[Int, ...], off: Array, target: Array, way: Array
 ) -> Bool:
     """Whether ways (M, n) lead from branch `two` to branch `one` of targets row: as they do where the class's lie
     farthest apart, among the targets around; where: row, one, two, (M,) each."""

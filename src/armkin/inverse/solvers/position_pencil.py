@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import stacked
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
@@ -150,16 +150,15 @@ def _solved(pencil: Pencil, target: Array) -> Rows:
     q[row, place] = np.where((size <= ANSWERED)[:, None], better, np.nan)
     missing = np.isnan(q[:, :, 0])
     beside = missing & (found.real | (found.off < pencil.touching))
-    with np.errstate(invalid="ignore"):
-        apart = newton.distances(arm, q, q) + 9.0 * np.eye(4)
-        merged = (apart < max(APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
+    apart = newton.distances(arm, q, q) + 9.0 * np.eye(4)
+    merged = (apart < max(APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
     doubt = beside.any(axis=1) | merged | found.loose
     return Rows(q, doubt, np.ones(len(target), bool), None, np.where(beside[:, :, None], found.q, np.nan))
 
 
-def _order(away: Array) -> NDArray[np.intp]:
+def _order(away: Array) -> Int:
     """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
     away = np.where(np.isnan(away), np.pi, away)
     cost = away[:, np.arange(4), ALL].sum(axis=2)
-    order: NDArray[np.intp] = ALL[cost.argmin(axis=1)]
+    order: Int = ALL[cost.argmin(axis=1)]
     return order
