@@ -428,3 +428,25 @@ def test_a_batch_of_a_redundant_arm_may_be_compiled() -> None:
     q, target = postures(arm, None, 2, 7)
     fast, own = armkin.compile(arm).ik(target, "pose", near=q), armkin.ik(arm, target, near=q)
     np.testing.assert_allclose(fast.q, own.q, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "degrees",
+    [
+        *(
+            [0, -180, -90, 0, 0, 0, -180],
+            [-180, -135, -180, 60, 15, 60, -90],
+        ),  # where something may change is not known
+        *([-45, -180, -135, -90, -45, 90, -180], [-30, -60, 135, 120, -90, -135, 165]),  # or does not explain a change
+    ],
+)
+def test_a_target_whose_changes_nobody_explains_is_sampled_alone_as_in_a_batch(degrees: list[int]) -> None:
+    arm = armkin.load("panda")
+    T, other = (armkin.fk(arm, np.radians(q)) for q in (degrees, [10, -20, 30, -90, 40, 100, 50]))
+    alone, both = armkin.ik(arm, T), armkin.ik(arm, np.stack([T, other]))
+    count = alone.valid.sum()
+    assert alone.interval is not None
+    assert both.interval is not None
+    np.testing.assert_array_equal(alone.interval[:count], both.interval[0, :count])
+    assert count == both.valid[0].sum() > 0
+    assert not alone.complete

@@ -104,3 +104,13 @@ def test_a_joint_that_rests_on_a_surface_at_a_double_root_is_not_free(seed: int)
     solved = newton.difference(arm, found[size < 1e-12], np.deg2rad([0.0, 0, -180, 0, 0, 0]))
     assert len(solved) > 500
     assert s.free.tolist() == (np.abs(solved).max(axis=0) > 0.1).tolist() == [True, False, False, True, False, True]
+
+
+@pytest.mark.parametrize("seed", [25, 94, 284])
+def test_a_surface_of_double_roots_is_one_row_whatever_near_is(seed: int) -> None:
+    """Joints 1, 4 and 6 of a Thor about one line: roots there are known to the root of rounding, listed ones too."""
+    arm = armkin.load("thor")
+    T = armkin.fk(arm, np.radians([90, 0, -180, 135, 0, 135]))
+    s = armkin.ik(arm, T, near=np.random.default_rng(seed).uniform(-2.0, 2.0, 6))
+    assert s.valid.sum() == 1
+    assert s.free.tolist() == [True, False, False, True, False, True]

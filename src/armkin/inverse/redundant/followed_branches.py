@@ -36,27 +36,17 @@ class Followed(NamedTuple):
     def along(cls, find: Follower) -> Followed:
         """Of some targets; in two ways: those of which all places are known where something changes, and others."""
         N = len(find.target)
-        curves = cls(find, none(find.arm.n), np.zeros(N, bool), np.zeros(N, bool))
+        parts, short, complete = [none(find.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
         of = boundaries(find.arm) if find.free.joint == find.arm.n - 1 else None
-        left = np.ones(N, bool)
         if of is not None:
             at, known = places(of, find.target)
-            some = np.flatnonzero(known)
-            own, short, explained = _between_places(find.of(some), at[some])
-            left[some] = ~explained
-            curves = curves._with(
-                some[explained], rows_of(own, explained[own.row]), np.cumsum(explained) - 1, short[explained], True
-            )
-        some = np.flatnonzero(left)
-        if len(some):
-            own, short = _sampled(find.of(some), 1)
-            curves = curves._with(some, own, np.arange(len(some)), short, False)
-        return curves
-
-    def _with(self, rows: Int, pieces: Pieces, number: Int, short: Bool, complete: bool) -> Followed:
-        """Those of targets rows as well; number: of the pieces' targets, in rows."""
-        self.short[rows], self.complete[rows] = short, complete
-        return self._replace(pieces=stacked([self.pieces, pieces._replace(row=rows[number[pieces.row]])]))
+            if len(some := np.flatnonzero(known)):
+                own, short[some], complete[some] = _between_places(find.of(some), at[some])
+                parts.append(own._replace(row=some[own.row]))
+        if len(some := np.flatnonzero(~complete)):
+            own, short[some] = _sampled(find.of(some), 1)
+            parts.append(own._replace(row=some[own.row]))
+        return cls(find, stacked(parts), short, complete)
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
         """Where near has the joint, and beside the best sample."""
@@ -70,8 +60,8 @@ class Followed(NamedTuple):
 
 
 def _between_places(find: Follower, at: Array) -> tuple[Pieces, Bool, Bool]:
-    """Pieces of some targets whose curves can change at places (N, V) alone, which are short (N,), and which change at
-    these alone (N,)."""
+    """Pieces of those of some targets whose curves change at places (N, V) alone; which are short (N,), and which
+    targets those are (N,)."""
     found = seen(find, over_a_turn(EVEN), at)
     changes = found.crossed.at, found.gone.at
     legal, there = ends = [place_between(found.t, one, at) for one in changes]
@@ -80,9 +70,10 @@ def _between_places(find: Follower, at: Array) -> tuple[Pieces, Bool, Bool]:
     explained = np.ones(len(at), bool)
     for one, end in zip(changes, ends, strict=True):
         explained[one.row[np.isinf(end)]] = False
-    parts = [_of_runs(found.t, found.legal, True, changes[0], legal)]
-    parts.append(rows_of(_of_runs(found.t, found.there, False, changes[1], there), ~found.there.within))
-    return stacked(parts), found.short, explained
+    intervals, families = (rows_of(runs, explained[runs.row]) for runs in (found.legal, found.there))
+    pieces = _of_runs(found.t, intervals, True, changes[0], legal)
+    without = _of_runs(found.t, rows_of(families, ~families.within), False, changes[1], there)
+    return stacked([pieces, without]), found.short, explained
 
 
 def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:

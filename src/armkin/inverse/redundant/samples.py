@@ -113,7 +113,7 @@ def seen(find: Follower, t: Array, known: Array | None = None) -> Seen:
 
 
 def place_between(t: Array, at: Changes, known: Array) -> Array:
-    """The known place (N, V) of a turn that each change (M,) between samples at t (N, K) is at; nan where there is
+    """The known place (N, V) of a turn that each change (M,) between samples at t (N, K) is at; inf where there is
     none."""
     low, own = value_at(t, at.row, at.k)[:, None], known[at.row]
     width = value_at(t, at.row, at.k + 1)[:, None] - low

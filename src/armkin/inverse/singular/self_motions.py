@@ -49,11 +49,12 @@ def drop_contained(
     """
     pairs: list[tuple[int, int, int]] = []  # a target, a posture of it and one of a self-motion beside
     for k in np.flatnonzero((chosen & curve.any(axis=2)).any(axis=1)):
-        mine = np.flatnonzero(chosen[k] & (sigma[k] < SOLUTION) & curve[k].any(axis=1))
+        mine = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
         few = curve[k, mine].sum(axis=1) <= arm.n // 2
         for i in np.flatnonzero(chosen[k] & (sigma[k] < HIGH) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
             pairs += [(int(k), int(i), int(j)) for j in mine[(away < CLOSE_BY) & few]]
+        mine = mine[sigma[k, mine] < SOLUTION]  # of double roots the posture listed may be off it
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]
