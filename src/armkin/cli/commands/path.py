@@ -281,8 +281,9 @@ def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, 
     try:
         if locked:
             from armkin.motion.path_held import path_held
+            from armkin.motion.path_planner import PathRequest
 
-            plan = path_held(arm, moves, locked, **options)
+            plan = path_held(arm, moves, locked, PathRequest(**options))
         else:
             plan = armkin.path(arm, moves, **options)
     except NoSolutionError as error:
