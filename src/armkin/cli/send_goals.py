@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import armkin
 from armkin.cli import arguments, lock_and_sweep, piped_answers
 from armkin.cli.csv_to_numbers import streamed_rows
 from armkin.cli.number_parsing import decimals
@@ -135,8 +136,6 @@ def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -
 def _from_pipe(robot: str | None, scene: str | None, tool: str | None) -> tuple[Arm, Goals]:
     import numpy as np
 
-    import armkin
-
     answer = piped_answers.read(robot)
     arm = arguments.load(answer.robot_file, scene, tool)
     if answer.scene_sha256 is not None and answer.scene_sha256 != arm.scene_sha256:
@@ -172,7 +171,6 @@ def _of_pulses(arm: Arm, q: Array, counts: list[int]) -> Array:
     """
     import numpy as np
 
-    import armkin
     from armkin.motors import resolution
 
     if len(counts) != len(arm.motor_gain):

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from armkin import path_file
 from armkin.errors import UsageError
 from armkin.forward import fk
 from armkin.inverse.tasks.choose_task import task_for
@@ -14,6 +15,8 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
 from armkin.model.target_numbers import targets_out
 from armkin.motion.tool_path.path_numbers import check_numbers
+from armkin.path_file import PathFile
+from armkin.path_file.path_keys import KINDS
 from armkin.robot_file.robot_file_text import flow
 from armkin.teach import request_checks
 
@@ -95,14 +98,10 @@ class Program:
 
     def file(self) -> PathFile:
         """The program as a path file's model. Raises PathFileError if it is none."""
-        from armkin import path_file
-
         return path_file.validated(self.document())
 
     def text(self) -> str:
         """The program as the text of a path file; names are comments."""
-        from armkin.path_file import PathFile
-
         lines = [f"robot: {self.arm.name}"]
         keys = [key for key in PathFile.model_fields if key in self.head]
         lines += [f"{key}: {flow(self.head[key])}" for key in keys]
@@ -115,8 +114,6 @@ class Program:
 
     def load(self, text: str, name: str) -> None:
         """Take the program of a path file's text. Raises PathFileError with the line, and changes nothing."""
-        from armkin import path_file
-
         file = path_file.parse(text, name)
         path_file.check_robot(file, self.arm.name, self.arm.path)
         check_numbers(self.arm, file)
@@ -246,8 +243,6 @@ class Program:
 
 
 def _kind(move: Mapping[str, Any]) -> str:
-    from armkin.path_file.path_keys import KINDS
-
     return next(kind for kind in KINDS if kind in move)
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend.motion_start import check_jog, jog_goal
 from armkin.board.backend.sent_positions import planned
-from armkin.board.ports import BAUD, SIM
+from armkin.board.ports import BAUD, SIM, SerialPort, list_ports
 from armkin.errors import LinkError, UsageError
 from armkin.motion.joint_moves import rate_lines, straight
 from armkin.motion.timing.trajectory import Trajectory
@@ -137,14 +137,10 @@ class Board(ABC):
 
     def likely(self) -> list[str]:
         """Names of the ports where such a board may be: Arduinos, and the chips of ESP32s and adapters."""
-        from armkin.board.ports import list_ports
-
         return [port.device for port in list_ports() if port.board or port.adapter]
 
     def open(self, name: str, baud: int | None = None, *, reset: bool = True) -> Port:
         """The port of that name; `sim`: a board of this kind in this process."""
-        from armkin.board.ports import SerialPort
-
         return self.simulated() if name == SIM else SerialPort(name, baud or self.baud, reset=reset)
 
     def answers(self, name: str, baud: int | None = None, stop: Never = lambda: False, *, reset: bool = True) -> bool:

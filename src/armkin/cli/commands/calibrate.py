@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, output, render
 from armkin.cli.csv_to_numbers import batch_rows
 from armkin.cli.options import Json, Out, Robot
@@ -93,8 +94,6 @@ def calibrate(
 
 def _fitted(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Calibration:
     """What rows (N, n + 3) or, with `poses`, (N, n + 6) [deg | mm] tell of the arm; kinds: left as they are."""
-    import armkin
-
     q, tips = units.joints_in(arm, rows[:, : arm.n]), rows[:, arm.n :]
     if poses:
         tips = targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, compiled_ik, ik_text, lock_and_sweep, output, piped_answers, render
 from armkin.cli.ik_answer import answer_of, nearest_to
 from armkin.cli.number_parsing import decimals
@@ -164,7 +165,6 @@ def _one(questions: Questions, values: Array, words: list[list[int]] | None, out
 
 def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float]]:
     """Targets [mm, deg] of the task that joint values [deg | mm] reach."""
-    import armkin
     from armkin.inverse.tasks.task import targets_of
 
     q = units.joints_in(arm, joints)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, board_link, keep_outs, output, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.default_port import PortName
@@ -274,7 +275,6 @@ def _blend(text: str | None, batch: str | None) -> float:
 
 def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Planned]:
     """All plans at once, from counts; a stream is read to its end."""
-    import armkin
     from armkin.board.planner import Stream
 
     if isinstance(goals, Stream):
