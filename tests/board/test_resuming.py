@@ -138,7 +138,7 @@ def test_a_motion_held_in_its_approach_goes_on_with_that(arm: Arm, tmp_path: Pat
     file = tmp_path / "lines.yaml"
     file.write_text("start: home\nmoves: [{line: [390, 60, 300]}, {line: [390, -60, 300]}]\n")
     end = armkin.pulses(armkin.load(THREE_DOF), armkin.path(armkin.load(THREE_DOF), file).motion.end).tolist()
-    assert arm.send(20, 70, -70, "--assume-home")[0] == 0
+    assert arm.send(60, 70, -70, "--assume-home")[0] == 0  # an approach of 1.5 s: held in its middle
     arm.track.clear()
     arm.paused_at = 0.3
     code, err = arm.send("--path", file)
