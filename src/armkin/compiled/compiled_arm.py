@@ -212,6 +212,10 @@ class _CompiledTask:
             return found
         if self.turned is not self.arm:
             return self._commanded(targets, near, workers, said)
+        return self._of_batch(targets, near, workers, said)
+
+    def _of_batch(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None) -> Solutions:
+        """As `ik`, of an arm whose joints move as they are commanded."""
         given = arrays.real(targets, "targets")
         m = len(self.goal_shape)
         if given.shape[-m:] != self.goal_shape or given.ndim < m:

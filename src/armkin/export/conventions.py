@@ -203,15 +203,7 @@ def _file(
 def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
     """What a change of convention leaves alone: the file's head, the joints without geometry, and the rest."""
     if arm.file is None:
-        joints = []
-        limits, home = units.limits_out(arm), units.home_out(arm)
-        for i, name in enumerate(arm.joint_names):
-            joint: dict[str, Any] = {"name": name}
-            joint |= {"type": "prismatic"} if arm.prismatic[i] else {}
-            joint |= {"limits": list(limits[i])} if np.isfinite(limits[i]).all() else {}
-            joint |= {"home": home[i]} if home[i] else {}
-            joints.append(joint)
-        return {"name": arm.name}, joints, {}
+        return {"name": arm.name}, _joints_without_a_file(arm), {}
     data = arm.file.model_dump(exclude_unset=True, exclude_none=True)
     joints = [{k: v for k, v in joint.items() if k not in ("dh", "screw", "ratio")} for joint in data["joints"]]
     for joint, ratio in zip(joints, arm.ratio.tolist(), strict=True):
@@ -219,6 +211,19 @@ def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any
     head = {k: v for k, v in data.items() if k in ("name", "description", "source", "compared", "task", "pitch_offset")}
     rest = {k: v for k, v in data.items() if k not in head and k not in _GEOMETRY}
     return head, joints, rest
+
+
+def _joints_without_a_file(arm: Arm) -> list[dict[str, Any]]:
+    """The keys of joints, geometry apart, that say what the arm's arrays do."""
+    joints = []
+    limits, home = units.limits_out(arm), units.home_out(arm)
+    for i, name in enumerate(arm.joint_names):
+        joint: dict[str, Any] = {"name": name}
+        joint |= {"type": "prismatic"} if arm.prismatic[i] else {}
+        joint |= {"limits": list(limits[i])} if np.isfinite(limits[i]).all() else {}
+        joint |= {"home": home[i]} if home[i] else {}
+        joints.append(joint)
+    return joints
 
 
 def _same_pitch(arm: Arm, data: dict[str, Any]) -> dict[str, Any]:

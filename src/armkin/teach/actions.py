@@ -17,6 +17,7 @@ from armkin.teach.tabs import Action, Fields, Tab, Tabs
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.teach.board_actions import BoardActions
+    from armkin.teach.pose_answers import Question
     from armkin.teach.quick_ik import QuickIk
 
 
@@ -119,8 +120,27 @@ class Actions:
         `goal`: a person drags or types it: an arm that follows goes there. Any other new pose ends following: a drag
         from there would take the arm along to what nobody dragged.
         """
-        from armkin.teach.pose_answers import Question, look  # the solver: imported while the browser loads the page
+        from armkin.teach.pose_answers import look  # the solver: imported while the browser loads the page
         from armkin.teach.quick_ik import QuickIk
+
+        question = self._question(fields)
+        with self._solving:
+            self._quick = self._quick or QuickIk()
+            answer = look(self.arm, question, self._quick)
+        before, self._shown = self._shown, answer
+        self.tabs.tell("look", answer, but=tab)
+        if self.board is None:
+            return answer
+        if request_checks.flag(fields, "goal"):
+            if not answer["outside"]:
+                self.board.shown(tab, units.joints_in(self.arm, answer["q"]))
+        elif not before or answer["q"] != before["q"]:
+            self.board.end_follow()
+        return answer
+
+    def _question(self, fields: Fields) -> Question:
+        """What a page asks. Raises UsageError for what is no question."""
+        from armkin.teach.pose_answers import Question
 
         arm = self.arm
         q = units.joints_in(arm, request_checks.numbers(fields, "q", arm.n))
@@ -131,7 +151,7 @@ class Actions:
         if target is not None:
             count = len(target) if isinstance(target, list) and len(target) <= 6 else 6
             target = request_checks.numbers(fields, "target", count)
-        question = Question(
+        return Question(
             q,
             target,
             tuple(name for name in arm.joint_names if name in held),
@@ -140,19 +160,6 @@ class Actions:
             request_checks.flag(fields, "nearest"),
             self.stands(),
         )
-        with self._solving:
-            self._quick = self._quick or QuickIk()
-            answer = look(arm, question, self._quick)
-        before, self._shown = self._shown, answer
-        self.tabs.tell("look", answer, but=tab)
-        if self.board is None:
-            return answer
-        if request_checks.flag(fields, "goal"):
-            if not answer["outside"]:
-                self.board.shown(tab, units.joints_in(arm, answer["q"]))
-        elif not before or answer["q"] != before["q"]:
-            self.board.end_follow()
-        return answer
 
     def stands(self) -> tuple[int, ...] | None:
         """Pulses where the arm stands; None if nothing is known of it."""

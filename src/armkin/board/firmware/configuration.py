@@ -54,22 +54,14 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
     _refuse_incomplete(arm, board=not rehearsal)
-    made_up = rehearsal and bool(missing_keys.without_board(arm))
-    motors = arm.motors
-    if made_up:
-        board = _rehearsal_board(arm)
-        names = [*(motor.name for motor in motors), "gripper"]
-    else:
-        assert arm.board is not None
-        board = BOARDS[arm.board.kind]
-        names = [*(str(motor.axis) for motor in motors), str(arm.gripper.axis) if arm.gripper is not None else ""]
+    board, names = _board(arm, rehearsal=rehearsal)
     axes = tuple(board.axes.index(name) for name in names[:-1])
     grip = as_axis(board.axes.index(names[-1]), arm.gripper) if arm.gripper is not None else None
     images = [AxisImage() for _ in board.axes]
     low, high = _limits(arm)
     home = pulses(arm, arm.home)
     rate, accel = np.abs(arm.motor_gain) @ arm.max_speed, motor_accel(arm)
-    for k, (motor, axis) in enumerate(zip(motors, axes, strict=True)):
+    for k, (motor, axis) in enumerate(zip(arm.motors, axes, strict=True)):
         if motor.kind == "servo":
             _check_servo(f"motor {motor.name}", low[k], high[k])
         stepper = motor.kind == "stepper"
@@ -99,6 +91,15 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
         meaning=_meaning(arm, grip),
     )
     return Configuration(board, image, axes, grip)
+
+
+def _board(arm: Arm, *, rehearsal: bool) -> tuple[Board, list[str]]:
+    """The board, and the names of the axes of all motors and of the gripper; made up for a rehearsal without one."""
+    if rehearsal and missing_keys.without_board(arm):
+        return _rehearsal_board(arm), [*(motor.name for motor in arm.motors), "gripper"]
+    assert arm.board is not None
+    gripper = str(arm.gripper.axis) if arm.gripper is not None else ""
+    return BOARDS[arm.board.kind], [*(str(motor.axis) for motor in arm.motors), gripper]
 
 
 def _refuse_incomplete(arm: Arm, *, board: bool) -> None:

@@ -70,20 +70,24 @@ def searches(
         joint_index(arm, name)
     wanted = [j for j, name in enumerate(arm.joint_names) if not names or name in names]
     wanted = [j for group in _groups(arm, wanted) for j in group]
-    bare = [arm.joint_names[j] for j in wanted if arm.homing[j] is None]
-    if rest_at_home and len(bare) < len(wanted):
-        wanted = [j for j in wanted if arm.homing[j] is not None]
-    elif bare:
+    orders = _orders(arm, wanted, rest_at_home=rest_at_home)
+    in_order = sorted(orders, key=lambda j: (orders[j] is None, orders[j] or 0, j))
+    return [_search(arm, configuration, j) for j in in_order]
+
+
+def _orders(arm: Arm, wanted: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
+    """Of the joints that have a homing: joint -> its order. Raises NoHomingError for others that are not left out."""
+    orders = {j: homing.order for j in wanted if (homing := arm.homing[j]) is not None}
+    bare = [arm.joint_names[j] for j in wanted if j not in orders]
+    if bare and not (rest_at_home and orders):
         raise NoHomingError(
             f"{arm.path} has no homing for {', '.join(bare)}",
             advice="without limit switches put the arm in its home pose, then Machine.prepare(assume=arm.home)",
             joints=bare,
             file=arm.path,
-            some=len(bare) < len(wanted),
+            some=bool(orders),
         )
-    orders = {j: homing.order for j, homing in enumerate(arm.homing) if homing is not None}
-    wanted.sort(key=lambda j: (orders[j] is None, orders[j] or 0, j))
-    return [_search(arm, configuration, j) for j in wanted]
+    return orders
 
 
 def home(
