@@ -265,13 +265,13 @@ def test_what_is_left_of_a_curve_keeps_to_the_joints_limits(begin: float) -> Non
     plan = armkin.path(one, corners, blend=15.0)
     stretch = max(plan.motion.stretches, key=lambda s: s.duration)
     t0 = begin * stretch.duration
-    left = remainder(one, stretch, t0, stretch.at(np.array([t0]))[0])
+    left = remainder(one, stretch, t0, stretch.evaluate(np.array([t0]))[0])
     t = np.linspace(0, left.duration, 4000)
-    assert np.abs(left.at(t, 1) / one.max_speed).max() <= 1.001
-    assert np.abs(left.at(t, 2) / one.max_accel).max() <= 1.02
-    assert np.abs(left.at(t, 1)[[0, -1]]).max() < 1e-6  # from rest to rest
+    assert np.abs(left.evaluate(t, 1) / one.max_speed).max() <= 1.001
+    assert np.abs(left.evaluate(t, 2) / one.max_accel).max() <= 1.02
+    assert np.abs(left.evaluate(t, 1)[[0, -1]]).max() < 1e-6  # from rest to rest
     assert left.end == pytest.approx(stretch.end)
     assert left.duration < stretch.duration - t0 + 1.5
-    way = places(one, stretch.at(np.linspace(t0, stretch.duration, 20_000)))
-    track = [tuple(row) for row in places(one, left.at(t[::40]))]
+    way = places(one, stretch.evaluate(np.linspace(t0, stretch.duration, 20_000)))
+    track = [tuple(row) for row in places(one, left.evaluate(t[::40]))]
     assert distance(track, way) < 0.01

@@ -40,7 +40,7 @@ def note(plan: PathPlan, carried: Carried, near: Array) -> None:
     for k, run in enumerate(carried.runs):
         for window in run.chain.windows:
             if c.s[run.first] <= window.begin and window.end <= c.s[run.last]:
-                plan.passed.append(Passed(base + window.begin, base + window.end, window.turned, window.aside))
+                plan.passed.append(Passed(base + window.begin, base + window.end, window.turned, window.tip_offset))
         q = run.chain.run(run.first, run.last, near)
         begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
         if end > begin:
@@ -59,7 +59,7 @@ def _names(c: Columns, run: Run, base: float) -> list[tuple[float, str]]:
 def _branches(arm: Arm, carried: Carried, near: Array) -> list[Branch]:
     """The branches at the start, the one that carries farthest first; of equals the one that is taken."""
     c, found, chosen = carried.columns, [], None
-    for chain in carried.all:
+    for chain in carried.chains:
         if chain.first == 0:
             e = chain.carries(0)
             q = (chain.run(0, e, near) if e >= 0 else chain.q)[0].copy()  # a view would keep the whole chain

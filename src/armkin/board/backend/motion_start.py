@@ -61,7 +61,7 @@ def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
         return
     for stretch in trajectory.stretches:
         times = [stretch.duration] if isinstance(stretch, Straight) else np.linspace(0.0, stretch.duration, _SAMPLES)
-        reached = stretch.at(np.asarray(times, dtype=float))
+        reached = stretch.evaluate(np.asarray(times, dtype=float))
         farther = beyond(arm, reached).max(axis=0) > out + SLACK
         if farther.any():
             raise _farther(arm, int(farther.argmax()), trajectory.start)

@@ -106,7 +106,7 @@ def way(job: Job, piece: float) -> NDArray[np.int64]:
     arm, points = job.trajectory.arm, [np.asarray(job.start, dtype=np.int64)[None]]
     for stretch in job.trajectory.stretches:
         count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / piece)), 1)
-        points.append(pulses(arm, stretch.at(np.linspace(0.0, stretch.duration, count + 1)[1:])))
+        points.append(pulses(arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:])))
     return np.concatenate(points)
 
 

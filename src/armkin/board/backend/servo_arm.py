@@ -193,7 +193,7 @@ class ServoArm(Backend):
         low, high = np.minimum(self._limits[:, 0], job.start), np.maximum(self._limits[:, 1], job.start)
         for stretch in job.trajectory.stretches:
             count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / PERIOD)), 1)
-            goals = pulses(self.arm, stretch.at(np.linspace(0.0, stretch.duration, count + 1)[1:]))
+            goals = pulses(self.arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:]))
             for row, k in np.argwhere((goals < low) | (goals > high))[:1]:
                 least, most = self._limits[k].tolist()
                 raise NoSolutionError(

@@ -97,7 +97,7 @@ def _path(job: Job) -> tuple[Array, Array]:
     times, points = [np.zeros(1)], [np.asarray(job.start, dtype=float)[None]]
     for stretch, began in zip(job.trajectory.stretches, job.trajectory.begins, strict=False):
         t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE)), 1) + 1)[1:]
-        at = stretch.at(t)
+        at = stretch.evaluate(t)
         times.append(began + t)
         points.append(places(arm, at) if isinstance(stretch, Straight) else pulses(arm, at).astype(float))
     return np.concatenate(times), np.concatenate(points)

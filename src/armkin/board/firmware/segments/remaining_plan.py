@@ -86,8 +86,8 @@ def _refined(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
     t = guess
     for _ in range(8):
         when = np.array([t])
-        off = counts - places(arm, stretch.at(when))[0]
-        speed = stretch.at(when, 1)[0] @ arm.motor_gain.T
+        off = counts - places(arm, stretch.evaluate(when))[0]
+        speed = stretch.evaluate(when, 1)[0] @ arm.motor_gain.T
         if speed @ speed < 1.0:  # slower than a step a second: at rest, or all but
             break
         t = float(np.clip(t + np.clip(off @ speed / (speed @ speed), -0.02, 0.02), 0.0, stretch.duration))
