@@ -148,12 +148,12 @@ def answer(plan: PathPlan) -> dict[str, Any]:
         "nearest_singularity": None
         if worst is None
         else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
-        **({} if plan.trajectory is None else _moved(plan)),
-        **_if_any(plan),
+        **({} if plan.trajectory is None else _motion_fields(plan)),
+        **_optional_fields(plan),
     }
 
 
-def _moved(plan: PathPlan) -> dict[str, Any]:
+def _motion_fields(plan: PathPlan) -> dict[str, Any]:
     """What is known of a plan's motion; keys that are None where there is none."""
     motion, names = plan.motion, plan.arm.joint_names
     return {
@@ -165,7 +165,7 @@ def _moved(plan: PathPlan) -> dict[str, Any]:
     }
 
 
-def _if_any(plan: PathPlan) -> dict[str, Any]:
+def _optional_fields(plan: PathPlan) -> dict[str, Any]:
     """Keys that a plan without such things does not have."""
     said: dict[str, Any] = {"held": held(plan)} if plan.held else {}
     if plan.turned is not None:

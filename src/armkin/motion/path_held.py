@@ -38,7 +38,7 @@ def path_held(
     check_rates(arm)
     free = lock(arm, held)
     kept = [k for k, name in enumerate(arm.joint_names) if name not in held]
-    here = asked.here(arm)
+    here = asked.start_joints(arm)
     ready = unlock(arm, held, here[kept])
     check_limits(arm, ready[None])
     near, jerk = (

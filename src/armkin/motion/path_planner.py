@@ -46,7 +46,7 @@ class PathRequest:
     split: bool = False
     samples: int | None = None
 
-    def here(self, arm: Arm) -> Array:
+    def start_joints(self, arm: Arm) -> Array:
         """Where the arm stands: (n,) [rad | mm]."""
         return arm.home if self.start is None else np.asarray(self.start, dtype=float)
 
@@ -59,7 +59,7 @@ def planned(arm: Arm, file: PathFile, asked: PathRequest) -> PathPlan:
     pace = _pace(arm, file, asked)
     if pace.turn:
         wrist_turn.check(arm)
-    here = asked.here(arm)
+    here = asked.start_joints(arm)
     if arm.motors and not undriven(arm):
         here = legal_with_same_pulses(arm, here)
     near = None if asked.near is None else np.asarray(asked.near, dtype=float)

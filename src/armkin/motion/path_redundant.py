@@ -44,7 +44,7 @@ def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, asked: PathReque
     if that carries the path, or the nearest value that does. Raises as `armkin.path` does, UsageError also for joint
     moves that want the joint at different values.
     """
-    name, here = arm.joint_names[spare.joint], asked.here(arm)
+    name, here = arm.joint_names[spare.joint], asked.start_joints(arm)
     begin = _begin(arm, file, here)
     said = _said(arm, file, spare.joint, here)
     stands = here if begin is None else begin

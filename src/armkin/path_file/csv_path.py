@@ -35,7 +35,7 @@ def parse(raw: bytes, name: str) -> PathFile:
     rows = _filled(text, name)
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
-    header, rows = _headed(rows, name)
+    header, rows = _header_and_rows(rows, name)
     if len(rows) > MOST_POINTS:
         raise PathFileError(
             f"{name}: has more than {MOST_POINTS} rows, and a path no more: give it in parts", file=name
@@ -50,7 +50,7 @@ def parse(raw: bytes, name: str) -> PathFile:
     )
 
 
-def _headed(rows: list[Row], name: str) -> tuple[list[str] | None, list[Row]]:
+def _header_and_rows(rows: list[Row], name: str) -> tuple[list[str] | None, list[Row]]:
     """The columns' names, None where the first row has numbers alone, and the rows below without a batch's words."""
     if all(_value(cell) is not None for cell in rows[0][1]):
         return None, rows

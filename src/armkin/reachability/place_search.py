@@ -202,7 +202,7 @@ def each(
     found = []
     for i, (one, grid, file) in enumerate(zip(asked, grids, paths, strict=True)):
         mine = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.which == i])
-        found.append(_placed(one, *grid, mine, settings, file))
+        found.append(_result(one, *grid, mine, settings, file))
     return found
 
 
@@ -215,7 +215,7 @@ def _chunks(questions: Sequence[Question], grids: Sequence[tuple[Array, Array]])
     return made
 
 
-def _placed(
+def _result(
     question: Question,
     axes: tuple[Array, Array],
     inner: tuple[slice, slice],

@@ -175,7 +175,7 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
     places = [count * protocol.STEP + protocol.HALF for count in at]
     source = (s.of(moving) for s in move.segments)
     todo: list[Segment] = list(islice(source, _SEEN))
-    sizes = _paused(session, todo, room, clock, least) if todo else []
+    sizes = _insert_pause(session, todo, room, clock, least) if todo else []
     begins = not sizes
     while todo := todo + list(islice(source, max(0, _BATCH[1] + 1 - len(todo)))):
         fits = _BATCH[1] if begins else max(_BATCH[0], session.pending[1])  # more would wait for room
@@ -191,7 +191,7 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
         at = end
 
 
-def _paused(session: Session, todo: list[Segment], room: int, clock: int, least: float) -> list[int]:
+def _insert_pause(session: Session, todo: list[Segment], room: int, clock: int, least: float) -> list[int]:
     """Put the pause before a motion into its segments; how many of them its first frames have, none for no pause."""
     pause, sizes = _start(session, todo, room, clock, least)
     # Behind a rest, for which it may wait until less is left there: the queue is filled while that lasts.

@@ -64,7 +64,7 @@ def calibrate(
     arm = arguments.load(robot)
     kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
     names = [*arm.joint_names, "x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
-    numbers, rows = _measured(measured, names, arm)
+    numbers, rows = _measured_rows(measured, names, arm)
     if suggest is not None:
         _suggest(arm, suggest, rows, kinds, json, out)
         return
@@ -85,7 +85,7 @@ def calibrate(
         output.note("--out NEW.yaml writes the corrected robot file")
 
 
-def _measured(source: str | None, names: list[str], arm: Arm) -> tuple[list[int], Array | None]:
+def _measured_rows(source: str | None, names: list[str], arm: Arm) -> tuple[list[int], Array | None]:
     """Numbers and values of a file's rows; None: there is no file."""
     import numpy as np
 

@@ -103,7 +103,7 @@ def ik(
         every=all_branches or continuous,
         position_first=position_first,
     )
-    request = _prepared(request, what.name, compiled=compiled)
+    request = _request_with_solver(request, what.name, compiled=compiled)
     questions = Questions(request, what, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
         from armkin.cli.batch_answers import Batch as Run
@@ -122,7 +122,7 @@ def ik(
     _one(questions, one_row(values).values, words, out, json=json)
 
 
-def _prepared(request: choose_branch.Request, task: str, *, compiled: bool) -> choose_branch.Request:
+def _request_with_solver(request: choose_branch.Request, task: str, *, compiled: bool) -> choose_branch.Request:
     """The same where position first fits the arm; compiled: by machine code, which is built if it is not there yet."""
     from armkin.inverse import choose_branch
     from armkin.inverse.redundant.position_first import check as position_first_is_for

@@ -71,7 +71,7 @@ def new(
 
     path = _path(name, out)
     asks = not dh and batch is None and sys.stdin is not None and sys.stdin.isatty()
-    convention, table = _asked(convention) if asks else _given(dh, batch, convention)
+    convention, table = _asked(convention) if asks else _table_of_options(dh, batch, convention)
     if convention not in ("standard", "modified"):
         raise UsageError(f"--convention {convention}: must be standard or modified")
     rows = [_row(entries, i) for i, entries in enumerate(table, 1)]
@@ -95,7 +95,7 @@ def _check(made: str, path: str) -> None:
     checked(parse(made, path))
 
 
-def _given(dh: list[str] | None, batch: str | None, convention: str | None) -> tuple[str, list[dict[str, str]]]:
+def _table_of_options(dh: list[str] | None, batch: str | None, convention: str | None) -> tuple[str, list[dict[str, str]]]:
     """The convention and the table that the options give. Raises UsageError for what lacks."""
     if dh and batch is not None:
         raise UsageError("--dh and --batch: give one of the two")

@@ -64,7 +64,7 @@ def place(
 
     arms = [arguments.load(word) for word in words[:-1]]
     settings = _settings(step, z, yaw, area)
-    found = _found(arms, words[-1], settings, scene, out, Engine(workers, cluster), compiled=compiled)
+    found = _search(arms, words[-1], settings, scene, out, Engine(workers, cluster), compiled=compiled)
     if out is not None:
         write(found, out)
     if plot is not None:
@@ -81,7 +81,7 @@ def place(
         raise _no_place(found, "points of the path on one branch" if _is_path(words[-1]) else "targets")
 
 
-def _found(
+def _search(
     arms: list[Arm],
     source: str,
     settings: dict[str, Any],
