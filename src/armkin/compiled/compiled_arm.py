@@ -214,7 +214,9 @@ class _CompiledTask:
             return self._commanded(targets, near, workers, said)
         return self._solve_batch(targets, near, workers, said)
 
-    def _solve_batch(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None) -> Solutions:
+    def _solve_batch(
+        self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None
+    ) -> Solutions:
         """As `ik`, of an arm whose joints move as they are commanded."""
         given = arrays.real(targets, "targets")
         m = len(self.goal_shape)

@@ -95,7 +95,9 @@ def _check(made: str, path: str) -> None:
     checked(parse(made, path))
 
 
-def _table_of_options(dh: list[str] | None, batch: str | None, convention: str | None) -> tuple[str, list[dict[str, str]]]:
+def _table_of_options(
+    dh: list[str] | None, batch: str | None, convention: str | None
+) -> tuple[str, list[dict[str, str]]]:
     """The convention and the table that the options give. Raises UsageError for what lacks."""
     if dh and batch is not None:
         raise UsageError("--dh and --batch: give one of the two")
