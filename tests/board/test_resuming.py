@@ -12,7 +12,7 @@ import pytest
 import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import Machine
-from armkin.board.firmware.segments.remaining_plan import onwards, places_on
+from armkin.board.firmware.segments.remaining_plan import places_on, remaining_trajectory
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
 from armkin.board.firmware.wire.protocol import HALF, STEP
 from armkin.board.ports import note_path
@@ -242,7 +242,7 @@ def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, .
     last = list(dict.fromkeys(map(tuple, stands)))[-14:-1]
     for counts in map(np.array, last):
         place = next(places_on([whole], counts))
-        left = cut(onwards(whole, place, joints(one, counts)), counts, min_interval=448)
+        left = cut(remaining_trajectory(whole, place, joints(one, counts)), counts, min_interval=448)
         assert _moves(left) == whole.end.tolist(), counts
 
 

@@ -147,7 +147,9 @@ class Walk:
     def _back(self) -> int:
         """Be again where a posture was taken, with the others left; the number of that move."""
         others, refused, (state, plan) = self.untried_postures, self.refused, self.saved_state
-        vars(self).update({**_copied_state(state), "others": others, "refused": refused, "before": self.saved_state})
+        vars(self).update(
+            {**_copied_state(state), "untried_postures": others, "refused": refused, "saved_state": self.saved_state}
+        )
         vars(self.plan).update(_copied_state(plan))
         return self.current_moves[0]
 

@@ -167,14 +167,14 @@ def _rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: l
     return tuple(rows)
 
 
-def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int, far: Array) -> RowImage:
+def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int, widest: Array) -> RowImage:
     """Scaled to 16-bit weights, the bounds widened by what rounding weights and counts may do."""
-    most = float(np.abs(per_count) @ far)
+    most = float(np.abs(per_count) @ widest)
     scale = min(32767 / float(np.abs(per_count).max()), (2**30 - 2**20) / most)
     weight = np.rint(per_count * scale)
     # The exact sum and the rounded one differ by the weights' rounding times the counts, and the counts
     # themselves are rounded by up to half, and up to a quarter away where a segment ends.
-    slack = float(np.abs(weight - per_count * scale) @ far + 0.8 * np.abs(weight).sum())
+    slack = float(np.abs(weight - per_count * scale) @ widest + 0.8 * np.abs(weight).sum())
     offset = float(weight @ arm.motor_bias)
     bounds = []
     for limit, sign in ((arm.lower[j], -1), (arm.upper[j], 1)):
@@ -212,10 +212,10 @@ def _bytes(weights: Array) -> list[int]:
     return [int(w) for w in np.rint(whole)]
 
 
-def _check_servo(what: str, low: int, high: int) -> None:
+def _check_servo(name: str, low: int, high: int) -> None:
     least, most = _SERVO_RANGE
     if low < least or high > most:
-        raise UsageError(f"{what}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}")
+        raise UsageError(f"{name}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}")
 
 
 def _rate(board: Board, rate: float) -> int:

@@ -200,7 +200,7 @@ def _move(
                 _write_trace(arm, plans, trace)
             began = machine.counts()
             _carry_out(planner, plans, held)
-        planned = planner.done.summary(began)
+        planned = planner.total_sent.summary(began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
     _tell(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
 

@@ -57,7 +57,7 @@ class Pieces(IntEnum):
     ROUGH = 2  # so few that a bad line brings them in time; right to 10 %
 
 
-def along(
+def line_segments(
     start: Sequence[int],
     end: Sequence[int],
     law: Profile,
@@ -136,7 +136,7 @@ def line(
     min_interval: int = MIN_INTERVAL,
 ) -> Move:
     """A straight line in counts from rest to rest: `top` [1/s] and `accel` [1/s^2] at most, both in lines."""
-    return along(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
+    return line_segments(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
 
 
 def _most(law: Profile, pieces: Pieces) -> int:
