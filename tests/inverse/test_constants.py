@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator
 from importlib import import_module
+from inspect import getsource
 from pathlib import Path
 from pkgutil import iter_modules
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -55,6 +56,17 @@ def modules() -> Iterator[ModuleType]:
         )
 
 
+def used_by(module: ModuleType) -> set[str]:
+    """The tolerances that a module names."""
+    attributes = (node for node in ast.walk(ast.parse(getsource(module))) if isinstance(node, ast.Attribute))
+    return {node.attr for node in attributes if ast.unparse(node.value) == "tol"}
+
+
+def changed(**values: float) -> SimpleNamespace:
+    """The tolerances, some with other values."""
+    return SimpleNamespace(**{**vars(tolerances), **values})
+
+
 def test_at_most_twelve_constants_decide_and_each_is_derived() -> None:
     """44 were imported by these rooms, each a number of its own."""
     deciding, following = part("what decides a word"), part("what follows from these")
@@ -64,9 +76,7 @@ def test_at_most_twelve_constants_decide_and_each_is_derived() -> None:
         used = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
         assert used, name
         assert used <= {*deciding, *following}, name
-    known = {name for name in vars(tolerances) if name.isupper()}
-    imported = {name for module in modules() for name in vars(module) if name in known}
-    assert imported <= {*deciding, *following, *STEPS}
+    assert {name for module in modules() for name in used_by(module)} <= {*deciding, *following, *STEPS}
     page = PAGE.read_text()
     assert all(f"| {name} |" in page for name in deciding)
 
@@ -101,15 +111,16 @@ def test_no_word_hangs_on_the_others(monkeypatch: pytest.MonkeyPatch, sample: Ca
     before = words(sets)
     assert {0, 1, 2} <= set(before[:, 0])
     fixed = {"SOLUTION", "REACH", "EQUAL", "DECIMAL", "FLOAT32", "FEW_DIGITS", "TINY", "FAR"}
-    places = [(module, name) for module in modules() for name in vars(module) if name in {*ALL, *STEPS} - fixed]
+    rooms = [module for module in modules() if used_by(module)]
+    names = {*ALL, *STEPS} - fixed
     for seed in range(sample(4, 1)):
         sense = dict(zip(sorted({*ALL, *STEPS}), np.random.default_rng(seed).choice([-1, 1], 99), strict=False))
         for way in (1, -1):
-            for module, name in places:
-                monkeypatch.setattr(module, name, getattr(tolerances, name) * 3.0 ** (way * sense[name]))
+            values = {name: getattr(tolerances, name) * 3.0 ** (way * sense[name]) for name in names}
+            for module in rooms:
+                monkeypatch.setattr(module, "tol", changed(**values))
             np.testing.assert_array_equal(words(sets), before)
     monkeypatch.undo()
-    for module in modules():
-        if "SOLUTION" in vars(module):
-            monkeypatch.setattr(module, "SOLUTION", 3.0 * tolerances.SOLUTION)
+    for module in rooms:
+        monkeypatch.setattr(module, "tol", changed(SOLUTION=3.0 * tolerances.SOLUTION))
     assert (words(sets) != before).any()  # and on SOLUTION some do

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from oracle import goal
 
 import armkin
 from armkin.inverse.elimination import method, passes, polish, roots
+from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import ALONE
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.rotation import inverse
@@ -39,7 +41,8 @@ def test_random_poses_of_right_angled_arms_are_complete(seed: int) -> None:
 
 @pytest.mark.parametrize("name", [169, 188, 1000, "6R general", "6R modified DH", "RRRPRR general"])
 def test_no_root_of_a_branch_is_called_empty(name: int | str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(roots, "NO_PRODUCT", -1.0)  # the distance of every root from the others
+    # the distance of every root from the others
+    monkeypatch.setattr(roots, "tol", SimpleNamespace(**{**vars(tolerances), "NO_PRODUCT": -1.0}))
     arm = (built(name) if isinstance(name, int) else random_case(name, 1)).arm
     elimination = method.prepare(arm.link, arm.prismatic)
     closed = elimination.loop

@@ -27,6 +27,19 @@ def stacked(parts: Sequence[Columns]) -> Columns:
     return out
 
 
+def replaced(columns: Columns, which: NDArray[Any], rows: Columns) -> Columns:
+    """The same with other rows in place of some, as wide as both need; in place where they need no more than there is."""
+    each: Any = columns
+    out: Columns = each._make(_replaced(column, which, new) for column, new in zip(each, rows, strict=True))  # type: ignore[call-overload]
+    return out
+
+
+def _replaced(column: NDArray[Any], which: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
+    column = column if rows.ndim < 2 else widened(column, rows.shape[1])
+    column[which] = rows if rows.ndim < 2 else widened(rows, column.shape[1])
+    return column
+
+
 def _below(parts: Sequence[Any]) -> Any:
     """Arrays or named tuples one below the other."""
     if parts[0] is None:

@@ -25,7 +25,7 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.branches.whole_turns import turns as copies_of
-from armkin.inverse.numeric.tolerances import EQUAL, HELD, SOLUTION
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.families import intervals_out
 from armkin.inverse.redundant.held_joints import arm_without, others, redundant_alone
 from armkin.inverse.redundant.position_first import closest_each as nearest_positions
@@ -200,7 +200,7 @@ def turns(request: Request, branch: Branch) -> list[list[float]]:
     arm = request.arm
     copies = copies_of(arm, branch.q, near=units.joints_in(arm, request.near_out))
     held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
-    same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < HELD
+    same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < tol.HELD
     return [list(row) for row in units.joints_out(arm, copies[same]).tolist()]
 
 
@@ -350,7 +350,7 @@ class _Found:
         if request.position_first and best is not None:
             row = both[best][0]
             missed = math.hypot(row.residual_mm / request.arm.reach, math.radians(row.residual_deg))
-            status = (Status.EXACT if missed <= SOLUTION else Status.POSITION).name.lower()
+            status = (Status.EXACT if missed <= tol.SOLUTION else Status.POSITION).name.lower()
         return Answer(
             status,
             first.method,
@@ -368,8 +368,8 @@ class _Found:
 
 def _rank(request: Request, branch: Branch) -> tuple[bool, bool, float, float]:
     hit = branch.within_limits and bool(branch.hits)  # outside limits hits do not count
-    turned = round(branch.residual_deg, EQUAL) if request.position_first else 0.0
-    return not branch.within_limits, hit, turned, round(branch.motion, EQUAL)
+    turned = round(branch.residual_deg, tol.EQUAL) if request.position_first else 0.0
+    return not branch.within_limits, hit, turned, round(branch.motion, tol.EQUAL)
 
 
 def _refused(request: Request, named: Sequence[Branch]) -> str:

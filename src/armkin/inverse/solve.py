@@ -14,20 +14,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.formula import arrays
-from armkin.formula.array_tuples import rows_of, stacked
+from armkin.formula.array_tuples import replaced, rows_of, stacked
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
 from armkin.inverse.answers import rounding as target_rounding
-from armkin.inverse.answers.batch import Batch, Goals, Seeds, empty, pack, replaced
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, as_solutions, empty, pack
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.elimination.merge import projection
-from armkin.inverse.numeric.tolerances import FAR
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.families import families
-from armkin.inverse.redundant.position_first import check as check_position_first
 from armkin.inverse.redundant.position_first import position_first as minima
 from armkin.inverse.run import chunks
 from armkin.inverse.run import single as one_target
@@ -83,24 +82,26 @@ def ik(
     """
     if workers != 1:
         check(workers)
-    if position_first:
-        check_position_first(arm, task)
-        return minima(ik, arm, targets, near=near)
-    if (free := redundancy(arm, task)) is not None:
-        return families(ik, arm, free, targets, near, rounding)
+    free = redundancy(arm, task)
     values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
     if (
         rounding is None
-        and not single
+        and not (single or position_first)
         and examine
+        and free is None
         and (values.ndim == 1 or values.shape == (4, 4))  # a batch prepares nothing for one
         and (one := one_target.prepared(arm, task)) is not None
         and (alone := one.solve(values, near)) is not None
     ):
         return alone
     if (turned := actual(arm)) is not arm:
-        more: dict[str, Any] = {"examine": examine, "workers": workers, "rounding": rounding}
-        return _commanded(arm, ik(turned, targets, task, near=_actual_near(arm, near), **more))
+        more: dict[str, Any] = {"examine": examine, "workers": workers, "position_first": position_first}
+        s = ik(turned, targets, task, near=_actual_near(arm, near), rounding=rounding, **more)
+        return _commanded(arm, s)
+    if position_first:
+        return minima(ik, arm, task, targets, near)
+    if free is not None:
+        return families(ik, arm, free, targets, near, rounding)
     return answered(arm, *solver(arm, task), values, near, single, examine, workers, rounding)
 
 
@@ -131,8 +132,8 @@ def answered(  # noqa: C901 - what is looked at after the closed form, in its or
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
         out, count = _rows(arm, definition, geometry, target, each, examine, workers)
     shown, most = target_rounding.of_targets(arm, definition, target, (given, shown), single, rounding, lead)
+    goals = Goals(arm, definition, target, each)
     if examine:
-        goals = Goals(arm, definition, target, each)
         edge = np.flatnonzero((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR))
         if len(illegal := edge[~out.within[edge].any(axis=1)]):
             out = legal_postures.with_legal_postures(goals, out, illegal)
@@ -141,29 +142,12 @@ def answered(  # noqa: C901 - what is looked at after the closed form, in its or
         if arm.keep_out:
             out = free_postures.with_free_postures(goals, out)
     if arm.prismatic.any():
-        out.complete[distance(arm, definition, target) > FAR] = False
+        out.complete[distance(arm, definition, target) > tol.FAR] = False
     if not geometry.ordered:
         out.branch[...] = follow(arm, definition, out.q, target)
     names = branch_names(arm, definition, geometry, count)
     names += tuple(f"branch {i + 1}" for i in range(count, out.q.shape[1]))
-    each_branch = (*lead, out.q.shape[1])
-    return Solutions(
-        arm=arm,
-        task=definition,
-        target=target.reshape(lead + target.shape[1:]),
-        near=np.broadcast_to(close.copy(), (*lead, arm.n)),
-        q=out.q.reshape(*each_branch, arm.n),
-        valid=out.valid.reshape(each_branch),
-        within_limits=out.within.reshape(each_branch),
-        branch=out.branch.reshape(each_branch),
-        status=out.status.reshape(lead),
-        free=out.free.reshape(*lead, arm.n),
-        names=names,
-        method=geometry.name,
-        why=geometry.why,
-        complete=out.complete.reshape(lead),
-        rounding=shown.reshape(lead),
-    )
+    return as_solutions(goals, close, lead, out, shown, (names, geometry.name, geometry.why))
 
 
 def columns(
@@ -194,8 +178,10 @@ def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
 
 def _commanded(arm: Arm, found: Solutions) -> Solutions:
     """Solutions in actual joint values as those in commanded ones."""
-    q, near = found.q / arm.ratio, found.near / arm.ratio
-    return replace(found, arm=arm, task=task_for(arm, found.task.name), near=near, q=q)
+    q, near, interval, task = found.q / arm.ratio, found.near / arm.ratio, found.interval, found.task.name
+    if interval is not None and (free := redundancy(arm, task)) is not None:
+        interval = np.sort(interval / arm.ratio[free.joint], axis=-1)
+    return replace(found, arm=arm, task=task_for(arm, task), near=near, q=q, interval=interval)
 
 
 def _otherwise(goals: Goals, geometry: Geometry | None, out: Batch, left: Int, examine: bool, workers: int) -> Batch:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.array_tuples import widened
+from armkin.formula.array_tuples import stacked
 from armkin.formula.arrays import Array, Bool, Int
+from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -69,11 +70,6 @@ class Examined(NamedTuple):
     moved: Bool
     beyond: Bool
 
-    def wider(self, width: int) -> Examined:
-        """In at least so many columns."""
-        q, valid, label = (widened(array, width) for array in (self.q, self.valid, self.label))
-        return self._replace(q=q, valid=valid, label=label)
-
 
 class Batch(NamedTuple):
     """q (N, B, n), valid, within, branch (N, B), status (N,), free (N, n), complete (N,)."""
@@ -99,9 +95,26 @@ def empty(N: int, B: int, n: int) -> Batch:
     )
 
 
-def write(arm: Arm, out: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> None:
+Text = tuple[tuple[str, ...], str, str]  # of an answer: `Solutions.names`, method and why
+
+
+def as_solutions(
+    goals: Goals, near: Array, lead: tuple[int, ...], out: Batch, rounding: Array, text: Text
+) -> Solutions:
+    """The answer of a batch of shape lead; near: (n,) or (*lead, n), as it was given."""
+    arm, task, target, _ = goals
+    close = np.broadcast_to(near.copy(), (*lead, arm.n))
+    q, valid, within, branch, status, free, complete, target, rounding = (
+        x.reshape((*lead, *x.shape[1:])) for x in (*out, target, rounding)
+    )
+    return Solutions(arm, task, target, close, q, valid, within, branch, status, free, *text, complete, rounding)
+
+
+def write(arm: Arm, out: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> Batch:
     """Write branches (K, W, n) of some targets, with labels (K, W) as `named`, at their nearest legal copies, nan
-    behind."""
+    behind; the same batch, or where they need more columns a wider one."""
+    if q.shape[1] > out.q.shape[1]:
+        out = stacked([out, empty(0, q.shape[1], arm.n)])
     width, label = q.shape[1], np.where(valid, label, -1)
     ordered = np.sort(label, axis=1)
     if ((label < 0) & valid).any() or ((np.diff(ordered) == 0) & (ordered[:, 1:] >= 0)).any():
@@ -112,6 +125,7 @@ def write(arm: Arm, out: Batch, rows: Int, q: Array, valid: Bool, label: Int, ne
     out.valid[rows, :width] = valid
     out.within[rows, :width] = inside & valid
     out.branch[rows, :width] = label
+    return out
 
 
 def named(label: Int, valid: Bool) -> Int:
@@ -123,22 +137,6 @@ def named(label: Int, valid: Bool) -> Int:
             if out[row, b] < 0 or out[row, b] in taken:
                 out[row, b] = next(i for i in range(out.shape[1] + len(taken) + 1) if i not in {*taken, *out[row]})
             taken.add(int(out[row, b]))
-    return out
-
-
-def wider(out: Batch, width: int) -> Batch:
-    """The same with more columns, empty."""
-    q, valid, within, branch = (widened(array, width) for array in (out.q, out.valid, out.within, out.branch))
-    return out._replace(q=q, valid=valid, within=within, branch=branch)
-
-
-def replaced(out: Batch, rows: Int, by: Batch) -> Batch:
-    """The same with other results for some rows, in as many columns as both need."""
-    width = max(out.q.shape[1], by.q.shape[1])
-    out, by = wider(out, width), wider(by, width)
-    arrays: tuple[NDArray[Any], ...] = out
-    for array, some in zip(arrays, by, strict=True):
-        array[rows] = some
     return out
 
 

@@ -12,21 +12,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk, one_pose
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import (
-    EQUAL_BUT_ROUNDING,
-    EQUAL_COST,
-    FLAT_GRADIENT,
-    GAINS_NOTHING,
-    GRADIENT_WAY,
-    LAST_STEP,
-    LEAST_COST,
-    LEAST_DAMPING,
-    LEVEL_VALUE,
-    NO_COST,
-    SHORTENED,
-    TINY,
-    UPHILL,
-)
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_targets, targets_of
@@ -130,7 +116,7 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     q, converged = _finish(arm, task, starts.reshape(-1, n), each)
     cost = _cost(arm, task, q, each).reshape(N, kept)
     moved = np.abs((q.reshape(N, kept, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
-    equal = cost <= cost.min(axis=1, keepdims=True) * (1 + EQUAL_COST) + NO_COST
+    equal = cost <= cost.min(axis=1, keepdims=True) * (1 + tol.EQUAL_COST) + tol.NO_COST
     best = np.arange(N) * kept + np.where(equal, moved, np.inf).argmin(axis=1)
     T = fk(arm, q[best])
     missing, p = residual(task, T, q[best], target), task.position
@@ -146,14 +132,18 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     ]
 
 
-@lru_cache(maxsize=16)
-def _pool(arm: Arm, task: Task) -> tuple[Array, Array]:
-    """Postures spread within limits (P, n), and what is compared of them with targets: see `_features`."""
-    rng = np.random.default_rng(11)
+def spread(arm: Arm, rng: np.random.Generator, count: int) -> Array:
+    """Random postures (count, n) within limits; where a joint has none within half a turn, or a reach, of home."""
     span = np.where(arm.prismatic, arm.reach, np.pi)
     low = np.where(np.isfinite(arm.lower), arm.lower, np.minimum(-span, arm.home - span))
     high = np.where(np.isfinite(arm.upper), arm.upper, np.maximum(span, arm.home + span))
-    q = rng.uniform(low, high, (POOL, arm.n))
+    return rng.uniform(low, high, (count, arm.n))
+
+
+@lru_cache(maxsize=16)
+def _pool(arm: Arm, task: Task) -> tuple[Array, Array]:
+    """Postures spread within limits (P, n), and what is compared of them with targets: see `_features`."""
+    q = spread(arm, np.random.default_rng(11), POOL)
     return q, _features(arm, task, targets_of(task, fk(arm, q), q))
 
 
@@ -196,7 +186,7 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]
     Far beyond the reach the residual is large and Levenberg-Marquardt alone creeps.
     """
     n, unit = arm.n, radian_or_reach(arm)
-    shifts = np.concatenate([np.eye(n), -np.eye(n)]) * GRADIENT_WAY * unit
+    shifts = np.concatenate([np.eye(n), -np.eye(n)]) * tol.GRADIENT_WAY * unit
     q, converged, cost = q.copy(), np.zeros(len(q), bool), _cost(arm, task, q, target)
     active = np.arange(len(q))
     for _ in range(40):
@@ -205,12 +195,12 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]
         free = ~_stopped(arm, at, downhill)
         around = (at[:, None, :] + shifts).reshape(-1, n)
         slopes = _downhill(arm, task, around, np.repeat(goal, 2 * n, axis=0)).reshape(len(at), 2, n, n)
-        H = -(slopes[:, 0] - slopes[:, 1]) / (2 * GRADIENT_WAY)
+        H = -(slopes[:, 0] - slopes[:, 1]) / (2 * tol.GRADIENT_WAY)
         H = 0.5 * (H + np.swapaxes(H, 1, 2))
         both = free[:, :, None] & free[:, None, :]
         values, vectors = np.linalg.eigh(np.where(both, H, np.eye(n)))
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
-        there = (slope <= FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -UPHILL)
+        there = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL)
         converged[active] = there
         active, left = active[~there], np.flatnonzero(~there)
         if not len(active):
@@ -218,15 +208,15 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]
         # a step downhill along every eigenvector, whatever its curvature; flat ones gently
         values, vectors = values[left], vectors[left]
         along = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0)[left])
-        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), LEVEL_VALUE))
-        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
+        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), tol.LEVEL_VALUE))
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
         rest = np.arange(len(active))
-        for shrink in (1.0, 0.25, 0.05, SHORTENED):
+        for shrink in (1.0, 0.25, 0.05, tol.SHORTENED):
             rows = active[rest]
             trial = np.clip(q[rows] + shrink * step[rest] * unit, arm.lower, arm.upper)
             now = _cost(arm, task, trial, target[rows])
             # equal but for rounding is still a step towards a vanishing gradient
-            better = now <= cost[rows] * (1.0 + EQUAL_BUT_ROUNDING)
+            better = now <= cost[rows] * (1.0 + tol.EQUAL_BUT_ROUNDING)
             q[rows[better]], cost[rows[better]] = trial[better], now[better]
             rest = rest[~better]
             if not len(rest):
@@ -247,7 +237,7 @@ def _descend(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> Array
         J = np.where(held[:, None, :], 0.0, J)
         H = J.swapaxes(1, 2) @ J + damping[active][:, None, None] * np.eye(arm.n)
         step = np.linalg.solve(H, np.where(held, 0.0, downhill)[:, :, None])[:, :, 0]
-        step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
+        step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
         trial = np.clip(q[active] + step * unit, arm.lower, arm.upper)
         now = _cost(arm, task, trial, target[active])
         better = now < cost[active]
@@ -255,8 +245,9 @@ def _descend(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> Array
         size = np.abs(trial - q[active]).max(axis=1)
         q[active[better]] = trial[better]
         cost[active[better]] = now[better]
-        damping[active] = np.where(better, np.maximum(damping[active] * 0.2, LEAST_DAMPING), damping[active] * 6.0)
-        idle = better & (gained <= GAINS_NOTHING * np.maximum(cost[active], LEAST_COST)) & (size < LAST_STEP)
+        damping[active] = np.where(better, np.maximum(damping[active] * 0.2, tol.LEAST_DAMPING), damping[active] * 6.0)
+        little = gained <= tol.GAINS_NOTHING * np.maximum(cost[active], tol.LEAST_COST)
+        idle = better & little & (size < tol.LAST_STEP)
         done = idle | (damping[active] > 1e8)
         active = active[~done]
         if not len(active):

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula import arrays
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.numeric.tolerances import DECIMAL, FEW_DIGITS, FLOAT32, SOLUTION
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import ROUNDED, Task
 from armkin.model.arm import Arm
 
@@ -53,13 +53,13 @@ def of_targets(
             shapes = "() or " + str(lead) if lead else "()"
             raise UsageError(f"rounding: expected finite numbers from 0, of shape {shapes}; got shape {said.shape}")
         known = np.broadcast_to(said, lead).reshape(-1).astype(float)
-        return known, SOLUTION + known
+        return known, tol.SOLUTION + known
     numbers, defect = shown
     known = defect
     if single:
         point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
         largest = np.abs(point).max(axis=1, initial=0.0) / arm.reach
-        known = np.maximum(defect, FLOAT32 * np.maximum(largest, 1.0 if task.orientation != "none" else 0.0))
+        known = np.maximum(defect, tol.FLOAT32 * np.maximum(largest, 1.0 if task.orientation != "none" else 0.0))
     most = DEFECTS * known
     rows = np.flatnonzero(defect > ROUNDED)
     if len(rows):
@@ -71,7 +71,7 @@ def of_targets(
         rows = rows[(np.abs(R - np.rint(R)) <= ROUNDED).all(axis=(1, 2))]
         if len(rows):
             most[rows] = np.maximum(most[rows], last_place_of_position(numbers[rows, :3, 3]) / arm.reach)
-    return known, SOLUTION + most
+    return known, tol.SOLUTION + most
 
 
 def last_place_of_position(p: Array) -> Array:
@@ -79,8 +79,8 @@ def last_place_of_position(p: Array) -> Array:
 
     Typed ones are: of fewer than six digits, and fewer than three decimals.
     """
-    p = np.where(np.abs(p) < SOLUTION, 0.0, p)  # what is that small is rounding
-    size = np.floor(np.log10(np.maximum(np.abs(p), SOLUTION)))
+    p = np.where(np.abs(p) < tol.SOLUTION, 0.0, p)  # what is that small is rounding
+    size = np.floor(np.log10(np.maximum(np.abs(p), tol.SOLUTION)))
     half = np.zeros(len(p))
     typed = _whole(p * 10.0 ** (FEWEST - 1)) & _whole(p * 10.0 ** (PRINTED - 2 - size))
     left = np.flatnonzero(~typed.all(axis=1))
@@ -89,7 +89,7 @@ def last_place_of_position(p: Array) -> Array:
         half[left[here]] = 0.5 * 10.0 ** (size[left[here]].max(axis=1) + 1 - digits)
         left = left[~here]
     single = left[(p[left] == p[left].astype(np.float32)).all(axis=1)]
-    half[single] = FLOAT32 * np.abs(p[single]).max(axis=1)
+    half[single] = tol.FLOAT32 * np.abs(p[single]).max(axis=1)
     off: Array = 3.0**0.5 * half
     return off
 
@@ -101,12 +101,12 @@ def last_place(R: Array) -> Array:
     eight. What is rounded to decimals has as many digits, or fewer.
     """
     entries = R.reshape(-1, 9)
-    half = np.where((entries == entries.astype(np.float32)).all(axis=1), FLOAT32, 0.0)
+    half = np.where((entries == entries.astype(np.float32)).all(axis=1), tol.FLOAT32, 0.0)
     left = np.flatnonzero(half == 0.0)
     for digits in range(COARSEST, MOST):
         some = entries[left]
-        size = np.floor(np.log10(np.maximum(np.abs(some), FEW_DIGITS)))
-        here = (_whole(some * 10.0 ** (digits - 1 - size)) | (np.abs(some) < FEW_DIGITS)).all(axis=1)
+        size = np.floor(np.log10(np.maximum(np.abs(some), tol.FEW_DIGITS)))
+        here = (_whole(some * 10.0 ** (digits - 1 - size)) | (np.abs(some) < tol.FEW_DIGITS)).all(axis=1)
         half[left[here]] = 0.5 * 10.0**-digits
         left = left[~here]
         if not len(left):
@@ -154,4 +154,4 @@ def _needed(values: Array) -> Int:
 
 def _whole(scaled: Array) -> Bool:
     """Which numbers are integers but for rounding."""
-    return np.asarray(np.abs(scaled - np.rint(scaled)) <= DECIMAL * np.maximum(np.abs(scaled), 1.0))
+    return np.asarray(np.abs(scaled - np.rint(scaled)) <= tol.DECIMAL * np.maximum(np.abs(scaled), 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.numeric.tolerances import EQUAL
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.keep_out.clearance import clear
@@ -151,4 +151,4 @@ class Solutions:
 def _rounded(motion: Array) -> Array:
     """How much more than the least (..., B) of each target, inf where there is none: equal if rounding explains it."""
     least = motion.min(axis=-1, initial=np.inf, keepdims=True)
-    return (motion - np.where(np.isfinite(least), least, 0.0)).round(EQUAL)
+    return (motion - np.where(np.isfinite(least), least, 0.0)).round(tol.EQUAL)

@@ -28,7 +28,7 @@ from armkin.forward import fk
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import NAMED, NO_LENGTH, SOLUTION
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task, targets_of
 from armkin.model.arm import Arm
 from armkin.model.chain import Chain, axes
@@ -127,14 +127,14 @@ def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]
     # branch by branch, by the formulas of a small batch: those of a large one would be recorded for this alone
     missing = np.stack([newton.missing(arm, task, branch, goal) for branch in q.swapaxes(0, 1)], axis=1)
     edge = np.broadcast_to(candidates.doubt.edge, values[0].shape).reshape(q.shape[1], -1).T
-    return postures, q, (missing < SOLUTION) & ~edge
+    return postures, q, (missing < tol.SOLUTION) & ~edge
 
 
 def _own_branch(arm: Arm, postures: Array, q: Array, valid: Bool) -> Array:
     """Index of the branch that is the posture itself: (M,), -1 where it is not found again."""
     distance = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
     index = distance.argmin(axis=1)
-    return np.where(distance.min(axis=1) < NAMED, index, -1)
+    return np.where(distance.min(axis=1) < tol.NAMED, index, -1)
 
 
 def _bent_wrist(arm: Arm, postures: Array) -> Array:
@@ -161,9 +161,9 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     shoulder, elbow, wrist = points[:, 1], points[:, 2], points[:, 3]
     way = wrist - shoulder
     length = np.linalg.norm(way, axis=1)
-    tilt = np.abs(way[:, 2]) / np.maximum(length, NO_LENGTH)
+    tilt = np.abs(way[:, 2]) / np.maximum(length, tol.NO_LENGTH)
     # far out, no offset of the shoulder can turn the way round
-    return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), NO_LENGTH)).reshape(shape)
+    return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), tol.NO_LENGTH)).reshape(shape)
 
 
 def _bends_upright(arm: Arm) -> bool:

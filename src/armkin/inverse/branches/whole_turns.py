@@ -12,7 +12,7 @@ from armkin.errors import UsageError
 from armkin.formula.array_shapes import Joints
 from armkin.formula.arrays import Array, Bool, Truth, wrapped
 from armkin.forward import one_pose
-from armkin.inverse.numeric.tolerances import EQUAL
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm, actual
 from armkin.model.limits import SLACK
 
@@ -140,9 +140,9 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
     if not q.size:
         return out, inside
     for i in range(arm.n):
-        slides, value = bool(arm.prismatic[i]), q[..., i]
-        limits = float(arm.lower[i]), float(arm.upper[i])
-        out[..., i], ok = nearest_copy(value if slides else wrapped(value), near[..., i], *limits, slides)
+        slides, limits = bool(arm.prismatic[i]), (float(arm.lower[i]), float(arm.upper[i]))
+        value = q[..., i] if slides else wrapped(q[..., i])
+        out[..., i], ok = nearest_copy(value, near[..., i], *limits, slides)
         inside &= ok
     return out, inside
 
@@ -202,4 +202,4 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
     unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
     motion = (np.abs(rows - close) * unit).sum(axis=1)
-    return rows[np.argsort(motion.round(EQUAL), kind="stable")]
+    return rows[np.argsort(motion.round(tol.EQUAL), kind="stable")]

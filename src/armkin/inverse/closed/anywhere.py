@@ -43,14 +43,14 @@ from armkin.inverse.closed.subproblems import (
 )
 from armkin.inverse.closed.three_link import ThreeLink
 from armkin.inverse.closed.wrist import Wrist, meeting_point
-from armkin.inverse.numeric.tolerances import EXACT, LOOSE, LOOSE_DOUBLE, NEAR, NO_SIZE
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse, shrunk
 
 
-def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | None:
     """Six revolute joints and a full pose, three neighbouring axes parallel or meeting in a point."""
     if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
         return None
@@ -85,8 +85,8 @@ class _Ends:
         self.rows = np.array([La[:3, :3] @ [0.0, 0.0, 1.0], La[:3, 3]])  # factors of f in (2)
         self.A = self.rows[:, :2]
         U, S, _ = np.linalg.svd(self.A)
-        off = float(S[1] / max(S[0], NO_SIZE))
-        self.regular, self.close = off > tolerance, tolerance < off <= NEAR
+        off = float(S[1] / max(S[0], tol.NO_SIZE))
+        self.regular, self.close = off > tolerance, tolerance < off <= tol.NEAR
         self.alone, self.main = U[:, 1], U[:, 0]  # combinations of (2): without f, and the other one
 
     def solve(
@@ -118,7 +118,7 @@ class _Ends:
         v = pose.turn_back(self.La, v)
         second, _ = rotation_between(u[0], u[1], v[0], v[1], 1.0, None)
         across = arrays.dot(u[:2], u[:2]) + arrays.dot(v[:2], v[:2])
-        free = (across < LOOSE) | (doubt.edge & (across < LOOSE_DOUBLE))
+        free = (across < tol.LOOSE) | (doubt.edge & (across < tol.LOOSE_DOUBLE))
         if prefer[1] is not None and np.any(free):
             second = Pair(arrays.where(free, prefer[1].c, second.c), arrays.where(free, prefer[1].s, second.s))
         return [first, second, last], doubt | Doubt(free, free)

@@ -17,7 +17,7 @@ from armkin.inverse.closed import crossings, four_bars
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, spin
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, HOPELESS, ROUNDING, SEED, SHAKE, TURNED
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task, moved
 from armkin.model.arm import Arm
 
@@ -116,20 +116,20 @@ class Recorded:
         which do not. Everywhere: of places where a self-motion meets another one. nan where there is none, or where the
         candidate is far from its target. near: (N, n). Also of which targets (N,) these may not lead to all.
         """
-        q, miss = self._all_round(target, near)
+        q, miss = self._shifted(target, near, ROUND)
         if not (lost.any() or (q[:, 1:] != q[:, :1]).any()):  # nothing that a formula leaves free: no curve, no meeting
             return q[:, 0, :0], np.zeros(0, np.int64), np.zeros_like(lost)
-        exact = np.where((miss <= ACCEPTED**2)[..., None], q, np.nan)
+        exact = np.where((miss <= tol.ACCEPTED**2)[..., None], q, np.nan)
         kept, held = four_bars.one_a_circuit(self.arm, exact, near)
         known: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)
         linkage = np.asarray(known.any(axis=1))
         # what else does not depend on the free joint is known already
-        kept = np.where(linkage[:, None, None], kept & known[:, None], miss < HOPELESS**2)
+        kept = np.where(linkage[:, None, None], kept & known[:, None], miss < tol.HOPELESS**2)
         more = [_each_once(np.where((kept & lost[:, None, None])[..., None], q, np.nan))]
-        on = np.where((miss < SEED**2)[..., None], q, np.nan)
+        on = np.where((miss < tol.SEED**2)[..., None], q, np.nan)
         meeting = crossings.beside(self.arm, self.task, on, target)
         off = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
-        same = np.where(np.isnan(off), 0.0, off).max(axis=3) < TURNED
+        same = np.where(np.isnan(off), 0.0, off).max(axis=3) < tol.TURNED
         meeting[np.any(same & known[:, None], axis=2)] = np.nan  # on a self-motion of which all circuits are known
         more.append(meeting)
         rest = np.flatnonzero(lost & ~linkage)
@@ -142,8 +142,8 @@ class Recorded:
 
     def samples(self, target: Array, near: Array) -> Array:
         """Candidates (N, FREED, B, n) with values for free joints all round; nan where they miss their target."""
-        q, miss = self._all_round(target, near)
-        return np.where((miss <= ACCEPTED**2)[..., None], q, np.nan)
+        q, miss = self._shifted(target, near, ROUND)
+        return np.where((miss <= tol.ACCEPTED**2)[..., None], q, np.nan)
 
     def best_shift(self, target: Array, near: Array, loose: Bool) -> tuple[Array, Bool]:
         """How far from `near` the free joints of targets are best: (N, 1), [rad, parts of the reach].
@@ -158,16 +158,12 @@ class Recorded:
             _, miss = self._shifted(target[open_], near[open_], best[open_, None] + shift)
             size = np.where(loose[open_, None], miss, np.inf).min(axis=2)
             best[open_] += shift[size.argmin(axis=1)]
-            open_ = open_[~(size.min(axis=1) <= (ROUNDING if closer else ACCEPTED) ** 2)]
+            open_ = open_[~(size.min(axis=1) <= (tol.ROUNDING if closer else tol.ACCEPTED) ** 2)]
             if not len(open_):
                 break
             apart /= 16
             shift = apart * np.arange(-16.0, 17.0)[:, None]
         return best, single
-
-    def _all_round(self, target: Array, near: Array) -> tuple[Array, Array]:
-        """Candidates (N, FREED, B, n) with values for free joints all round; squared residuals."""
-        return self._shifted(target, near, ROUND)
 
     def _shifted(self, target: Array, near: Array, shift: Array) -> tuple[Array, Array]:
         """Candidates (N, S, B, n) with free joints so far from `near`, (S, 1) or (N, S, 1); squared residuals."""
@@ -181,9 +177,9 @@ class Recorded:
         offsets = np.concatenate([rng.uniform(-1, 1, (FREED, n)) * unit, np.zeros((SHAKEN, n))])
         goals = np.repeat(target[:, None], len(offsets), axis=1)
         for k in range(FREED, len(offsets)):
-            goals[:, k] = moved(self.arm, self.task, target, SHAKE * rng.uniform(-1, 1, 6))
+            goals[:, k] = moved(self.arm, self.task, target, tol.SHAKE * rng.uniform(-1, 1, 6))
         q, miss = self._at(goals, near[:, None] + offsets)
-        return _each_once(np.where((miss < HOPELESS**2)[..., None], q, np.nan))
+        return _each_once(np.where((miss < tol.HOPELESS**2)[..., None], q, np.nan))
 
     def _at(self, goals: Array, values: Array) -> tuple[Array, Array]:
         """Candidates (N, S, B, n) of targets (N, S, ...) with values (N, S, n) for free joints; squared residuals."""
@@ -205,7 +201,7 @@ def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
     """Whether a closed form gives random postures back without a correction: its quartic may be ill-conditioned."""
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 8, 1.0)
     _, miss, _ = recorded(arm, task, geometry).rows(fk(arm, q))
-    return int((miss.min(axis=1) <= ACCEPTED**2).sum()) >= 15
+    return int((miss.min(axis=1) <= tol.ACCEPTED**2).sum()) >= 15
 
 
 def as_rows(values: Sequence[ArrayLike], count: int) -> Array:

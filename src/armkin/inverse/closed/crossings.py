@@ -11,7 +11,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import RATHER, SAME, SEED
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -46,9 +46,9 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
         found |= changes
-        second[changes] *= RATHER  # there, not at a step beside it
+        second[changes] *= tol.RATHER  # there, not at a step beside it
     for b in range(1, B):  # double roots are there twice
-        twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < SAME
+        twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < tol.SAME
         found[:, :, b] &= ~twin.any(axis=2)
     at = _apart(arm, place.reshape(N, -1, n), np.where(found, second, np.inf).reshape(N, -1)).reshape(-1, n)
     out = np.full((len(at), 8, n), np.nan)
@@ -61,7 +61,7 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     there, size = newton.correct(arm, task, start, goal, steps=10)
     # what falls back stands for no self-motion: it is on both, nearly
     back = np.abs(newton.difference(arm, there, np.repeat(at[some], 8, axis=0))).max(axis=1) < 0.5 * AWAY
-    out[some] = np.where((back | (size > SEED))[:, None], np.nan, there).reshape(-1, 8, n)
+    out[some] = np.where((back | (size > tol.SEED))[:, None], np.nan, there).reshape(-1, 8, n)
     return out.reshape(N, -1, n)
 
 

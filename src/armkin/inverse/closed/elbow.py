@@ -15,7 +15,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, distance2, linear, rotation_between, spin
-from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, PARALLEL, ROUNDING
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.chain import Chain, is_parallel
@@ -31,7 +31,7 @@ class Elbow:
     def __init__(self, chain: Chain, tip: Array) -> None:
         """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm]."""
         L2 = chain.link[2]
-        self.parallel = is_parallel(L2, ROUNDING)  # to rounding, so that `miss` and `turned_back` hold as they are
+        self.parallel = is_parallel(L2, tol.ROUNDING)  # to rounding, so that `miss` and `turned_back` hold as they are
         sense3 = 1.0 if L2[2, 2] > 0 else -1.0
         if sense3 < 0:
             L2, tip = L2 @ FLIP, FLIP[:3, :3] @ tip
@@ -42,7 +42,7 @@ class Elbow:
         self.rise, self.to_fore = float(upper[2]), pose.constant(L2 @ FLIP if sense3 < 0 else L2)
         self.along = float(upper[2] + fore[2])
         self.two_link = TwoLink(upper[:2], fore[:2], sense3)
-        self.scale = max(float(np.abs(chain.link[:, :3, 3]).max()), float(np.abs(tip).max()), NO_LENGTH)
+        self.scale = max(float(np.abs(chain.link[:, :3, 3]).max()), float(np.abs(tip).max()), tol.NO_LENGTH)
 
     def solve(
         self, p: list[Entry], past: list[Entry], prefer: Prefer, tip: list[Entry] | None = None
@@ -106,7 +106,7 @@ class TwoLink:
         """upper, fore: l and m, (2,) [mm]; sense: -1 if joint 3 turns against joint 2."""
         (self.lx, self.ly), (self.mx, self.my) = upper.tolist(), fore.tolist()
         self.sense = sense
-        self.scale = max(float(np.abs(upper).max()), float(np.abs(fore).max()), NO_LENGTH)
+        self.scale = max(float(np.abs(upper).max()), float(np.abs(fore).max()), tol.NO_LENGTH)
 
     def solve(
         self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None, fore: list[Entry] | None = None,
@@ -140,7 +140,7 @@ def together(first: Pair, second: Pair, sense: float) -> Pair:
     return Pair(first.c * second.c - first.s * s2, first.s * second.c + first.c * s2)
 
 
-def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | None:
     """Arms whose joints 2 and 3 (for pitch tasks also 4) are parallel: xyz, xyz_roll, xyz_pitch, xyz_pitch_roll."""
     n = {"xyz": 3, "xyz_roll": 4, "xyz_pitch": 4, "xyz_pitch_roll": 5}.get(task.name)
     if n != arm.n or arm.prismatic[1:].any():
@@ -150,7 +150,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None
     for i in range(2, parallels + 1):
         if not is_parallel(link[i], tolerance):
             return None
-    if arm.prismatic[0] and abs(link[1][2, 2]) < PARALLEL:
+    if arm.prismatic[0] and abs(link[1][2, 2]) < tol.PARALLEL:
         return None  # the slide lies in the arm's plane
     why = "joints 2 and 3 are parallel" if parallels == 2 else "joints 2, 3 and 4 are parallel"
     labels = ("" if arm.prismatic[0] else "shoulder", "elbow", "")

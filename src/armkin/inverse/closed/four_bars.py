@@ -14,7 +14,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int, cross_rows
 from armkin.forward import jacobian
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import NEAR, NO_AREA, PARALLEL, SAME, SOLUTION, TINY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm
 
 
@@ -47,12 +47,12 @@ def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
     least, most = np.roll(lowest, -2, axis=1), np.roll(highest, -2, axis=1)
     # equal bars, or nearly: there are several postures in one line, and the curve may fall into others that cross
     ends = np.abs(np.stack([lowest - least, lowest - most, highest - least, highest - most]))
-    several = ((ends < NEAR).sum(axis=0) > 1).any(axis=1)
+    several = ((ends < tol.NEAR).sum(axis=0) > 1).any(axis=1)
     # where all bars come so near to one line that the posture in it solves the target, two circuits are one
-    least, most = least - SOLUTION, most + SOLUTION
+    least, most = least - tol.SOLUTION, most + tol.SOLUTION
     reaches = ((lowest > least) & (lowest < most)) | ((highest > least) & (highest < most))
     length = np.where(at.spherical[:, None], np.sin(at.bars), at.bars)
-    known[rows] = (at.planar | at.spherical) & (length > NEAR).all(axis=1) & ~several
+    known[rows] = (at.planar | at.spherical) & (length > tol.NEAR).all(axis=1) & ~several
     two = np.flatnonzero(~reaches.all(axis=1))
     joint[rows[two]] = which[two, reaches[two].argmin(axis=1)]
     return known, joint
@@ -75,7 +75,7 @@ def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
     N, _, B, n = q.shape
     there = ~np.isnan(q[..., 0])
     first = np.take_along_axis(q, there.argmax(axis=1)[:, None, :, None], axis=1)
-    joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > SAME).any(axis=1))
+    joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > tol.SAME).any(axis=1))
     k, b = np.nonzero(joints.sum(axis=2) == 4)
     known, joint = dead_points(arm, first[k, 0, b], joints[k, b])
     k, b, joint = k[known], b[known], joint[known]
@@ -110,16 +110,16 @@ def _linkages(arm: Arm, q: Array, which: Int) -> _Linkages:
     after, ahead = np.roll(axis, -1, axis=1), np.roll(point, -1, axis=1) - point
     normal = cross_rows(axis, after)
     area = np.linalg.norm(normal, axis=2)
-    planar = (area < NO_AREA).all(axis=1)
+    planar = (area < tol.NO_AREA).all(axis=1)
     behind = np.roll(ahead, 1, axis=1)
     bars, sine = np.linalg.norm(ahead, axis=2), (cross_rows(behind, ahead) * axis[:, :1]).sum(axis=2)
     # all meet in the point where the first two do
-    far = np.maximum(area[:, :1] ** 2, TINY)
+    far = np.maximum(area[:, :1] ** 2, tol.TINY)
     turn = cross_rows(ahead[:, 0], axis[:, 1])
     along = (turn * normal[:, 0]).sum(axis=1, keepdims=True) / far
     centre = point[:, :1] + (along * axis[:, 0])[:, None]
     off = np.linalg.norm(cross_rows(centre - point, axis), axis=2)
-    spherical = ~planar & (area > PARALLEL).all(axis=1) & (off < NO_AREA).all(axis=1)
+    spherical = ~planar & (area > tol.PARALLEL).all(axis=1) & (off < tol.NO_AREA).all(axis=1)
     arcs = np.arctan2(area, (axis * after).sum(axis=2))
     triple = (np.roll(axis, 1, axis=1) * normal).sum(axis=2)
     some = spherical[:, None]

@@ -17,7 +17,7 @@ from armkin.formula.arrays import Array, Entry, Truth
 from armkin.inverse.closed.elbow import together
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, spin
-from armkin.inverse.numeric.tolerances import APART_ROOTS, LAST_ERROR, NO_DETERMINANT, NO_SIZE
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.rotation import joint_motion, rotation_about
@@ -49,7 +49,7 @@ class NewtonSteps:
         follow = -np.linalg.solve(rest, own) if len(task.sums) else np.zeros((0, self.size))
         self.follow: list[list[float]] = follow.tolist()  # how the last joints turn with the first ones
         error = min(SLOPE * off, 0.5)  # its square after a step, and so on
-        least = max(math.ceil(math.log2(math.log(LAST_ERROR) / math.log(error))), 1)
+        least = max(math.ceil(math.log2(math.log(tol.LAST_ERROR) / math.log(error))), 1)
         self.steps = min(least + 1, MOST)  # one more, and two thirds of those near a singularity need no other way
         self.counted = task.name == "xyz" and not arm.prismatic.any()
         # squared residual of a seed that leads nowhere, and need not; the error grows with a slide's extension
@@ -65,7 +65,7 @@ class NewtonSteps:
         for _ in range(self.steps):
             missing, columns = self._linear(pairs, where)
             adjugate, det = _adjugate(columns)
-            inverse = det / (det * det + NO_DETERMINANT)
+            inverse = det / (det * det + tol.NO_DETERMINANT)
             pairs = self._moved(pairs, [arrays.mul(inverse, arrays.dot(row, missing)) for row in adjugate])
             first = missing if first is None else first
         assert first is not None
@@ -144,7 +144,7 @@ def _peeled(arm: Arm) -> tuple[Array, list[float]]:
         front, back = i > 0 and not slides[i - 1], i < arm.n and not slides[i]
         if front:
             x, y = link[i, :2, 3] if i == arm.n else (-link[i, 1, 2], link[i, 0, 2])
-            turn = math.atan2(y, x) if math.hypot(x, y) > NO_SIZE else 0.0
+            turn = math.atan2(y, x) if math.hypot(x, y) > tol.NO_SIZE else 0.0
             turns[i - 1] += turn
             link[i] = joint_motion(False, -turn) @ link[i]
         if back and i > 0:
@@ -189,7 +189,7 @@ def _merged(pairs: list[Pair], unit: list[float]) -> Truth:
                         d = arrays.mul(scale, v - other)
                         away = arrays.add(away, d * d)
         if not isinstance(away, float):
-            merged = merged | (away < APART_ROOTS**2)
+            merged = merged | (away < tol.APART_ROOTS**2)
     return merged
 
 

@@ -18,7 +18,7 @@ from armkin.inverse.closed.elbow import TwoLink
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer
 from armkin.inverse.closed.three_joints import Position
-from armkin.inverse.numeric.tolerances import EXACT, NO_AREA
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.chain import Chain, axes, reverse
@@ -28,7 +28,7 @@ Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Doubt]]
 
 
 def recognise(  # noqa: C901 - the closed form is a function in it
-    arm: Arm, task: Task, tolerance: float = EXACT
+    arm: Arm, task: Task, tolerance: float = tol.EXACT
 ) -> Geometry | None:
     """Planar and SCARA arms with as many joints as constraints."""
     if task.name not in ("xy", "xy_theta", "xyz_yaw") or arm.n != task.constraints:
@@ -192,8 +192,8 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
         end = pose.times(P, link[3])
         x, y = goal[0] - end[9], goal[1] - end[10]
         det = arrays.sub(arrays.mul(a[0], b[1]), arrays.mul(a[1], b[0])) + 0.0 * x
-        parallel = arrays.absolute(det) < NO_AREA
-        inverse_det = arrays.sign(det) / arrays.maximum(arrays.absolute(det), NO_AREA)
+        parallel = arrays.absolute(det) < tol.NO_AREA
+        inverse_det = arrays.sign(det) / arrays.maximum(arrays.absolute(det), tol.NO_AREA)
         d1 = (arrays.mul(x, b[1]) - arrays.mul(y, b[0])) * inverse_det
         d3 = (arrays.mul(a[0], y) - arrays.mul(a[1], x)) * inverse_det
         return [Pair(d1, None), second, Pair(d3, None)], Doubt(parallel, parallel)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
 
-from armkin.inverse.numeric.tolerances import FREE, NEARBY, NEARLY_FREE, ONE_ROOT, SHARP, TANGENT
+from armkin.inverse.numeric import tolerances as tol
 
 
 class Precision(NamedTuple):
@@ -26,7 +26,7 @@ class Precision(NamedTuple):
 
 
 ULPS = 128 * 2.0**-23  # of a float: a pose of six joints is off by ten to a hundred
-DOUBLE = Precision(TANGENT, SHARP, ONE_ROOT, FREE, NEARLY_FREE, NEARBY**2)
+DOUBLE = Precision(tol.TANGENT, tol.SHARP, tol.ONE_ROOT, tol.FREE, tol.NEARLY_FREE, tol.NEARBY**2)
 SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)
 
 _current = ContextVar("precision", default=DOUBLE)

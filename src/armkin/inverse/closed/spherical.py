@@ -20,7 +20,7 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, distance2, walked_back
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.closed.wrist import Wrist, meeting_point
-from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.chain import Chain, is_parallel, reverse
@@ -29,7 +29,7 @@ from armkin.model.rotation import inverse
 Place = Callable[..., tuple[list[Pair], Doubt]]
 
 
-def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | None:
     """Six joints and a full pose, axes 4, 5, 6 or 1, 2, 3 meeting in a point."""
     if task.name != "pose" or arm.n != 6:
         return None
@@ -79,7 +79,7 @@ class SphericalWrist:
             self.place = position.solve
             self.why = f"of the other three, {position.why}"
         self.links = [pose.constant(L) for L in chain.link[:4]]
-        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), NO_LENGTH)
+        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), tol.NO_LENGTH)
         L3 = chain.link[3]
         self.height4 = float((L3[:3, :3].T @ (after3 - L3[:3, 3]))[2])  # the centre on axis 4
         end = inverse(chain.link[6])

@@ -20,19 +20,7 @@ import numpy as np
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry, Truth
 from armkin.inverse.closed.precision import precision
-from armkin.inverse.numeric.tolerances import (
-    AT_INFINITY,
-    LEVEL_ROOT,
-    MERGING,
-    NO_CUBIC_SLOPE,
-    NO_SIZE,
-    NO_SLOPE,
-    ROUNDING,
-    TINY,
-    TOUCHING,
-    UNDERFLOW,
-    UNDERFLOW_SQUARED,
-)
+from armkin.inverse.numeric import tolerances as tol
 
 
 class Pair(NamedTuple):
@@ -175,7 +163,7 @@ def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
 
 def normalised(pair: Pair) -> Pair:
     """The pair on the unit circle: the closest angle where `linear` found no real root."""
-    size = arrays.sqrt(arrays.maximum(pair.c * pair.c + pair.s * pair.s, TINY))
+    size = arrays.sqrt(arrays.maximum(pair.c * pair.c + pair.s * pair.s, tol.TINY))
     return Pair(pair.c / size, pair.s / size)
 
 
@@ -238,7 +226,7 @@ def half_tangent(pair: Pair) -> Entry:
     ahead = pair.c > 0.0
     below = arrays.where(ahead, 1.0 + pair.c, pair.s)
     above = arrays.where(ahead, pair.s, 1.0 - pair.c)
-    far = arrays.absolute(below) < AT_INFINITY
+    far = arrays.absolute(below) < tol.AT_INFINITY
     return arrays.where(far, 1e9, above / arrays.where(far, 1.0, below))
 
 
@@ -259,7 +247,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     size = arrays.add(abs(ecc), abs(ess))
     for v in (e0, ec, es, ecs):
         size = arrays.add(size, abs(v))
-    inverse = 1.0 / arrays.maximum(size, NO_SIZE * scale)
+    inverse = 1.0 / arrays.maximum(size, tol.NO_SIZE * scale)
     # the conic's symmetric matrix [[a, b, u], [b, -a, v], [u, v, w]], less a multiple of the circle's diag(1, 1, -1)
     a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
     u, v = 0.5 * ec * inverse, 0.5 * es * inverse
@@ -278,7 +266,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     squares = [columns[i][i] for i in range(3)]
     column = _longest(squares, columns)
     down = 1.0 / arrays.sqrt(
-        arrays.maximum(arrays.maximum(squares[0], arrays.maximum(squares[1], squares[2])), ROUNDING)
+        arrays.maximum(arrays.maximum(squares[0], arrays.maximum(squares[1], squares[2])), tol.ROUNDING)
     )
     px, py, pz = (down * value for value in column)
     rows = [[M[0][0], b - pz, u + py], [b + pz, M[1][1], v - px], [u - py, v + px, M[2][2]]]
@@ -286,14 +274,14 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     lines = [_longest([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
     lx, ly, lz = (arrays.where(signs(0) > 0.0, *both) for both in zip(*lines, strict=True))
     # a line at infinity has no direction
-    lx = lx + UNDERFLOW
+    lx = lx + tol.UNDERFLOW
     h2 = lx * lx + ly * ly
     disc = h2 - lz * lz
-    pair, _ = linear(lx, ly, -lz, 1, UNDERFLOW_SQUARED, None, disc)
-    real = disc > -(TOUCHING**2) * h2
+    pair, _ = linear(lx, ly, -lz, 1, tol.UNDERFLOW_SQUARED, None, disc)
+    real = disc > -(tol.TOUCHING**2) * h2
     at, slope = _on_conic(pair, real, a, b, u, v, w)
-    merging = (real & (arrays.absolute(slope) < MERGING)) | ((disc < 0.0) & (-disc < TOUCHING**2 * h2))
-    free = rest * size < NO_SIZE * scale
+    merging = (real & (arrays.absolute(slope) < tol.MERGING)) | ((disc < 0.0) & (-disc < tol.TOUCHING**2 * h2))
+    free = rest * size < tol.NO_SIZE * scale
     return _prefer(at, free, prefer), Doubt(merging | triple | free, free)
 
 
@@ -303,7 +291,7 @@ def _on_conic(pair: Pair, real: Truth, a: Entry, b: Entry, u: Entry, v: Entry, w
     for _ in range(2):
         value = w + 2.0 * (u * c + v * s) + a * (c * c - s * s) + 2.0 * b * c * s
         slope = 2.0 * (v * c - u * s) + 2.0 * b * (c * c - s * s) - 4.0 * a * c * s
-        step = arrays.where(real, value * slope / (slope * slope + NO_SLOPE), 0.0)
+        step = arrays.where(real, value * slope / (slope * slope + tol.NO_SLOPE), 0.0)
         step = arrays.minimum(arrays.maximum(step, -0.01), 0.01)
         c, s = c + s * step, s - c * step
         shorter = arrays.where(real, 1.0 / arrays.sqrt(arrays.maximum(c * c + s * s, 0.5)), 1.0)
@@ -329,13 +317,15 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     disc = q * q + p3 * p3 * p3
     # one real root (Cardano) or three (Viete): the largest and the smallest of them
     root = arrays.sqrt(arrays.absolute(disc))
-    A = arrays.cbrt(arrays.absolute(q) + root + TINY)
+    A = arrays.cbrt(arrays.absolute(q) + root + tol.TINY)
     alone = arrays.copysign(A - p3 / A, -q)
     size = 2.0 * arrays.sqrt(arrays.maximum(-p3, 0.0))
     c, s = arrays.cos_sin(arrays.arctan2(root, -q) / 3.0)
     most = size * c
     least = -0.5 * size * (c + np.sqrt(3.0) * s)
-    span = arrays.sqrt(h) + NO_SIZE  # at an end, where two roots are double, rounding must not choose the double one
+    span = (
+        arrays.sqrt(h) + tol.NO_SIZE
+    )  # at an end, where two roots are double, rounding must not choose the double one
     above = arrays.maximum(most + third - span, 0.0)
     below = arrays.maximum(-span - least - third, 0.0)
     # the middle root is -(most + least): the wider gap is at the largest if most + least > 0 ... and the reverse
@@ -344,8 +334,8 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     for _ in range(2):
         value = ((x - w) * x + linear_) * x + rest
         slope = (3.0 * x - 2.0 * w) * x + linear_
-        x = x - value * slope / (slope * slope + NO_CUBIC_SLOPE)
-    return x, arrays.absolute(slope) < LEVEL_ROOT
+        x = x - value * slope / (slope * slope + tol.NO_CUBIC_SLOPE)
+    return x, arrays.absolute(slope) < tol.LEVEL_ROOT
 
 
 def _longest(sizes: Sequence[Entry], vectors: Sequence[Sequence[Entry]]) -> list[Entry]:

@@ -38,17 +38,7 @@ from armkin.inverse.closed.subproblems import (
     spin,
     trig_quadratic,
 )
-from armkin.inverse.numeric.tolerances import (
-    EXACT,
-    NEAR,
-    NEARBY,
-    NEARLY_SPECIAL,
-    NO_COEFFICIENT,
-    NO_LENGTH,
-    NO_SIZE,
-    SEED,
-    TINY,
-)
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.choose_task import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -59,7 +49,7 @@ from armkin.model.rotation import inverse
 class Position:
     """``link[0] Z1 link[1] Z2 link[2] Z3 tip``, three joints, revolute or prismatic, any geometry."""
 
-    def __init__(self, chain: Chain, tip: Array, tolerance: float = EXACT, near: float = NEAR) -> None:
+    def __init__(self, chain: Chain, tip: Array, tolerance: float = tol.EXACT, near: float = tol.NEAR) -> None:
         """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm].
 
         tolerance: what still counts as a special case. `close` says that the arm is farther from one than that,
@@ -68,7 +58,7 @@ class Position:
         Raises UsageError if the three joints cannot place a point in space.
         """
         self.prismatic = [bool(p) for p in chain.prismatic[:3]]
-        self.scale = max(float(np.abs(chain.link[1:3, :3, 3]).max()), float(np.abs(tip).max()), NO_LENGTH)
+        self.scale = max(float(np.abs(chain.link[1:3, :3, 3]).max()), float(np.abs(tip).max()), tol.NO_LENGTH)
         self.from_base = pose.constant(inverse(chain.link[0]))
         L1, L2 = chain.link[1], chain.link[2]
         self.L1 = pose.constant(L1)
@@ -103,11 +93,11 @@ class Position:
         if self.prismatic[1]:
             # one unknown d2 (its square cancels in no combination): eliminate it between the rows
             self.regular = not self.prismatic[0] and self._is_regular(abs(float(self.rows[0, 2])))
-            if self.prismatic[0] and np.abs(self.A).max() < NO_COEFFICIENT:
+            if self.prismatic[0] and np.abs(self.A).max() < tol.NO_COEFFICIENT:
                 raise UsageError("joints 1 and 2 slide along one line: three joints cannot place a point")
             return "joint 2 slides, so its value is eliminated first"
         U, S, _ = np.linalg.svd(scaled)
-        if S[0] < NO_COEFFICIENT:
+        if S[0] < tol.NO_COEFFICIENT:
             raise UsageError("joints 1 and 2 turn about one line: three joints cannot place a point")
         self.regular = self._is_regular(float(S[1] / S[0]))
         self.alone = U[:, 1] * weight  # combination that holds q3 alone
@@ -145,7 +135,7 @@ class Position:
 
     def _tip(self, third: Pair) -> list[Entry]:
         """The tip in the frame of joint 2."""
-        return [_at(row.tolist(), third) for row in self.Y]
+        return [_at_joint(row.tolist(), third) for row in self.Y]
 
     def _affine(self, weights: Array, known: list[Entry]) -> list[Entry]:
         """``weights . (known - forms - rows_z y_z)`` as coefficients of (1, b1, b2, b1^2, b1 b2, b2^2)."""
@@ -176,7 +166,7 @@ class Position:
                     for j in range(3):
                         k[i + j] = arrays.add(k[i + j], arrays.mul(quad[i], quad[j]))
             if self.prismatic[0]:  # nothing beyond d^2
-                d, doubt = quadratic(k[2], k[1], k[0], 0, size, NO_SIZE * size * size, prefer[2])
+                d, doubt = quadratic(k[2], k[1], k[0], 0, size, tol.NO_SIZE * size * size, prefer[2])
                 third = Pair(d, None)
             else:
                 power: Entry = 1.0
@@ -191,7 +181,7 @@ class Position:
                 if prefer[2] is not None and np.any(doubt.free):
                     d = arrays.where(doubt.free, prefer[2].c, d)
                 third = Pair(d, None)
-        gx, gy = (_at([six[0], six[1], six[2] if third.s is not None else six[3]], third, 2) for six in g)
+        gx, gy = (_at_joint(six, third) for six in g)
         y = self._tip(third)
         second, doubt2 = rotation_between(y[0], y[1], gx, gy, size, prefer[1])
         return third, second, doubt | doubt2
@@ -199,7 +189,7 @@ class Position:
     def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         alone = self._affine(self.alone, known)
         if self.prismatic[2]:
-            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, NO_SIZE * size, prefer[2])
+            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, tol.NO_SIZE * size, prefer[2])
             third = Pair(d, None)
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
@@ -209,7 +199,7 @@ class Position:
             third = normalised(third)
         y = self._tip(third)
         main = self._affine(self.main, known)
-        right = _at([main[0], main[1], main[2] if third.s is not None else main[3]], third, 2)
+        right = _at_joint(main, third)
         ax, ay = (self.main @ self.A).tolist()
         a, b = (
             arrays.add(arrays.mul(ax, y[0]), arrays.mul(ay, y[1])),
@@ -231,7 +221,7 @@ class Position:
             only = [arrays.sub(arrays.mul(z1, a), arrays.mul(z0, b)) for a, b in zip(*across, strict=True)]
             third, doubt = self._one_unknown(only, size, prefer)
             k = 0 if abs(z0) >= abs(z1) else 1
-            return third, Pair(_at(across[k], third) / float(self.rows[k, 2]), None), doubt
+            return third, Pair(_at_joint(across[k], third) / float(self.rows[k, 2]), None), doubt
         # |y|^2 / 2, for a revolute joint 3 affine in b: cos^2 and sin^2 have equal factors and no product
         half = [self.square[0, 0] / 2, self.square[0, 1], self.square[0, 2]]
         curved = self.square[1, 1] / 2
@@ -241,11 +231,11 @@ class Position:
         if not self.regular:
             # the height does not feel d2: it gives joint 3, then the distance gives d2
             third, doubt = self._one_unknown(across[0], size, prefer)
-            rest = arrays.sub(_at(across[1], third), _at(half, third))
+            rest = arrays.sub(_at_joint(across[1], third), _at_joint(half, third))
             if third.s is None:
                 rest = arrays.sub(rest, arrays.mul(curved, third.c * third.c))
             # d^2 / 2 + (y_z + rows_z) d - rest = 0
-            d, doubt2 = quadratic(0.5, arrays.add(self._tip(third)[2], z1), -rest, 1, size, TINY, None)
+            d, doubt2 = quadratic(0.5, arrays.add(self._tip(third)[2], z1), -rest, 1, size, tol.TINY, None)
             return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
         d2 = [arrays.mul(1.0 / z0, v) for v in across[0]]
@@ -255,29 +245,29 @@ class Position:
         factor = [arrays.add(arrays.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
         six = quadratics.total([*constant, curved, 0.0, 0.0], quadratics.product(d2, factor))
         if self.prismatic[2]:
-            d, doubt = quadratic(six[3], six[1], six[0], 0, size, NO_SIZE * size * size, prefer[2])
+            d, doubt = quadratic(six[3], six[1], six[0], 0, size, tol.NO_SIZE * size * size, prefer[2])
             third = Pair(d, None)
         else:
             third, doubt = quadratics.turn(six, size, prefer[2])
-        return third, Pair(_at(d2, third), None), doubt
+        return third, Pair(_at_joint(d2, third), None), doubt
 
     def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Doubt]:
         """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
         known, slope, other = coefficients
         if self.prismatic[2]:
-            if abs(slope) < NO_SIZE:
+            if abs(slope) < tol.NO_SIZE:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
             return Pair(arrays.mul(-1.0 / slope, known), None), Doubt(np.zeros(1, bool))
         third, doubt = linear(slope, other, arrays.mul(-1.0, known), 0, size, prefer[2])
         return normalised(third), doubt
 
 
-def _at(coefficients: list[Entry], third: Pair, power: int = 1) -> Entry:
-    """``k0 + k1 b1 + k2 b2``, b2 the sine or, of a prismatic joint, that power of d: by default there is no b2."""
-    total = arrays.add(coefficients[0], arrays.mul(coefficients[1], third.c))
-    if third.s is not None:
-        return arrays.add(total, arrays.mul(coefficients[2], third.s))
-    return total if power == 1 else arrays.add(total, arrays.mul(coefficients[2], third.c * third.c))
+def _at_joint(terms: list[Entry], joint: Pair) -> Entry:
+    """An expression affine in a joint's cosine and sine, at the joint; of a slide d k0 + k1 d, of six + k3 d^2."""
+    total = arrays.add(terms[0], arrays.mul(terms[1], joint.c))
+    if joint.s is not None:
+        return arrays.add(total, arrays.mul(terms[2], joint.s))
+    return total if len(terms) < 6 else arrays.add(total, arrays.mul(terms[3], joint.c * joint.c))
 
 
 def _solves(six: list[Entry], third: Pair, length: Entry) -> Truth:
@@ -287,7 +277,7 @@ def _solves(six: list[Entry], third: Pair, length: Entry) -> Truth:
     total, size = terms[0], abs(terms[0])
     for term in terms[1:]:
         total, size = arrays.add(total, term), arrays.add(size, abs(term))
-    solves: Truth = arrays.absolute(total) <= arrays.add(SEED * size, NEARBY * length)
+    solves: Truth = arrays.absolute(total) <= arrays.add(tol.SEED * size, tol.NEARBY * length)
     return solves
 
 
@@ -296,14 +286,14 @@ def _form(rows: Array) -> Array:
     return np.asarray(rows.T @ rows)
 
 
-def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | None:
     """Any three joints that place a point; none that is near a special case but not one."""
     if task.name != "xyz" or arm.n != 3:
         return None
     if rank(arm, task) < 3:
         raise UsageError(f"{arm.name}: its three joints cannot place a point: they move it in a plane or on a line")
-    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance, NEARLY_SPECIAL)
-    if position.close and tolerance == EXACT:
+    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance, tol.NEARLY_SPECIAL)
+    if position.close and tolerance == tol.EXACT:
         return None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     why = f"{kinds}: {position.why}"

@@ -20,14 +20,14 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, linear, rotation_between, walked_back
 from armkin.inverse.closed.three_link import ThreeLink
-from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, PARALLEL
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
 
 
-def recognise(arm: Arm, task: Task, tolerance: float = EXACT) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | None:
     """Six revolute joints and a full pose."""
     if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
         return None
@@ -48,7 +48,7 @@ def fits(chain: Chain, tolerance: float, reach: float) -> bool:
     L1, L2, L3, L4, L5 = chain.link[1:6]
     if not (is_parallel(L2, tolerance) and is_parallel(L3, tolerance)):
         return False
-    if any(is_parallel(L, max(tolerance, PARALLEL)) for L in (L1, L4, L5)):
+    if any(is_parallel(L, max(tolerance, tol.PARALLEL)) for L in (L1, L4, L5)):
         return False
     return float(np.hypot(*_meeting(L5)[1])) <= tolerance * reach
 
@@ -71,7 +71,7 @@ class ThreeParallel:
         self.to_joint2 = pose.constant(inverse(L1))
         self.back5, self.back4 = pose.constant(inverse(L5)), pose.constant(inverse(L4))
         self.height6, _ = _meeting(L5)
-        self.scale = max(float(np.abs(chain.link[1:6, :3, 3]).max()), NO_LENGTH)
+        self.scale = max(float(np.abs(chain.link[1:6, :3, 3]).max()), tol.NO_LENGTH)
         # common direction of the parallel axes, along joint 2's, seen from joint 5
         self.three_link = ThreeLink(L2, L3)
         m = self.three_link.sense4 * L4[2, :3]
@@ -79,7 +79,7 @@ class ThreeParallel:
         # m . Rz(q5) b
         self.cos5, self.sin5 = float(m[0] * b[0] + m[1] * b[1]), float(m[1] * b[0] - m[0] * b[1])
         self.rest5 = float(m[2] * b[2])
-        self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
+        self.orthogonal = abs(self.rest5) < tol.EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < tol.EXACT
         self.m = [float(v) for v in m]
         self.B = pose.constant(L5)
         # distance along the common direction from joint 2 to the point where axes 5 and 6 meet
@@ -87,7 +87,7 @@ class ThreeParallel:
         past = L4[:3, 3] + L4[:3, :3] @ [0.0, 0.0, meeting[2]]
         R23 = L2[:3, :3] @ L3[:3, :3]
         self.along = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3] + R23 @ past)[2])
-        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), NO_LENGTH)
+        self.reach = max(float(np.linalg.norm(chain.link[1:, :3, 3], axis=1).sum()), tol.NO_LENGTH)
 
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (shoulder, elbow, wrist, N)."""

@@ -8,7 +8,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Doubt, Pair, Prefer, distance2, linear, rotation_between, signs, spin
-from armkin.inverse.numeric.tolerances import EXACT, PARALLEL
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.chain import is_parallel
 from armkin.model.rotation import inverse
 
@@ -22,7 +22,7 @@ def foot(L: Array) -> Array:
 
 def meeting_point(L4: Array, L5: Array, tolerance: float) -> tuple[Array, Array] | None:
     """Where the axes on both sides of two links meet: seen before the first joint and after the last one, or None."""
-    if is_parallel(L4, PARALLEL) or is_parallel(L5, PARALLEL):
+    if is_parallel(L4, tol.PARALLEL) or is_parallel(L5, tol.PARALLEL):
         return None
     at4 = foot(L4)
     at5 = (inverse(L4) @ [*at4, 1.0])[:3]
@@ -44,8 +44,8 @@ class Wrist:
         self.cos5 = float(A[2, 0] * b[0] + A[2, 1] * b[1])
         self.sin5 = float(A[2, 1] * b[0] - A[2, 0] * b[1])
         self.rest5 = float(A[2, 2] * b[2])
-        self.mirrored = abs(self.rest5) < EXACT and abs(self.sin5) < EXACT and abs(abs(self.cos5) - 1.0) < EXACT
-        self.orthogonal = abs(self.rest5) < EXACT and abs(self.cos5**2 + self.sin5**2 - 1.0) < EXACT
+        self.mirrored = max(abs(self.rest5), abs(self.sin5), abs(abs(self.cos5) - 1.0)) < tol.EXACT
+        self.orthogonal = max(abs(self.rest5), abs(self.cos5**2 + self.sin5**2 - 1.0)) < tol.EXACT
 
     def solve(
         self, x: list[Entry], z: list[Entry], prefer: Prefer

@@ -22,7 +22,7 @@ from armkin.inverse.elimination.joint_order import Role, roles
 from armkin.inverse.elimination.passes import TILT, attempt
 from armkin.inverse.elimination.pencil import Pencil, build
 from armkin.inverse.elimination.polish import jacobian, refine, tip
-from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, ELIMINATED, ERROR_FLOOR, RANK, SHAKES, TINY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import inverse
 
 PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
@@ -77,9 +77,9 @@ def kinds(closed: Loop, goal: Array) -> Int:
         return out
     x, y = goal[:, 0, 2], goal[:, 1, 2]  # of axis 6; axis 1 is z
     sine = np.hypot(x, y)
-    apart = np.abs(goal[:, 0, 3] * y - goal[:, 1, 3] * x) / np.maximum(sine, TINY)
-    out[apart < BESIDE_SPECIAL] = Kind.MEETING
-    out[sine < BESIDE_SPECIAL] = Kind.PARALLEL
+    apart = np.abs(goal[:, 0, 3] * y - goal[:, 1, 3] * x) / np.maximum(sine, tol.TINY)
+    out[apart < tol.BESIDE_SPECIAL] = Kind.MEETING
+    out[sine < tol.BESIDE_SPECIAL] = Kind.PARALLEL
     return out
 
 
@@ -96,9 +96,9 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     rng = np.random.default_rng(5)
     q = rng.uniform(-np.pi, np.pi, (SAMPLES, 6))
     q[:, prismatic] = rng.uniform(-1, 1, (SAMPLES, int(np.sum(prismatic))))
-    goal, size = _poses(closed, q)
+    goal, size = poses(closed, q)
     # Collinear axes, say: no solution is isolated and no role can do better.
-    redundant = bool(np.all(size < RANK))
+    redundant = bool(np.all(size < tol.RANK))
     rated: list[_Rating] = []
     # The first slots nearly always do; some arms with two prismatic joints need the others.
     for slot, hidden in _SEARCH:
@@ -113,7 +113,7 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     return Elimination(closed, _sequence(closed, rated), rated[0].error)
 
 
-def _poses(closed: Loop, q: Array) -> tuple[Array, Array]:
+def poses(closed: Loop, q: Array) -> tuple[Array, Array]:
     """Poses (N, 4, 4) of the loop's chain at q (N, 6), and their Jacobians' smallest singular values (N,)."""
     frame, joints = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
     goal = np.tile(np.eye(4), (len(q), 1, 1))
@@ -131,9 +131,9 @@ def _sequence(closed: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
     others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
     again = build(first.role, closed.links, closed.prismatic, PSI[1])
     plans = [first, *others[:1], again, *others[1:]]
-    while len(plans) < len(SHAKES):
+    while len(plans) < len(tol.SHAKES):
         plans.append(plans[-2])
-    return tuple(plans[: len(SHAKES)])
+    return tuple(plans[: len(tol.SHAKES)])
 
 
 def _of_special_poses(elimination: Elimination, kind: Kind) -> tuple[Pencil, ...]:
@@ -142,7 +142,7 @@ def _of_special_poses(elimination: Elimination, kind: Kind) -> tuple[Pencil, ...
     q = _postures(closed, kind)
     if len(q) < SAMPLES:  # the arm cannot stand there
         return elimination.plans
-    goal = _poses(closed, q)[0]
+    goal = poses(closed, q)[0]
     usual = list({id(pencil): pencil for pencil in elimination.plans}.values())
     rated = [_rate(closed, pencil.role, q, goal) for pencil in usual if pencil.psi == PSI[0]]
     if rated[0].error < HEALTHY:
@@ -161,7 +161,7 @@ def _postures(closed: Loop, kind: Kind) -> Array:
     count = SAMPLES * STARTS
     q = rng.uniform(-np.pi, np.pi, (2, count, 6))
     q[:, :, closed.prismatic] /= np.pi
-    goal = _poses(closed, q[0])[0]
+    goal = poses(closed, q[0])[0]
     if kind is Kind.PARALLEL:
         c, s = np.cos(q[0, :, 0]), np.sin(q[0, :, 0])
         up = np.where(rng.random(count) < 0.5, 1.0, -1.0)
@@ -171,7 +171,7 @@ def _postures(closed: Loop, kind: Kind) -> Array:
         along = goal[:, :2, 2] / np.linalg.norm(goal[:, :2, 2], axis=1, keepdims=True)
         goal[:, :2, 3] = along * np.linalg.norm(goal[:, :2, 3], axis=1, keepdims=True)
     done = refine(closed.chain, closed.prismatic, q[1], goal, 20, damped=True)
-    good = (done.residual < ELIMINATED) & (done.weakness < STEEP)
+    good = (done.residual < tol.ELIMINATED) & (done.weakness < STEEP)
     return done.q[good][:SAMPLES]
 
 
@@ -214,7 +214,7 @@ def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
     np.minimum.at(nearest, found.pose, distance)
     if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
         return _Rating(20.0 + pencil.size, 0.0, 1.0, pencil)
-    error = float(np.quantile(np.log10(nearest + ERROR_FLOOR), 0.9))
+    error = float(np.quantile(np.log10(nearest + tol.ERROR_FLOOR), 0.9))
     left_open = float(np.mean(attempt(closed, pencil, goal, 0)[1])) if error < HEALTHY else 1.0
     # Below 1e-11 accuracy buys nothing; size and open poses cost time; a constant N (slot Lb) saves some.
     cost = max(error, -11.0) + 0.15 * pencil.size + 4 * left_open - 0.5 * (role.slot == 1)

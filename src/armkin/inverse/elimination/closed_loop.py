@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.tolerances import RANK
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import inverse, shrunk
 
 NO_LENGTH = 300.0  # unit [mm] of a chain whose links have no length of their own
@@ -49,13 +49,13 @@ def close(link: Array, prismatic: Bool) -> Loop:
         lengths[rows] = link[i + 1, :3, 3]
         moves[rows, here] = -free[i]
         moves[rows, there] = link[i + 1, :3, :3] @ free[i + 1]
-    d = np.linalg.lstsq(moves, -lengths, rcond=RANK)[0]
+    d = np.linalg.lstsq(moves, -lengths, rcond=tol.RANK)[0]
     moved = np.array(link, dtype=float)
     for i in range(6):
         move = free[i] @ d[start[i] : start[i + 1]]
         moved[i, :3, 3] += moved[i, :3, :3] @ move
         moved[i + 1, :3, 3] -= move
     size = float(np.linalg.norm(moved[1:6, :3, 3], axis=1).sum()) / 3
-    length = size if size > RANK * (1 + float(np.abs(link[:, :3, 3]).max())) else NO_LENGTH
+    length = size if size > tol.RANK * (1 + float(np.abs(link[:, :3, 3]).max())) else NO_LENGTH
     moved = shrunk(moved, length)
     return Loop(np.array(prismatic, dtype=np.bool_), moved[0], moved[1:6], moved[6], length)

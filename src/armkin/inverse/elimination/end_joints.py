@@ -15,8 +15,8 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import line_features
 from armkin.inverse.elimination.joint_order import Role
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import RANK, TINY
 from armkin.model.rotation import inverse, joint_motion
 
 # The columns of Q as (b, a).  The five that give the joints back come last: with Q = (orthonormal)(triangle)
@@ -64,13 +64,13 @@ def prepare(role: Role, part: Bool, links: Array) -> Ends:
             product = np.einsum("bij,jk,akl->bail", U_b, middle, U_a)
             factors = (np.concatenate([product[b, a] for b, a in _MONOMIALS]),)
         size = np.linalg.svd(_monomials(role.slot, factors, _SAMPLES), compute_uv=False)
-        rank = int(np.sum(size > RANK * size[:, :1], axis=1).max())
+        rank = int(np.sum(size > tol.RANK * size[:, :1], axis=1).max())
         return Ends(role.slot, rank, factors, nothing, nothing)
     product = np.einsum("bij,ja->iba", U_b, middle @ turned)
     Q = np.stack([product[:, b, a] for b, a in _MONOMIALS], axis=1)
     basis, size, _ = np.linalg.svd(Q)
-    rank = int(np.sum(size > RANK * size[0]))
-    return Ends(role.slot, rank, (), basis[:, rank:].T, np.linalg.pinv(Q, rcond=RANK)[_READ:])
+    rank = int(np.sum(size > tol.RANK * size[0]))
+    return Ends(role.slot, rank, (), basis[:, rank:].T, np.linalg.pinv(Q, rcond=tol.RANK)[_READ:])
 
 
 def eliminate(ends: Ends, Y: Array) -> tuple[Array, Array]:
@@ -80,7 +80,7 @@ def eliminate(ends: Ends, Y: Array) -> tuple[Array, Array]:
     Q = _monomials(ends.slot, ends.factors, Y)
     if ends.rank < 9:
         basis, size, vectors = np.linalg.svd(Q)
-        kept = np.maximum(size[:, : ends.rank, None], TINY)
+        kept = np.maximum(size[:, : ends.rank, None], tol.TINY)
         inverse_factor = np.swapaxes(vectors[:, : ends.rank] / kept, 1, 2)
         transposed = np.swapaxes(basis, 1, 2)
         return transposed[:, ends.rank :], (inverse_factor @ transposed[:, : ends.rank])[:, _READ:]

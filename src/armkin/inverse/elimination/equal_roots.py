@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.numeric.tolerances import APART_VECTORS, EQUAL_ROOTS, TWIN_ROOTS, UPRIGHT
+from armkin.inverse.numeric import tolerances as tol
 
 # (cos 3f, sin 3f, cos f, sin f) to (c^3, c^2 s, c s^2, s^3) of c = cos f, s = sin f
 _CUBIC: Array = 0.25 * np.array([[1, 0, 3, 0], [0, 1, 0, 1], [-1, 0, 1, 0], [0, -1, 0, 3]], dtype=float)
@@ -25,9 +25,9 @@ def groups(pose: Int, x: Array) -> list[Int]:
     order = np.lexsort((angle, pose))
     away = np.where(np.diff(pose[order]) == 0, np.diff(angle[order]), np.inf)
     away = np.concatenate([[np.inf], away, [np.inf]])[: len(pose) + 1]
-    first = np.flatnonzero(away[:-1] >= EQUAL_ROOTS)
+    first = np.flatnonzero(away[:-1] >= tol.EQUAL_ROOTS)
     size = np.diff(np.append(first, len(pose)))
-    alone = (away[first] > TWIN_ROOTS) & (away[first + size] > TWIN_ROOTS)
+    alone = (away[first] > tol.TWIN_ROOTS) & (away[first + size] > tol.TWIN_ROOTS)
     return [order[first[alone & (size == d)][:, None] + np.arange(d)] for d in np.unique(size[size > 1]).tolist()]
 
 
@@ -49,7 +49,7 @@ def products(v: Array) -> tuple[Array, Bool, Bool]:
     tangent, vectors = np.linalg.eig(np.where(good[:, None, None], along + _SECOND * second, np.eye(v.shape[1])))
     slant = np.abs(tangent.imag) / (1 + np.abs(tangent) ** 2)
     apart = np.abs(tangent[:, :, None] - tangent[:, None, :]) + np.eye(v.shape[1])
-    good &= (apart > UPRIGHT).all(axis=(1, 2)) & ~((slant > 0) & (slant < UPRIGHT)).any(axis=1)
+    good &= (apart > tol.UPRIGHT).all(axis=(1, 2)) & ~((slant > 0) & (slant < tol.UPRIGHT)).any(axis=1)
     return np.ascontiguousarray(vectors.real.swapaxes(1, 2)), np.asarray(slant == 0), np.asarray(good)
 
 
@@ -60,6 +60,6 @@ def _quotient(low: Array, high: Array) -> tuple[Array, Bool]:
     below, above = (c * low - s * high).reshape(shape), (s * low + c * high).reshape(shape)
     square = below @ below.swapaxes(1, 2)
     size = np.linalg.eigvalsh(square)
-    good = size[:, 0] > APART_VECTORS**2 * size[:, -1]
+    good = size[:, 0] > tol.APART_VECTORS**2 * size[:, -1]
     square = np.where(good[:, None, None], square, np.eye(low.shape[1]))
     return np.linalg.solve(square, below @ above.swapaxes(1, 2)), good

@@ -7,7 +7,7 @@ import numpy as np
 from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination.polish import pose_error, tip
-from armkin.inverse.numeric.tolerances import ALIKE, EXAMINED, HALFWAY, ILL
+from armkin.inverse.numeric import tolerances as tol
 
 MOST = 16  # isolated answers a 6-joint chain can have (Primrose 1986)
 
@@ -68,7 +68,7 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
     key, answers = key[order], rows_of(answers, order)
     pose, q, residual = answers.pose, answers.q, answers.residual
     keep, merged = np.ones(pose.size, dtype=np.bool_), np.zeros(goal.shape[0], dtype=np.bool_)
-    widest = float(np.abs(_WEIGHTS).sum()) * EXAMINED
+    widest = float(np.abs(_WEIGHTS).sum()) * tol.EXAMINED
     for gap in range(1, pose.size):
         first = np.flatnonzero((pose[gap:] == pose[:-gap]) & (key[gap:] - key[:-gap] < widest))
         if first.size == 0:
@@ -76,20 +76,20 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
         second = first + gap
         step = difference(prismatic, q[second], q[first])
         distance = np.abs(step).max(axis=1)
-        near = np.flatnonzero((distance < EXAMINED) & keep[first] & keep[second])
+        near = np.flatnonzero((distance < tol.EXAMINED) & keep[first] & keep[second])
         if near.size == 0:
             continue
         first, second, step, distance = first[near], second[near], step[near], distance[near]
         target = np.ascontiguousarray(goal[pose[first], :3].transpose(1, 2, 0))
         _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
-        blur = np.maximum(HALFWAY, 4 * np.maximum(residual[first], residual[second]))
+        blur = np.maximum(tol.HALFWAY, 4 * np.maximum(residual[first], residual[second]))
         # How far off an answer may be itself: its next Newton step, along a curve of answers that all but solve it.
         radius = 3 * answers.weakness * residual
         reach = np.maximum(radius[first], radius[second])
-        same = (distance < np.maximum(ALIKE, reach)) | (halfway < blur)
+        same = (distance < np.maximum(tol.ALIKE, reach)) | (halfway < blur)
         worse = residual[second] > residual[first]
         keep[np.where(worse, second, first)[same]] = False
-        merged[pose[first[same & (distance > 1e-2 * ALIKE)]]] = True
+        merged[pose[first[same & (distance > 1e-2 * tol.ALIKE)]]] = True
     return rows_of(answers, keep), merged
 
 
@@ -101,7 +101,7 @@ def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
     """
     number = np.bincount(answers.pose, minlength=count)
     near_singular = number > MOST
-    near_singular[answers.pose[answers.weakness > ILL]] = True
+    near_singular[answers.pose[answers.weakness > tol.ILL]] = True
     if number.max(initial=0) > MOST:
         rank = np.empty(answers.pose.size, dtype=np.int64)
         rank[np.lexsort((answers.weakness, answers.pose))] = _column(answers.pose)

@@ -43,12 +43,12 @@ import numpy as np
 from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import three_prismatic
-from armkin.inverse.elimination.choose_variable import Elimination, Kind, kinds, prepare
+from armkin.inverse.elimination.choose_variable import Elimination, Kind, kinds, poses, prepare
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, best, merge, pack
 from armkin.inverse.elimination.passes import answers_of, attempt, none
-from armkin.inverse.elimination.polish import refine, tip
-from armkin.inverse.numeric.tolerances import ELIMINATED, GRAZING, SHAKES
+from armkin.inverse.elimination.polish import refine
+from armkin.inverse.numeric import tolerances as tol
 
 __all__ = ["Branches", "Elimination", "left_open", "prepare", "solve"]
 
@@ -68,9 +68,7 @@ def left_open(elimination: Elimination, samples: int = 48) -> float:
         return 0.0
     rng = np.random.default_rng(6)
     q = np.where(closed.prismatic, rng.uniform(-1, 1, (samples, 6)), rng.uniform(-np.pi, np.pi, (samples, 6)))
-    frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
-    goal = np.tile(np.eye(4), (samples, 1, 1))
-    goal[:, :3] = np.moveaxis(frame, -1, 0)
+    goal, _ = poses(closed, q)
     for number in range(2):
         if len(goal):
             goal = goal[attempt(closed, elimination.plans[number], goal, number)[1]]
@@ -137,8 +135,8 @@ def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers
     for one in Kind:
         open_poses = np.flatnonzero(kind == one)
         for number, pencil in enumerate(elimination.of_kind(one) if open_poses.size else ()):
-            shaken[open_poses] |= SHAKES[number] > 0
-            if SHAKES[number] > 0 and not moved:
+            shaken[open_poses] |= tol.SHAKES[number] > 0
+            if tol.SHAKES[number] > 0 and not moved:
                 break
             still = np.zeros(open_poses.size, dtype=np.bool_)
             for begin in range(0, open_poses.size, CHUNK):
@@ -169,7 +167,7 @@ def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
         done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
         # where links are all but points the loop's unit is as small, and slides are millions of it long
         far = np.maximum(1.0, np.linalg.norm(part[pose, :3, 3], axis=1))
-        good = done.residual < GRAZING * far
-        touching[begin + pose[good & (done.residual > ELIMINATED * far)]] = True
+        good = done.residual < tol.GRAZING * far
+        touching[begin + pose[good & (done.residual > tol.ELIMINATED * far)]] = True
         found.append(answers_of(closed, begin + pose, done, good))
     return stacked(found), touching, all_

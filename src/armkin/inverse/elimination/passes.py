@@ -12,24 +12,7 @@ from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, difference, projection
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import Polished, pose_error, refine, tip
-from armkin.inverse.numeric.tolerances import (
-    ALONE,
-    BLURRED_ROOT,
-    CLOSE_RESIDUAL,
-    ELIMINATED,
-    EXAMINED,
-    GRAZING,
-    NO_PRODUCT,
-    OWN_ROOT,
-    PAIRED,
-    SAME_KEY,
-    SAME_ROOT,
-    SEED,
-    SHAKES,
-    STRAY,
-    TWIN_ROOTS,
-    UPRIGHT,
-)
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import inverse
 
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
@@ -38,7 +21,7 @@ REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
 
 def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:
     """Answers of one pass for goals (N, 4, 4), the poses it leaves open, those with touching roots, and guesses."""
-    careful, shake = number > 0, SHAKES[number]
+    careful, shake = number > 0, tol.SHAKES[number]
     seed = roots.seeds(pencil, inverse(shaken_goal(goal, shake)), TILT[careful], part=careful or pencil.role.wide)
     if shake == 0:
         seed = _without_empty(closed, seed, goal, careful)
@@ -48,54 +31,57 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
     else:
         done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
     # In later passes also what is nearly an answer, at a double root: such poses are said to be near singular.
-    good = done.residual < (10 * GRAZING if careful else ELIMINATED)
+    good = done.residual < (10 * tol.GRAZING if careful else tol.ELIMINATED)
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
     # A complex pair that steps brought near the pose may be a real one, seen through rounding.
     # A move of the pose may turn two close real roots into such a pair.
-    pair = PAIRED + 10 * np.sqrt(shake)
+    pair = tol.PAIRED + 10 * np.sqrt(shake)
     maybe = seed.tilt < pair
-    near = (done.residual < CLOSE_RESIDUAL) & (seed.tilt < max(pair, STRAY)) if careful else done.residual < STRAY
-    missed = ~good & ((seed.tilt < UPRIGHT) | near | seed.torn)
-    touch = good & (seed.tilt > 0) & (seed.tilt < UPRIGHT)
+    near = done.residual < tol.STRAY
+    if careful:
+        near = (done.residual < tol.CLOSE_RESIDUAL) & (seed.tilt < max(pair, tol.STRAY))
+    missed = ~good & ((seed.tilt < tol.UPRIGHT) | near | seed.torn)
+    touch = good & (seed.tilt > 0) & (seed.tilt < tol.UPRIGHT)
     unsure = good & (seed.tilt > 0) & maybe
     # A real root that was far from the answer it led to may have stood for another one.
-    strayed = good & (seed.tilt == 0) & (done.guess > STRAY + 30 * shake)
+    strayed = good & (seed.tilt == 0) & (done.guess > tol.STRAY + 30 * shake)
     # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
     # roots, and no two roots may have led to one answer. Near singularities roots are too far off to say so.
     weakest = np.zeros(goal.shape[0])
     np.maximum.at(weakest, seed.pose[good], done.weakness[good])
     away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
-    own = (np.abs(away) < OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
+    own = (np.abs(away) < tol.OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
     # unless several solutions share the middle joints: these are one root
     some = np.flatnonzero(strayed & own)
     if some.size:
         own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
     strayed &= ~own
     unsettled[seed.pose[missed | unsure | strayed]] = True
-    touching[seed.pose[touch | (done.residual > ELIMINATED) & (done.residual < 10 * GRAZING)]] = True
+    touching[seed.pose[touch | (done.residual > tol.ELIMINATED) & (done.residual < 10 * tol.GRAZING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
     # and if the two answers are not the same.
     answers = answers_of(closed, seed.pose, done, good)
     # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
     stands = good & maybe
-    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > BLURRED_ROOT + 10 * shake
+    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > tol.BLURRED_ROOT + 10 * shake
     order = np.lexsort((hidden, pose))
-    close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < SAME_ROOT)
+    close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < tol.SAME_ROOT)
     close &= blurred[order][1:] | blurred[order][:-1]
     close &= ~(own[stands][order][1:] & own[stands][order][:-1])
     unsettled[pose[order][1:][close]] = True
-    # Two real roots that led to one answer: one of them stands for another.
-    real = rows_of(answers, seed.tilt[good] == 0)
+    unsettled[_met_twice(closed, rows_of(answers, seed.tilt[good] == 0))] = True
+    guesses = answers_of(closed, seed.pose, done, ~good & (done.residual < tol.SEED))
+    return answers, unsettled, touching, guesses
+
+
+def _met_twice(closed: Loop, real: Answers) -> Int:
+    """Poses in which two real roots led to one answer: one of them stands for another."""
     key = projection(closed.prismatic, real.q)
     order = np.lexsort((key, real.pose))
-    twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < SAME_KEY)
-    if twice.any():  # different answers may have the same key: about one pose in 10,000
-        pairs = np.flatnonzero(twice)
-        step = difference(closed.prismatic, real.q[order[pairs + 1]], real.q[order[pairs]])
-        twice[pairs] = np.abs(step).max(axis=1) < EXAMINED
-    unsettled[real.pose[order][1:][twice]] = True
-    guesses = answers_of(closed, seed.pose, done, ~good & (done.residual < SEED))
-    return answers, unsettled, touching, guesses
+    twice = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < tol.SAME_KEY)
+    pairs = np.flatnonzero(twice)  # different answers may have the same key: about one pose in 10,000
+    step = difference(closed.prismatic, real.q[order[pairs + 1]], real.q[order[pairs]])
+    return np.asarray(real.pose[order[pairs[np.abs(step).max(axis=1, initial=0.0) < tol.EXAMINED]]])
 
 
 def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array, careful: bool) -> roots.Seeds:
@@ -105,14 +91,14 @@ def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array, careful: bool) 
     product, and such a root has no other vector. Of a multiple root that was taken apart all products are known.
     One farther off the real line than a double one is stays in later passes alone: steps may lead it to an answer.
     """
-    empty = (seed.defect > NO_PRODUCT) & (seed.gap > ALONE)
-    upright = seed.tilt < TWIN_ROOTS
+    empty = (seed.defect > tol.NO_PRODUCT) & (seed.gap > tol.ALONE)
+    upright = seed.tilt < tol.TWIN_ROOTS
     some = np.flatnonzero(empty & upright)
     kept = ~empty | careful | upright
     if some.size:
         target = np.ascontiguousarray(goal[seed.pose[some], :3].transpose(1, 2, 0))
         frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[some].T))
-        kept[some[pose_error(frame, target)[1] > STRAY]] = False
+        kept[some[pose_error(frame, target)[1] > tol.STRAY]] = False
     if kept.all():
         return seed
     pose, q, hidden, tilt, rough, defect, gap = seed

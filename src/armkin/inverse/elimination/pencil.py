@@ -45,7 +45,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import end_joints, line_features
 from armkin.inverse.elimination.end_joints import Ends
 from armkin.inverse.elimination.joint_order import Role, links_by_part
-from armkin.inverse.numeric.tolerances import NULL
+from armkin.inverse.numeric import tolerances as tol
 
 # Products of (1, cos q, sin q) with cos(q/2) and sin(q/2), in (cos 3f, sin 3f, cos f, sin f), f = q/2.
 _HALF_ANGLE: Array = 0.5 * np.array(
@@ -166,7 +166,7 @@ def _spurious(role: Role, part: Bool, monomials: Array) -> NDArray[np.complex128
     products = coefficients.shape[3]
     _, M_c, M_s = np.einsum("ix,hxsp->hisp", monomials, coefficients).reshape(3, -1, products)
     _, size, vectors = np.linalg.svd(M_c + 1j * M_s)  # M(i) but for a factor, whatever psi
-    null = vectors[size < NULL * size[0]].conj().T
+    null = vectors[size < tol.NULL * size[0]].conj().T
     # Vectors of K that are (nearly) real would make [Re K, Im K] dependent: they stay in W.
     # The singular values of K^T K are the cosines between K and its conjugate.
     _, cosine, turned = np.linalg.svd(null.T @ null)

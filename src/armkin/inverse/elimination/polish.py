@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import CONVERGED, SLOWLY, STALE
 
 LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
 MORE = 3  # steps more for candidates this close that have not converged
@@ -123,7 +123,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         index = active[better]
         best[:, index], residual[index] = value[:, better], size[better]
         # While the residual falls steeply the last inverse Jacobian is good for one more step.
-        stale = np.flatnonzero((size > STALE * last) & (size > CONVERGED)) if step else active
+        stale = np.flatnonzero((size > tol.STALE * last) & (size > tol.CONVERGED)) if step else active
         last = size
         if stale.size:
             chosen = slice(None) if stale.size == active.size else stale
@@ -137,7 +137,9 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
                 normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
                 fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
             inverse[index] = fresh
-        going = np.flatnonzero(size > CONVERGED if step < steps else (size > 10 * CONVERGED) & (size < SLOWLY))
+        going = np.flatnonzero(
+            size > tol.CONVERGED if step < steps else (size > 10 * tol.CONVERGED) & (size < tol.SLOWLY)
+        )
         if step == most or going.size == 0:
             break
         if going.size < active.size:

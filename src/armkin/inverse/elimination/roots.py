@@ -13,19 +13,8 @@ from armkin.inverse.elimination import equal_roots, line_features
 from armkin.inverse.elimination.end_joints import eliminate
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import advance, turn
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import (
-    ALONE,
-    APART_VECTORS,
-    EQUAL_ROOTS,
-    FOLLOWS,
-    INFINITE,
-    NO_PRODUCT,
-    REAL_PAIR,
-    TINY,
-    TWIN_ROOTS,
-    UNDERFLOW,
-)
 from armkin.model.rotation import inverse
 
 STEADY = 1e5  # entries up to which a pencil's simple roots and their vectors are known far better than that
@@ -54,7 +43,7 @@ class Seeds(NamedTuple):
     @property
     def torn(self) -> Bool:
         """(M,) What may be a part of a multiple root: rounding tears it apart and off the real line, but not far."""
-        return (self.defect > NO_PRODUCT) & (self.gap < ALONE) & (self.tilt < ALONE)
+        return (self.defect > tol.NO_PRODUCT) & (self.gap < tol.ALONE) & (self.tilt < tol.ALONE)
 
 
 def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> Seeds:
@@ -88,7 +77,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
         candidates = _parted(pencil, candidates, vectors)
     pose, which, x, slant, u, parted = candidates
     middle, defect = _middle_joints(pencil, x, u)
-    near = np.flatnonzero((np.abs(middle) < INFINITE).all(axis=0))
+    near = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
     if near.size < pose.size:
         pose, which, slant, parted = pose[near], which[near], slant[near], parted[near]
         middle, defect = middle[:, near], defect[near]
@@ -97,7 +86,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
     gap = np.where(parted & steady[pose], np.inf, 0.0)
-    some = np.flatnonzero((defect > NO_PRODUCT) & steady[pose] & ~parted)
+    some = np.flatnonzero((defect > tol.NO_PRODUCT) & steady[pose] & ~parted)
     gap[some] = _gaps(roots[pose[some]], vectors[pose[some]], which[some])
     return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
 
@@ -114,7 +103,7 @@ def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
     a, b, e = _other_joints(pencil, part[2:5], Y, np.arange(len(q)), recover)
     away = np.stack([a, b, e]) - part[[0, 1, 5]]
     turning = ~pencil.prismatic[[0, 1, 5]][:, None]
-    return np.asarray((np.abs(np.where(turning, np.angle(np.exp(1j * away)), away)) < FOLLOWS).all(axis=0))
+    return np.asarray((np.abs(np.where(turning, np.angle(np.exp(1j * away)), away)) < tol.FOLLOWS).all(axis=0))
 
 
 class _Candidates(NamedTuple):
@@ -135,7 +124,7 @@ def _parted(pencil: Pencil, seen: _Candidates, vectors: NDArray[np.complex128]) 
     """The same, a root that several solutions share with the vectors of these: see `equal_roots`."""
     count = len(seen.pose)
     # rounding made a complex pair of some
-    twin = np.flatnonzero((seen.tilt > 0) & (seen.tilt < EQUAL_ROOTS))
+    twin = np.flatnonzero((seen.tilt > 0) & (seen.tilt < tol.EQUAL_ROOTS))
     pose, which, x, tilt, u, parted = (np.concatenate([part, part[twin]]) for part in seen)
     u[count:] = vectors.imag[seen.pose[twin], :, seen.which[twin]]
     kept = np.arange(len(pose)) < count
@@ -146,7 +135,7 @@ def _parted(pencil: Pencil, seen: _Candidates, vectors: NDArray[np.complex128]) 
         middle = np.repeat(x[rows].mean(axis=1), d)
         of_products = _vector(pencil, middle, basis.reshape(-1, basis.shape[2])).reshape(-1, d, 4, pencil.products // 4)
         weights, real, good = equal_roots.products(of_products)
-        good &= size[:, -1] > APART_VECTORS * size[:, 0]
+        good &= size[:, -1] > tol.APART_VECTORS * size[:, 0]
         part = rows[good].ravel()
         u[part] = (weights[good] @ basis[good]).reshape(len(part), u.shape[1])
         tilt[part], parted[part], kept[part] = 0.0, True, real[good].ravel()
@@ -172,8 +161,8 @@ def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], which:
     apart = away[row, twin]
     other = vectors[row, :, twin]
     sine = np.linalg.norm(other - v * (v.conj() * other).sum(axis=1, keepdims=True), axis=1)
-    double = (apart < TWIN_ROOTS) & (sine < ONE * apart)
-    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, which].imag != 0) & (sine * apart > REAL_PAIR)
+    double = (apart < tol.TWIN_ROOTS) & (sine < ONE * apart)
+    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, which].imag != 0) & (sine * apart > tol.REAL_PAIR)
     away[row, twin] = np.where(double | pair, np.inf, apart)
     return np.asarray(away.min(axis=1))
 
@@ -217,7 +206,7 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     hidden, dialytic, third = (2 + i for i in (pencil.role.hidden, pencil.role.dialytic, pencil.role.third))
     value = np.empty((3, v.shape[0]))
     if pencil.prismatic[hidden]:
-        value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x) < UNDERFLOW, UNDERFLOW, x)
+        value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x) < tol.UNDERFLOW, tol.UNDERFLOW, x)
     else:
         value[pencil.role.hidden] = pencil.psi + 2 * np.arctan(x)
     if pencil.prismatic[dialytic]:
@@ -238,7 +227,7 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     inner = (v * other[:, None, :]).sum(axis=2)
     # a product's square is 2 x 2: of the powers of either joint, and of (1, cos, sin)
     along = (inner * _half_powers(value[pencil.role.dialytic])).sum(axis=1) ** 2 / (
-        4.0 * np.maximum(size.sum(axis=(1, 2)), TINY)
+        4.0 * np.maximum(size.sum(axis=(1, 2)), tol.TINY)
     )
     return value, np.maximum(1.0 - along, 0.0)
 
@@ -251,7 +240,7 @@ def _half_powers(q: Array) -> Array:
 def _ratio(powers: Array) -> Array:
     """q from multiples of (1, q, q^2, ..) (M, k): the least-squares quotient of neighbours."""
     below = powers[:, :-1]
-    out: Array = np.sum(below * powers[:, 1:], axis=1) / np.maximum(np.sum(below * below, axis=1), TINY)
+    out: Array = np.sum(below * powers[:, 1:], axis=1) / np.maximum(np.sum(below * below, axis=1), tol.TINY)
     return out
 
 
@@ -268,7 +257,7 @@ def _other_joints(pencil: Pencil, middle: Array, Y: Array, pose: Int, recover: A
     factors = recover[pose] if recover.shape[0] > 1 else recover
     one, b1, b2, a1, a2 = np.matmul(factors, feature[:, :, None])[:, :, 0].T
     sign = np.where(one < 0, -1.0, 1.0)
-    safe = np.where(np.abs(one) < TINY, 1.0, one)
+    safe = np.where(np.abs(one) < tol.TINY, 1.0, one)
     a = a1 / safe if is_a else np.arctan2(sign * a2, sign * a1)
     b = b1 / safe if is_b else np.arctan2(sign * b2, sign * b1)
     before = turn(advance(turn(advance(start, links[5]), a, is_a), links[0]), b, is_b)

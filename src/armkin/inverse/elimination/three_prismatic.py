@@ -20,7 +20,7 @@ Where these are coplanar, slides can move alone: of the values that place the to
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.tolerances import COPLANAR, MERGED_SLIDES, NEARLY_COPLANAR, PARALLEL_SLIDES
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import joint_motion, rotation_about
 
 FREE = 0.7321  # [rad] its value there
@@ -46,8 +46,8 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
     off = np.hypot(B[:, 0, 2], B[:, 1, 2])
     one, other = off * np.hypot(v[0], v[1]), np.abs(u[2] - v[2] * B[:, 2, 2])
     square = (one - other) * (one + other)
-    free = off < PARALLEL_SLIDES
-    square[(square < MERGED_SLIDES) & ~free] = 0.0
+    free = off < tol.PARALLEL_SLIDES
+    square[(square < tol.MERGED_SLIDES) & ~free] = 0.0
     half = np.arctan2(np.sqrt(np.maximum(square, 0.0)), B[:, 2, 2] - u[2] * v[2])
     q2 = np.arctan2(odd, even) + np.stack([half, -half], axis=1)
     middle = A[1] @ rotation_about(2, q2) @ A[2]
@@ -61,10 +61,10 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
         return _with_slides(chain, prismatic, np.stack([q1, q2[rows], q3], axis=-1), goal[rows])
 
     q, weakest = whole(q1, np.ones(len(goal), bool))
-    sure = ~((square < NEARLY_COPLANAR**2) & (weakest < NEARLY_COPLANAR)) | free
-    sure[free] = weakest[free] > NEARLY_COPLANAR
+    sure = ~((square < tol.NEARLY_COPLANAR**2) & (weakest < tol.NEARLY_COPLANAR)) | free
+    sure[free] = weakest[free] > tol.NEARLY_COPLANAR
     for value in OTHERS if free.any() else ():
-        sure[free] &= np.abs(whole(np.full_like(q1[free], value), free)[1] - weakest[free]) < NEARLY_COPLANAR
+        sure[free] &= np.abs(whole(np.full_like(q1[free], value), free)[1] - weakest[free]) < tol.NEARLY_COPLANAR
     return q, sure
 
 
@@ -84,6 +84,6 @@ def _with_slides(chain: Array, prismatic: Bool, turned: Array, goal: Array) -> t
     # an explicit pseudoinverse would lose as many digits as the weakest direction has
     U, S, Vt = np.linalg.svd(np.stack(axes, axis=-1))
     ahead = np.swapaxes(U, -1, -2) @ rest[..., None]
-    moves = np.divide(ahead, S[..., None], out=np.zeros_like(ahead), where=S[..., None] > COPLANAR)
+    moves = np.divide(ahead, S[..., None], out=np.zeros_like(ahead), where=S[..., None] > tol.COPLANAR)
     q[..., prismatic] = (np.swapaxes(Vt, -1, -2) @ moves)[..., 0]
     return q, S[..., -1].min(axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import CONVERGING, SEED
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 
@@ -26,10 +26,10 @@ def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
     row, which = np.nonzero(np.repeat(lost[:, None], STARTS, axis=1))
     out = np.full((len(target), STARTS, arm.n), np.nan)
     q, size = newton.correct(arm, task, start[which], target[row], steps=STEPS, patience=PATIENCE)
-    slow = np.flatnonzero((size > CONVERGING) & (size < SEED))
+    slow = np.flatnonzero((size > tol.CONVERGING) & (size < tol.SEED))
     if len(slow):
         even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
         better = newton.missing(arm, task, even, target[row[slow]]) < size[slow]
         q[slow[better]] = even[better]
-    out[row, which] = np.where((size < SEED)[:, None], q, np.nan)
+    out[row, which] = np.where((size < tol.SEED)[:, None], q, np.nan)
     return out

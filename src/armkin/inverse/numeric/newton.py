@@ -9,7 +9,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.forward import fk, tip_and_jacobian
-from armkin.inverse.numeric.tolerances import CONVERGING, FOLDED, LEFT_OUT, NOISE, ROUNDING, TINY, WEAK
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -42,7 +42,7 @@ def correct(
     q: Array,
     target: Array,
     steps: int = 6,
-    least: float = LEFT_OUT,
+    least: float = tol.LEFT_OUT,
     patience: int = 1000,
     stalled: float = np.inf,
 ) -> tuple[Array, Array]:
@@ -68,14 +68,14 @@ def correct(
         better = size < before
         best[active[better]], best_size[active[better]] = q[active[better]], size[better]
         # done when rounding is all that is left
-        least_gain = np.isfinite(size) & (size > ROUNDING) & ((size > CONVERGING) | (size < 0.5 * before))
+        least_gain = np.isfinite(size) & (size > tol.ROUNDING) & ((size > tol.CONVERGING) | (size < 0.5 * before))
         idle[active] = np.where((size < 0.9 * before) | (size > stalled), 0, idle[active] + 1)
         going = least_gain & (idle[active] < patience) if k else np.isfinite(size) & (size > 0)
         active, r, size = active[going], r[going], size[going]
         if k == steps or not len(active):
             break
         step = _least_step(J[going], r, np.maximum(least, 0.1 * size))
-        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), TINY))[:, None]
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
         q[active] += step * unit
     return best, best_size
 
@@ -95,7 +95,7 @@ def _least_step(J: Array, r: Array, least: Array) -> Array:
     few = np.flatnonzero(weak)
     if len(few):
         U, S, Vt = np.linalg.svd(J[few], full_matrices=False)
-        gain = np.where(least[few, None] < S, 1.0 / np.maximum(S, TINY), 0.0)
+        gain = np.where(least[few, None] < S, 1.0 / np.maximum(S, tol.TINY), 0.0)
         step[few] = (Vt * (gain * (U * r[few, :, None]).sum(axis=1))[:, :, None]).sum(axis=1)
     return step
 
@@ -134,7 +134,7 @@ def _smallest(arm: Arm, task: Task, S: Array) -> tuple[Array, Int]:
     full[:, : S.shape[1]] = S
     # a task with an axis has one more row than constraints
     count = min(task.constraints, arm.n)
-    nullity = arm.n - (full > WEAK).sum(axis=1)
+    nullity = arm.n - (full > tol.WEAK).sum(axis=1)
     return full[:, count - 1], nullity - (arm.n - count)
 
 
@@ -178,7 +178,7 @@ def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) 
         # the Frobenius norm of the inverse is no smaller than its largest singular value
         inverse = nudged(np.linalg.inv, J)
         sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
-        some = bound < FOLDED
+        some = bound < tol.FOLDED
         k, b, r, J = k[some], b[some], r[some], J[some]
     weak = Linear(r, *np.linalg.svd(J))
     V[k, b], place[k, b] = weak.V, np.arange(len(k))
@@ -200,7 +200,7 @@ def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Ar
         return np.asarray(function(matrix, *arguments))
     except np.linalg.LinAlgError:
         noise, nudge = np.random.default_rng(0), matrix.copy()
-        size = NOISE * (1 + np.abs(matrix).max(axis=(1, 2), keepdims=True))
+        size = tol.NOISE * (1 + np.abs(matrix).max(axis=(1, 2), keepdims=True))
         for _ in range(8):  # the noise may itself cancel what is left of a pivot
             singular = np.linalg.slogdet(nudge).sign == 0
             nudge[singular] = (matrix + size * noise.standard_normal(matrix.shape[1:]))[singular]

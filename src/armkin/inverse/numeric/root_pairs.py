@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import PAIR_SETTLED, PAIR_WAY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -45,7 +45,7 @@ def meet(arm: Arm, task: Task, q: Array, target: Array) -> RootPair:
     active = np.arange(M)
     for _ in range(STEPS):
         goal, m, u, w = target[active], middle[active], way[active], square[active]
-        half = np.sqrt(np.maximum(np.abs(w), PAIR_WAY**2))[:, None]
+        half = np.sqrt(np.maximum(np.abs(w), tol.PAIR_WAY**2))[:, None]
         ahead, behind, there = (newton.scaled(arm, task, m + side * half * u * unit, goal) for side in (1.0, -1.0, 0.0))
         bent = (ahead[0] + behind[0] - 2.0 * there[0]) / half**2
         even, odd = there[0] + 0.5 * w[:, None] * bent, (ahead[0] - behind[0]) / (2.0 * half)
@@ -65,8 +65,8 @@ def meet(arm: Arm, task: Task, q: Array, target: Array) -> RootPair:
         way[active] += step[:, n:-1]
         square[active] += step[:, -1]
         size[active] = np.abs(step).max(axis=1)
-        active = active[~(size[active] < PAIR_SETTLED)]
+        active = active[~(size[active] < tol.PAIR_SETTLED)]
         if not len(active):
             break
     way *= np.sqrt(np.abs(square))[:, None] * unit
-    return RootPair(middle, way, square, size < PAIR_SETTLED)
+    return RootPair(middle, way, square, size < tol.PAIR_SETTLED)

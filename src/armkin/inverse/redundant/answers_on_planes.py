@@ -13,7 +13,7 @@ import numpy as np
 from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, NEAR, SAME_SEED
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.curve_points import Points, onto
 from armkin.inverse.redundant.interval_pieces import turning
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
@@ -59,8 +59,8 @@ class Planes(NamedTuple):
 
     def answers(self, row: Int, plane: Int, q: Array) -> tuple[Nodes, Int]:
         """Postures (M, n) moved along their planes (M,) onto curves, each once, and which of them are (K,)."""
-        points = onto(self.find, row, q, self.held(len(q)), SAME_SEED)
-        good = np.flatnonzero(points.step < SAME_SEED)
+        points = onto(self.find, row, q, self.held(len(q)), tol.SAME_SEED)
+        good = np.flatnonzero(points.step < tol.SAME_SEED)
         good = good[once(self.find, self.place(row[good], plane[good]), points.q[good])]
         return Nodes(row[good], plane[good], rows_of(points, good)), good
 
@@ -78,7 +78,7 @@ def answered(find: Follower) -> tuple[Planes, Nodes, Int]:
         more, own = _between(source, even, missed.reshape(N, PLANES, -1))
         row, t = np.append(row, more), np.append(t, own[:, guide.joint])
         others = source.candidates(more, t[N * PLANES :])
-        q, there = np.append(q, others[0], axis=0), np.append(missed, others[1], axis=0) < NEAR
+        q, there = np.append(q, others[0], axis=0), np.append(missed, others[1], axis=0) < tol.NEAR
     order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
     plane = np.empty_like(row)
     plane[order] = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
@@ -98,15 +98,15 @@ def _between(source: Follower, t: Array, missed: Array) -> tuple[Int, Array]:
     """Answers (M, n) of targets (M,) where these may be between values t (K,) alone, as what branches miss (N, K, B)
     tells: of a short curve, whose joint cannot be held where it turns back."""
     width, part = t[1] - t[0], np.arange(1, BETWEEN) / BETWEEN
-    off = np.where(missed <= ACCEPTED, np.nan, -missed)
+    off = np.where(missed <= tol.ACCEPTED, np.nan, -missed)
     row, k = np.nonzero(turning(off, np.broadcast_to(t, missed.shape[:2])).any(axis=2))
     row, values = np.repeat(row, len(part)), (t[k, None] + width * part).ravel()
     q, missed = source.candidates(row, values)
     best = missed.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
-    some, branch = np.nonzero(missed[best] < NEAR)
+    some, branch = np.nonzero(missed[best] < tol.NEAR)
     row, q = row[best[some]], q[best[some], branch]
     q, miss = newton.correct(source.arm, source.free.task, q, source.target[row])
-    good = np.flatnonzero(miss < SAME_SEED)
+    good = np.flatnonzero(miss < tol.SAME_SEED)
     good = good[once(source, row[good], q[good])]
     return row[good], q[good]
 
@@ -116,8 +116,8 @@ def once(find: Follower, group: Int, q: Array) -> Bool:
     key = np.cos(q - 0.3) @ np.sqrt(np.arange(2.0, 2.0 + q.shape[1]))
     order = np.lexsort((key, group))
     first, second = order[:-1], order[1:]
-    near = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * SAME_SEED)
+    near = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
     some = np.flatnonzero(near)
     out = np.ones(len(q), bool)
-    out[second[some[newton.wrapped_distance(find.arm, q[first[some]], q[second[some]]) < SAME_SEED]]] = False
+    out[second[some[newton.wrapped_distance(find.arm, q[first[some]], q[second[some]]) < tol.SAME_SEED]]] = False
     return out

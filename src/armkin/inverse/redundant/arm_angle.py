@@ -19,7 +19,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.wrist import meeting_point
-from armkin.inverse.numeric.tolerances import EXACT, NO_LENGTH, NO_SIZE, ROUNDING, SAME, SHARP, SOLUTION, TINY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import Pieces, best_samples, holding_none, none, runs
 from armkin.model.arm import Arm
 from armkin.model.rotation import inverse, rotation_about
@@ -32,7 +32,7 @@ JOINTS = (0, 1, 2), (4, 5, 6)  # of the shoulder and of the wrist
 
 def _offsets(A: Array, B: Array) -> Array | None:
     """Three axes at right angles, Rz(q1) A Rz(q2) B Rz(q3) = Rz(t1) Rx(90) Rz(t2) Rx(90) Rz(t3): t - q (3,)."""
-    if max(abs(A[2, 2]), abs(B[2, 2])) > EXACT:
+    if max(abs(A[2, 2]), abs(B[2, 2])) > tol.EXACT:
         return None
     # Rz(u) Rx(90) Rz(v) has the third column (sin u, -cos u, 0) and the third row (sin v, cos v, 0)
     (u, v), (x, y) = ((np.arctan2(L[0, 2], -L[1, 2]), np.arctan2(L[2, 0], L[2, 1])) for L in (A, B))
@@ -56,13 +56,13 @@ def arm_angle(arm: Arm) -> ArmAngle | None:
     if arm.n != 7 or arm.prismatic.any():
         return None
     L = arm.link
-    shoulder, wrist = (meeting_point(L[k], L[k + 1], EXACT * arm.reach) for k in (1, 5))
+    shoulder, wrist = (meeting_point(L[k], L[k + 1], tol.EXACT * arm.reach) for k in (1, 5))
     first, second = (_offsets(L[k], L[k + 1]) for k in (1, 5))
     if shoulder is None or wrist is None or first is None or second is None:
         return None
     upper = L[3][:3, :3].T @ (L[3][:3, 3] - shoulder[1])
     fore = L[4][:3, :3] @ wrist[0] + L[4][:3, 3]
-    if min(np.hypot(*upper[:2]), np.hypot(*fore[:2])) <= NO_LENGTH:
+    if min(np.hypot(*upper[:2]), np.hypot(*fore[:2])) <= tol.NO_LENGTH:
         return None  # joint 4 does not move the wrist away from the shoulder
     return ArmAngle(arm, shoulder[0], upper, fore, wrist[1], np.stack([first, second], axis=1))
 
@@ -96,9 +96,9 @@ def _circles(of: ArmAngle, target: Array) -> _Circles:
     still, swing = u @ u + p @ p + 2.0 * u[2] * p[2], float(np.hypot(a, b))
     cos = np.clip((far * far - still) / (2.0 * swing), -1.0, 1.0)
     miss = np.abs(far - np.sqrt(np.maximum(still + 2.0 * swing * cos, 0.0)))
-    there = (miss <= SOLUTION * of.arm.reach) & (far > NO_SIZE * of.arm.reach)
+    there = (miss <= tol.SOLUTION * of.arm.reach) & (far > tol.NO_SIZE * of.arm.reach)
     apart = np.arccos(cos)
-    apart = np.where(apart < SAME, 0.0, np.where(apart > np.pi - SAME, np.pi, apart))
+    apart = np.where(apart < tol.SAME, 0.0, np.where(apart > np.pi - tol.SAME, np.pi, apart))
     one = (apart == 0.0) | (apart == np.pi)  # the two elbows are the same
     row, half = np.nonzero(np.stack([there, there & ~one], axis=1))
     q4 = np.arctan2(b, a) + np.where(half == 0, apart[row], -apart[row])
@@ -110,8 +110,8 @@ def _circles(of: ArmAngle, target: Array) -> _Circles:
     fore = np.einsum("mjk,eijm->ekim", elbow @ L[4][:3, :3], upper)
     hand = np.einsum("ekim,mil->eklm", fore, hand[row, :3, :3])
     R = np.stack([upper, hand], axis=3)
-    straight = (np.abs(R[0, 2, 2]) + np.hypot(R[1, 2, 2], R[2, 2, 2]) > 1.0 - SHARP).any(axis=0)
-    complete = far > SOLUTION * of.arm.reach
+    straight = (np.abs(R[0, 2, 2]) + np.hypot(R[1, 2, 2], R[2, 2, 2]) > 1.0 - tol.SHARP).any(axis=0)
+    complete = far > tol.SOLUTION * of.arm.reach
     complete[row[straight]] = False
     return _Circles(R, q4, row, half, complete)
 
@@ -121,8 +121,8 @@ def _angles(of: ArmAngle, R: Array, psi: Array) -> Array:
     parts = R.reshape(3, 3, 3, 2, len(psi), *[1] * (psi.ndim - 1))[:, :, ::2]
     (x0, z0), (x1, z1), (x2, z2) = parts[0] + parts[1] * np.cos(psi) + parts[2] * np.sin(psi)
     r = np.hypot(z0, z1)
-    size = np.where(r > ROUNDING, r, 1.0)
-    c, s = np.where(r > ROUNDING, z0 / size, 1.0), z1 / size
+    size = np.where(r > tol.ROUNDING, r, 1.0)
+    c, s = np.where(r > tol.ROUNDING, z0 / size, 1.0), z1 / size
     t3 = np.arctan2(s * x0 - c * x1, r * x2 - z2 * (c * x0 + s * x1))
     return np.stack([np.arctan2(s, c), np.arctan2(r, -z2), t3])
 
@@ -135,7 +135,7 @@ def _joints(of: ArmAngle, t: Array, flip: Array) -> Array:
 
 def _roots(a: Array, b: Array, c: Array) -> Array:
     """The two angles (M, 2) where a cos + b sin = c; where there is none the one that comes closest, twice."""
-    apart = np.arccos(np.clip(c / np.maximum(np.hypot(a, b), TINY), -1.0, 1.0))
+    apart = np.arccos(np.clip(c / np.maximum(np.hypot(a, b), tol.TINY), -1.0, 1.0))
     middle = np.arctan2(b, a)
     return np.stack([middle - apart, middle + apart], axis=1)
 
@@ -203,9 +203,9 @@ def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
                 legal[some] &= fits[:, None]
     a, b, c = (x[:, None] for x in _turning(circles.R))
     middle = psi[:, 1::2]
-    up = (a * np.cos(middle) + b * np.sin(middle) + c >= 0.0) | (np.hypot(a, b) + np.abs(c) < NO_SIZE)
+    up = (a * np.cos(middle) + b * np.sin(middle) + c >= 0.0) | (np.hypot(a, b) + np.abs(c) < tol.NO_SIZE)
     # a piece shorter than rounding tells nothing: it is as the one before it
-    wide = np.diff(ends, axis=1) > EXACT
+    wide = np.diff(ends, axis=1) > tol.EXACT
     before = np.maximum.accumulate(np.where(np.tile(wide, 2), np.arange(2 * K), -1), axis=1)[:, K:] % K
     up = np.take_along_axis(up, before, axis=1)
     between = np.take_along_axis(legal[..., 1::2], before[:, None, None], axis=3)
@@ -234,11 +234,6 @@ class Turning(NamedTuple):
     @property
     def complete(self) -> Bool:
         return self.circles.complete
-
-    def tried(self, pieces: Pieces, near: Array) -> list[Array]:
-        """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: none,
-        as they are samples."""
-        return []
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """A posture (P, n) on each piece, at its legal copy nearest to near, and whether it is legal."""
@@ -270,7 +265,7 @@ def _pieces(of: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     best = best_samples(costs, curve + len(between) * legal, 2 * first, 2 * length + 1)
     sign = np.where(np.repeat(s.up, 2, axis=1), 1.0, -1.0)
     step = np.remainder(sign * (np.roll(s.turned, -1, axis=1) - s.turned), TURN)
-    step[step > TURN - SAME * 10] = 0.0  # rounding, backwards
+    step[step > TURN - tol.SAME * 10] = 0.0  # rounding, backwards
     way = np.concatenate([np.zeros((M, 1)), np.cumsum(np.tile(step, 2), axis=1)], axis=1)
     total = way[circle, 2 * (first + length)] - way[circle, 2 * first]
     total[length == K] = np.where(total[length == K] > np.pi, TURN, 0.0)

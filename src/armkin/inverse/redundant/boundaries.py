@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.closed.wrist import foot, meeting_point
-from armkin.inverse.numeric.tolerances import BESIDE_END, EXACT, NO_LENGTH, PARALLEL, SAME_END
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
 from armkin.model.arm import Arm
 from armkin.model.chain import is_parallel
@@ -74,15 +74,15 @@ def boundaries(arm: Arm) -> Boundaries | None:
     if arm.n != 7 or arm.prismatic.any():
         return None
     L = shrunk(arm.link, arm.reach)
-    shoulder = meeting_point(L[1], L[2], EXACT)
-    if shoulder is None or is_parallel(L[5], PARALLEL):
+    shoulder = meeting_point(L[1], L[2], tol.EXACT)
+    if shoulder is None or is_parallel(L[5], tol.PARALLEL):
         return None
     on5 = foot(L[5])
     wrist = (inverse(L[5]) @ [*on5, 1.0])[:3]
     upper, fore = (inverse(L[3]) @ [*shoulder[1], 1.0])[:3], (L[4] @ [*on5, 1.0])[:3]
     along, across = upper[:2] @ fore[:2], upper[1] * fore[0] - upper[0] * fore[1]
     swing = float(np.hypot(along, across))
-    if np.hypot(*wrist[:2]) > EXACT or swing <= NO_LENGTH:
+    if np.hypot(*wrist[:2]) > tol.EXACT or swing <= tol.NO_LENGTH:
         return None
     still = float(upper @ upper + fore @ fore - 2.0 * upper[2] * fore[2])
     middle = float(np.arctan2(across, along))
@@ -95,7 +95,10 @@ def _in_line(L: Array, upper: Array, fore: Array, middle: float) -> float | None
     along, across = axis3[:2] @ axis5[:2], axis3[1] * axis5[0] - axis3[0] * axis5[1]
     for q4 in (np.arctan2(across, along), np.arctan2(-across, -along)):
         back = rotation_about(2, -q4)
-        if max(np.abs(np.cross(back @ v, axis5)).max() for v in (axis3, upper - rotation_about(2, q4) @ fore)) <= EXACT:
+        if (
+            max(np.abs(np.cross(back @ v, axis5)).max() for v in (axis3, upper - rotation_about(2, q4) @ fore))
+            <= tol.EXACT
+        ):
             return float(np.cos(q4 - middle))
     return None
 
@@ -192,7 +195,7 @@ def places(of: Boundaries, target: Array) -> tuple[Array, Bool]:
     at = np.remainder(at + np.pi, 2 * np.pi) - np.pi
     order = np.lexsort((at, row))
     row, at = row[order], at[order]
-    apart = np.append(True, (np.diff(row) != 0) | (np.diff(at) > SAME_END))
+    apart = np.append(True, (np.diff(row) != 0) | (np.diff(at) > tol.SAME_END))
     row, at = row[apart], at[apart]
     count = np.bincount(row, minlength=S)
     out = np.full((S, int(count.max(initial=0))), np.inf)
@@ -210,6 +213,6 @@ def on_both_sides(at: Array) -> Array:
     following = np.concatenate([some[:, 1:], first], axis=1)
     behind = np.where(np.arange(at.shape[1]) == count[:, None] - 1, first, following) - some
     both = np.concatenate(
-        [some - np.minimum(before / 3, BESIDE_END), some + np.minimum(behind / 3, BESIDE_END)], axis=1
+        [some - np.minimum(before / 3, tol.BESIDE_END), some + np.minimum(behind / 3, tol.BESIDE_END)], axis=1
     )
     return np.where(np.tile(real, 2), np.remainder(both + np.pi, 2 * np.pi) - np.pi, np.inf)

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Int
-from armkin.inverse.numeric.tolerances import BEFORE_MERGING, BESIDE_CROSSING, JOINED, NO_ROOM, SAME_END, TINY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import golden_section, margin
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
@@ -48,7 +48,7 @@ class _Ends:
         By secants: across the end where the branch is there on both sides, else from the side where it is.
         """
         lo, hi, last = good.copy(), bad.copy(), before.copy()
-        at_lo, at_hi, at_last = np.maximum(rooms[0], TINY), rooms[1].copy(), rooms[2].copy()
+        at_lo, at_hi, at_last = np.maximum(rooms[0], tol.TINY), rooms[1].copy(), rooms[2].copy()
         out, going = 0.5 * (lo + hi), np.arange(len(lo))
         over, side = np.zeros(len(lo), bool), np.zeros(len(lo), bool)
         for k in range(HALVINGS):
@@ -62,12 +62,12 @@ class _Ends:
             # a secant along the branch that has gone past the end: it is close by
             guess = np.where(inside, guess, np.where(over[going], high - BACK * (high - low), 0.5 * (low + high)))
             out[going] = np.where(b == 0, high, np.where(inside | ~over[going], guess, out[going]))
-            left = (step > SAME_END) & (b != 0)
+            left = (step > tol.SAME_END) & (b != 0)
             going, guess, inside = going[left], guess[left], inside[left]
             if not len(going):
                 break
             room = self.rooms(going, guess)
-            left = ~(np.abs(room) < NO_ROOM)
+            left = ~(np.abs(room) < tol.NO_ROOM)
             going, guess, inside, room = going[left], guess[left], inside[left], room[left]
             better = room > 0
             over[going] = inside & np.isnan(room)
@@ -85,10 +85,10 @@ class _Ends:
 
 def crossed_at(find: Follower, at: Changes, value: Array) -> Array:
     """Where limits are crossed (M,), known but for the rounding of their polynomials: a secant step in the joints."""
-    near, far = (margin(find.arm, find.own(at.row, at.branch, value + h)) for h in (0.0, BESIDE_CROSSING))
+    near, far = (margin(find.arm, find.own(at.row, at.branch, value + h)) for h in (0.0, tol.BESIDE_CROSSING))
     with np.errstate(invalid="ignore", divide="ignore"):
-        step = near * BESIDE_CROSSING / (near - far)
-        return np.asarray(np.where(np.abs(step) < BESIDE_CROSSING, value + step, value))
+        step = near * tol.BESIDE_CROSSING / (near - far)
+        return np.asarray(np.where(np.abs(step) < tol.BESIDE_CROSSING, value + step, value))
 
 
 def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, Array]:
@@ -139,13 +139,15 @@ def _merged(find: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
         value[own] = ends.between(good[own], at.value(1, t)[own], at.value(-1, t)[own], rooms)
         some = np.flatnonzero(~joined & np.isin(first, own))
         value[some] = value[first[some]]
-        q = find.found(at.row[some], value[some] + np.clip(good[some] - value[some], -BEFORE_MERGING, BEFORE_MERGING))
+        q = find.found(
+            at.row[some], value[some] + np.clip(good[some] - value[some], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
+        )
         away, _, apart = beside(q, at.branch[some])
         mine = q[np.arange(len(some)), at.branch[some]]
         there = ~np.isnan(mine[:, 0])
         middle = margin(find.arm, mine + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away))
         room[some] = np.where(there, middle, gone.room[some])
-        joined[some] = (first[some] == some) | (there & (apart <= JOINED * gone.apart[some, 0]))
+        joined[some] = (first[some] == some) | (there & (apart <= tol.JOINED * gone.apart[some, 0]))
         own = some[~joined[some]]
         first[own] = own
     return value, room

@@ -13,8 +13,8 @@ import numpy as np
 from armkin.formula.array_tuples import stacked
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import PAIR_SETTLED, ROUGHLY
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
@@ -33,10 +33,10 @@ class Points(NamedTuple):
     @property
     def settled(self) -> Bool:
         """Whether rounding is all that is left (M,)."""
-        return np.asarray(self.step < PAIR_SETTLED)
+        return np.asarray(self.step < tol.PAIR_SETTLED)
 
 
-def onto(find: Follower, row: Int, q: Array, last: Array, enough: float = PAIR_SETTLED) -> Points:
+def onto(find: Follower, row: Int, q: Array, last: Array, enough: float = tol.PAIR_SETTLED) -> Points:
     """Postures q (M, n) moved onto the curves of their targets, across last (M, n): a tangent, or a joint that is held.
 
     The tangents point to where last does. enough: size of a step that is the last one.
@@ -99,4 +99,4 @@ class Ways(NamedTuple):
 
     def follow(self, find: Follower, row: Int) -> Bool:
         """Which lie on the curves of their targets row (M,), as their middles tell."""
-        return newton.missing(find.arm, find.free.task, self.at(find, 0.5), find.target[row]) < ROUGHLY
+        return newton.missing(find.arm, find.free.task, self.at(find, 0.5), find.target[row]) < tol.ROUGHLY

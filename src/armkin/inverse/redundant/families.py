@@ -18,11 +18,12 @@ from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.answers import rounding as target_rounding
+from armkin.inverse.answers.batch import Batch, Goals, as_solutions
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.numeric.tolerances import PROBE, SAME, SOLUTION
 from armkin.inverse.redundant.answers_on_planes import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
@@ -30,7 +31,7 @@ from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
 from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion, vertex
 from armkin.inverse.redundant.other_joints import Follower, Ik
 from armkin.inverse.redundant.traced_families import Traced, traced
-from armkin.inverse.solvers.redundant import Redundancy, moved, nearly_closed, redundancy
+from armkin.inverse.solvers.redundant import Redundancy, moved, nearly_closed
 from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
 from armkin.keep_out.clearance import clear
 from armkin.model import units
@@ -60,50 +61,31 @@ def families(
     values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
     goal, lead, off = read_targets(task, values)
     close = read_near(arm, near, lead)
-    each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n)) * arm.ratio
-    true = actual(arm)
-    turned = free if true is arm else redundancy(true, task.name)
-    assert turned is not None
-    of = arm_angle(true) if free.joint else None
+    each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
+    of = arm_angle(arm) if free.joint else None
     numbers = (shaped(task, values)[0], off)
     known, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
-    stands = (newton.missing(true, task, each, goal) <= most) & ~outside(true, each).any(axis=1)
-    rows = _Rows(true, turned.joint, each, stands)
-    some = CIRCLES if of else AT_ONCE // SAMPLES if turned.by_formula else TRACED
+    stands = (newton.missing(arm, task, each, goal) <= most) & ~outside(arm, each).any(axis=1)
+    rows = _Rows(arm, free.joint, each, stands)
+    some = CIRCLES if of else AT_ONCE // SAMPLES if free.by_formula else TRACED
     for k in range(0, len(goal), some):
         if of:
             rows.add(k, Turning.along(of, goal[k : k + some], each[k : k + some]))
         else:
-            find = Follower(ik, true, turned, goal[k : k + some], each[k : k + some])
-            for curves in [Followed.along(find)] if turned.by_formula else traced(find):
+            find = Follower(ik, arm, free, goal[k : k + some], each[k : k + some])
+            for curves in [Followed.along(find)] if free.by_formula else traced(find):
                 rows.add(k, curves)
                 k += len(curves.short)
-    rows.add_points(task, goal, not turned.by_formula)
+    rows.add_points(task, goal, not free.by_formula)
     q, interval, legal, branch = rows.stacked()
     valid = branch >= 0
-    B = valid.shape[1]
     status = np.where(valid.any(axis=1), np.where(rows.short, Status.BOUNDARY, Status.EXACT), Status.UNREACHABLE)
     names = ik(free.rest, moved(arm, free, goal[:1], np.zeros(1)), task.name, examine=False).names if len(goal) else ()
     names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
     method, why, _ = described(arm, free)
-    return Solutions(
-        arm=arm,
-        task=task,
-        target=goal.reshape(*lead, *goal.shape[1:]),
-        near=np.broadcast_to(close.copy(), (*lead, arm.n)),
-        q=(q / arm.ratio).reshape(*lead, B, arm.n),
-        valid=valid.reshape(*lead, B),
-        within_limits=legal.reshape(*lead, B),
-        branch=branch.reshape(*lead, B),
-        status=status.astype(np.int8).reshape(lead),
-        free=np.zeros((*lead, arm.n), bool),
-        names=names,
-        method=method,
-        why=why,
-        complete=rows.complete.reshape(lead),
-        rounding=known.reshape(lead),
-        interval=(interval / arm.ratio[free.joint]).reshape(*lead, B, 2),
-    )
+    out = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(each.shape, bool), rows.complete)
+    s = as_solutions(Goals(arm, task, goal, each), close, lead, out, known, (names, method, why))
+    return replace(s, interval=interval.reshape(*s.valid.shape, 2))
 
 
 def _still(
@@ -116,7 +98,7 @@ def _still(
     s = ik(free.rest, targets, free.task.name, near=np.delete(close, r, axis=-1), rounding=rounding)
     close = np.broadcast_to(close, (*lead, arm.n)).copy()
     value = np.clip(close[..., r], arm.lower[r], arm.upper[r])[..., None]
-    turns = (arm.upper[r] - arm.lower[r]) * abs(arm.ratio[r]) >= 2 * np.pi
+    turns = arm.upper[r] - arm.lower[r] >= 2 * np.pi
     interval = np.full((*s.valid.shape, 2), np.nan)
     interval[s.valid] = [-np.pi, np.pi] if turns else [arm.lower[r], arm.upper[r]]
     method, why, _ = described(arm, free)
@@ -201,7 +183,7 @@ class _Rows:
             if not self.stands[k]:
                 q = many_starts(self.arm, task, goal, np.ones(1, bool))[0]
                 q = q[~np.isnan(q[:, 0])]
-                q = q[newton.missing(self.arm, task, q, np.repeat(goal, len(q), axis=0)) <= SOLUTION]
+                q = q[newton.missing(self.arm, task, q, np.repeat(goal, len(q), axis=0)) <= tol.SOLUTION]
             if len(q):
                 q, legal = nearest_row(self.arm, q, np.broadcast_to(self.near[k], q.shape))
                 best = int(np.lexsort((motion(self.arm, q, self.near[k]), ~legal))[0])
@@ -244,11 +226,12 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
     some = np.flatnonzero(curves.pieces.legal)
     if not len(some):
         return best
-    for t in curves.tried(rows_of(curves.pieces, some), near[some]):
-        costs(some, t)
+    if isinstance(curves, Followed):  # of others these are samples
+        for t in curves.tried(rows_of(curves.pieces, some), near[some]):
+            costs(some, t)
     # beside a kink or a limit the motion grows on both sides: it is the nearest posture
     p = rows_of(curves.pieces, some)
-    beside = [costs(some, p.at + PROBE * (end - p.at)) for end in (p.low, p.high)]
+    beside = [costs(some, p.at + tol.PROBE * (end - p.at)) for end in (p.low, p.high)]
     some = some[np.minimum(*beside) < motion(arm, p.start, near[some])]
     p = rows_of(curves.pieces, some)
     low, high, middle, value = golden_section(lambda t: costs(some, t), p.low, p.high, curves.steps)
@@ -259,7 +242,8 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
         index = np.arange(len(some)), passes.argmax(axis=1)
         a, b = (end[index] for end in ends)
         costs(some, np.where(a * b < 0, low + (high - low) * a / np.where(a == b, 1.0, a - b), low))
-        costs(some, vertex(low, middle, high, *(motion(arm, end, near[some]) for end in q), value))
+        at_low, at_high = (motion(arm, end, near[some]) for end in q)
+        costs(some, vertex(low, middle, high, at_low, at_high, value))
     return best
 
 
@@ -269,7 +253,7 @@ def _standing(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> Ar
     It may be a posture with a joint that is free, or one that its target's rounding moves far.
     """
     middle, half = 0.5 * (pieces.a + pieces.b), 0.5 * (pieces.b - pieces.a)
-    inside = np.abs(wrapped(near[:, joint] - middle)) <= half + SAME
+    inside = np.abs(wrapped(near[:, joint] - middle)) <= half + tol.SAME
     cost = np.where(pieces.legal & inside, motion(arm, q, near), np.inf)
     out = q.copy()
     for row in np.unique(pieces.row).tolist():

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.numeric.tolerances import SOLUTION
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.boundaries import boundaries, places
 from armkin.inverse.redundant.branch_ends import crossed_at, hidden_stretches, number_of, places_of
 from armkin.inverse.redundant.interval_pieces import Pieces, none
@@ -49,7 +49,8 @@ class Followed(NamedTuple):
         return cls(find, stacked(parts), short, complete)
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
-        """Where near has the joint, and beside the best sample."""
+        """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: where
+        near has the joint, and beside that sample."""
         own = near[:, self.find.free.joint]
         own = own + np.round((pieces.at - own) / (2 * np.pi)) * 2 * np.pi
         return [np.where((own >= pieces.a) & (own <= pieces.b), own, pieces.at), pieces.low, pieces.high]
@@ -82,7 +83,7 @@ def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
     found = seen(find, over_a_turn(SAMPLES * finer))
     pieces, short = _pieces(find, found), found.short
     if finer == 1:
-        near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + SOLUTION)
+        near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + tol.SOLUTION)
         lost = found.lost & near_enough
         for more, which in ((CLOSER, found.hidden & ~lost), (FINER, lost)):
             again = np.flatnonzero(which)

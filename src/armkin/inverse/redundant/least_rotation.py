@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk, position, tip_and_jacobian
-from armkin.inverse.numeric.tolerances import LEVEL_CURVATURE, SAME, SOLUTION, STATIONARY, TINY, WEAK
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
@@ -77,9 +77,9 @@ def _tangent(at: _Local, held: Bool) -> _Tangent:
     n = held.shape[1]
     J = np.where(held[:, None, :], 0.0, at.J)
     U, S, Vt = np.linalg.svd(J, full_matrices=False)
-    gain = np.where(S > WEAK, 1.0 / np.maximum(S, WEAK), 0.0)
+    gain = np.where(S > tol.WEAK, 1.0 / np.maximum(S, tol.WEAK), 0.0)
     back = np.einsum("mkn,mk,mak->mna", Vt, gain, U)
-    rows = Vt * (S > WEAK)[:, :, None]
+    rows = Vt * (S > tol.WEAK)[:, :, None]
     P = np.eye(n) * ~held[:, :, None] - rows.swapaxes(1, 2) @ rows
     multipliers = -np.einsum("mna,mn->ma", back, np.where(held, 0.0, at.g))
     slope = at.g + np.einsum("man,ma->mn", at.J, multipliers)
@@ -105,17 +105,17 @@ def _move(box: Box, at: _Local, x: Array, held: Bool) -> _Move:
     held &= low | high
     tangent = _tangent(at, held)
     across = np.einsum("mij,mj->mi", tangent.P, at.g)
-    flat = np.abs(across).max(axis=1) <= STATIONARY
+    flat = np.abs(across).max(axis=1) <= tol.STATIONARY
     # at rest: a limit whose multiplier pulls away from it lets go, the strongest first
     pull = np.where(held & low, -tangent.slope, np.where(held & high, tangent.slope, -np.inf))
-    leaves = flat & (pull.max(axis=1) > STATIONARY)
+    leaves = flat & (pull.max(axis=1) > tol.STATIONARY)
     values, vectors = np.linalg.eigh(tangent.H)
-    there = np.abs(at.missed).max(axis=1) <= SOLUTION * SAME * 10
-    rest = flat & ~leaves & (values[:, 0] > -LEVEL_CURVATURE) & there
+    there = np.abs(at.missed).max(axis=1) <= tol.SOLUTION * tol.SAME * 10
+    rest = flat & ~leaves & (values[:, 0] > -tol.LEVEL_CURVATURE) & there
     held[leaves, pull.argmax(axis=1)[leaves]] = False
     saddle = flat & ~leaves & ~rest
     along = np.einsum("mij,mi->mj", vectors, -across)
-    step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), LEVEL_CURVATURE))
+    step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), tol.LEVEL_CURVATURE))
     step[saddle] = vectors[saddle, :, 0] * 0.05
     step = np.where(held, 0.0, step + np.einsum("mna,ma->mn", tangent.back, at.missed))
     pressed = ((low & (step < 0)) | (high & (step > 0))) & ~held
@@ -125,9 +125,9 @@ def _move(box: Box, at: _Local, x: Array, held: Bool) -> _Move:
 
 def _tried(arm: Arm, box: Box, x: Array, goal: Array, move: _Move, trust: Array) -> tuple[Array, Bool]:
     """Where the steps of at most trust (M,) lead, to the first limit at most; joints (M, n) that come onto one."""
-    step = move.step * np.minimum(1.0, trust / np.maximum(np.abs(move.step).max(axis=1), TINY))[:, None]
+    step = move.step * np.minimum(1.0, trust / np.maximum(np.abs(move.step).max(axis=1), tol.TINY))[:, None]
     room = np.where(step > 0, (box.upper - x) / box.unit, (x - box.lower) / box.unit)
-    share = np.where(np.abs(step) > TINY, room / np.maximum(np.abs(step), TINY), np.inf)
+    share = np.where(np.abs(step) > tol.TINY, room / np.maximum(np.abs(step), tol.TINY), np.inf)
     share[move.pressed] = np.inf
     reach = np.minimum(1.0, share.min(axis=1))
     hit = (share <= reach[:, None]) & (share < 1.0)
@@ -159,7 +159,7 @@ def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
         missed = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
         f = 0.5 * (3.0 - np.einsum("mij,mij->m", T[:, :3, :3], goal[:, :3, :3]))
         before = at.f + 10.0 * np.linalg.norm(at.missed, axis=1)
-        better = (f + 10.0 * missed <= before + SOLUTION * SAME) & ~move.rest & ~move.leaves
+        better = (f + 10.0 * missed <= before + tol.SOLUTION * tol.SAME) & ~move.rest & ~move.leaves
         better &= ~(move.blocked & move.flat)
         go = active[better]
         q[go] = trial[better]
@@ -167,7 +167,7 @@ def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
         trust[go] = np.minimum(2.0 * trust[go], 0.5)
         refused = active[~better & ~move.rest & ~move.blocked & ~move.leaves]
         trust[refused] *= 0.25
-        active = active[~move.rest & (trust[active] > SOLUTION)]
+        active = active[~move.rest & (trust[active] > tol.SOLUTION)]
     return q, done
 
 
@@ -179,5 +179,5 @@ def flat_minima(arm: Arm, q: Array, target: Array) -> Bool:
     tangent = _tangent(at, held)
     values, vectors = np.linalg.eigh(tangent.H)
     inside = np.linalg.norm(tangent.P @ vectors, axis=1) > 0.5
-    flat: Bool = (inside & (np.abs(values) <= LEVEL_CURVATURE)).any(axis=1)
+    flat: Bool = (inside & (np.abs(values) <= tol.LEVEL_CURVATURE)).any(axis=1)
     return flat

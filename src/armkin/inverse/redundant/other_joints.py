@@ -16,7 +16,7 @@ from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.subproblems import Pair
-from armkin.inverse.numeric.tolerances import ACCEPTED
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import motion_of_joint, within_limits
 from armkin.inverse.redundant.refine_samples import values_between
 from armkin.inverse.solvers.recognise import solver
@@ -88,7 +88,7 @@ class Follower(NamedTuple):
             s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
             return np.insert(s.q, self.free.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
         q, missed = self.candidates(rows, t)
-        np.copyto(q, np.nan, where=~(missed <= ACCEPTED)[..., None])
+        np.copyto(q, np.nan, where=~(missed <= tol.ACCEPTED)[..., None])
         return q
 
     def candidates(self, rows: Int, t: Array) -> tuple[Array, Array]:
@@ -144,7 +144,7 @@ class Follower(NamedTuple):
 
     def _within(self, some: Int, t: Array, columns: list[Array], missed: Array, axes: tuple[int, ...]) -> Sampled:
         """Values of all joints on their own branch axes before samples of some of the targets, at legal copies."""
-        there = missed <= ACCEPTED**2
+        there = missed <= tol.ACCEPTED**2
         near = self.near[np.repeat(some, t.shape[1])].T
         shape = (*axes, t.size)
         legal, cost, room = there, np.zeros(()), np.full(shape, 2 * np.pi)
@@ -168,7 +168,7 @@ class Follower(NamedTuple):
             return np.asarray(values[*at, np.arange(len(t))])
 
         q = np.stack([picked(values) for values in columns]).T
-        q[~(picked(miss) <= ACCEPTED**2)] = np.nan
+        q[~(picked(miss) <= tol.ACCEPTED**2)] = np.nan
         return q
 
     def one(self, rows: Int, branch: Int, t: Array) -> tuple[Array, Bool]:

@@ -17,18 +17,19 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array, Int
 from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
+from armkin.inverse.answers.batch import Goals, as_solutions, empty
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import EQUAL, ONE_MINIMUM, SAME, SOLUTION, TINY, WEAK
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.least_rotation import Box, box_of, descend, flat_minima
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_near, read_targets
 from armkin.keep_out.clearance import clear
-from armkin.model.arm import Arm, actual
+from armkin.model.arm import Arm
 from armkin.model.limits import outside
 
 POOL = 32_768  # postures within limits
@@ -50,56 +51,42 @@ def check(arm: Arm, task: str | None) -> None:
         raise UsageError(f"position first is for arms of 4 or 5 joints; {arm.name} has {arm.n}", joints=arm.n)
 
 
-def position_first(ik: Ik, arm: Arm, targets: ArrayLike, *, near: ArrayLike | None = None) -> Solutions:
+def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near: ArrayLike | None) -> Solutions:
     """The postures within limits at the targets' positions whose rotation is nearest: (..., 4, 4) -> rows.
 
     Rows are local minima of the rotation angle, sorted by it (`Solutions.angle`), then by motion from near, (n,) or
     (..., n); where there are keep-outs free ones come first. status tells of the first: exact if it solves the pose,
     else position; unreachable where there is none. ik: what finds exact answers, called as `armkin.ik` is.
-    Raises UsageError for arms of other than 4 or 5 joints.
+    Raises UsageError for arms of other than 4 or 5 joints, and for a task of another name.
     """
-    check(arm, "pose")
+    check(arm, name)
     task = task_for(arm, "pose")
     goal, lead, rounding = read_targets(task, targets)
     close = read_near(arm, near, lead)
     each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
-    true = actual(arm)
     found: list[Array] = []
     for start in range(0, len(goal), AT_ONCE):
         rows = slice(start, start + AT_ONCE)
-        found += _of_chunk(ik, true, task, goal[rows], each[rows] * arm.ratio)
+        found += _of_chunk(ik, arm, task, goal[rows], each[rows])
     if arm.keep_out:
-        found = [minima[np.argsort(~clear(arm, minima / arm.ratio), kind="stable")] for minima in found]
+        found = [minima[np.argsort(~clear(arm, minima), kind="stable")] for minima in found]
     B = max(map(len, found), default=0)
-    q = np.full((len(goal), B, arm.n), np.nan)
-    for row, minima in zip(q, found, strict=True):
-        row[: len(minima)] = minima / arm.ratio
-    valid = ~np.isnan(q).any(axis=2)
-    missing = residual(task, fk(arm, q.reshape(-1, arm.n)), q.reshape(-1, arm.n), np.repeat(goal, B, axis=0))
-    angle = np.linalg.norm(missing[:, 3:], axis=1).reshape(valid.shape)
-    solved = B > 0 and np.hypot(np.linalg.norm(missing[:, :3], axis=1) / arm.reach, angle.ravel()) <= SOLUTION
-    status = np.full(len(goal), Status.UNREACHABLE, np.int8)
+    out = empty(len(goal), B, arm.n)
+    out.q[...], out.branch[...], out.status[...], out.complete[...] = np.nan, -1, Status.UNREACHABLE, False
+    for row, branch, minima in zip(out.q, out.branch, found, strict=True):
+        row[: len(minima)], branch[: len(minima)] = minima, np.arange(len(minima))
+    out.valid[...] = out.within[...] = out.branch >= 0
+    q = out.q.reshape(-1, arm.n)
+    missing = residual(task, fk(arm, q), q, np.repeat(goal, B, axis=0)).reshape(len(goal), B, 6)
+    angle = np.linalg.norm(missing[:, :, 3:], axis=2)
     if B:
-        status[valid[:, 0]] = Status.POSITION
-        status[valid[:, 0] & np.reshape(solved, valid.shape)[:, 0]] = Status.EXACT
-    return Solutions(
-        arm=arm,
-        task=task,
-        target=goal.reshape(*lead, 4, 4),
-        near=np.broadcast_to(close.copy(), (*lead, arm.n)),
-        q=q.reshape(*lead, B, arm.n),
-        valid=valid.reshape(*lead, B),
-        within_limits=valid.reshape(*lead, B).copy(),
-        branch=np.where(valid, np.arange(B), -1).astype(np.int8).reshape(*lead, B),
-        status=status.reshape(lead),
-        free=np.zeros((*lead, arm.n), bool),
-        names=tuple(f"minimum {i + 1}" for i in range(B)),
-        method=METHOD,
-        why=f"minima of the rotation angle at the position, from {STARTS} postures",
-        complete=np.zeros(lead, bool),
-        rounding=rounding.reshape(lead),
-        angle=angle.reshape(*lead, B),
-    )
+        out.status[out.valid[:, 0]] = Status.POSITION
+        off = np.hypot(np.linalg.norm(missing[:, 0, :3], axis=1) / arm.reach, angle[:, 0])
+        out.status[off <= tol.SOLUTION] = Status.EXACT
+    names = tuple(f"minimum {i + 1}" for i in range(B))
+    text = names, METHOD, f"minima of the rotation angle at the position, from {STARTS} postures"
+    s = as_solutions(Goals(arm, task, goal, each), close, lead, out, rounding, text)
+    return replace(s, angle=angle.reshape(s.valid.shape))
 
 
 def closest_each(arm: Arm, targets: Array, near: Array) -> list[Closest]:
@@ -140,20 +127,20 @@ def _sorted(arm: Arm, task: Task, q: Array, exact: int, target: Array, near: Arr
         return q
     missing = residual(task, fk(arm, q), q, np.broadcast_to(target, (len(q), 4, 4)))
     angle, searched = np.linalg.norm(missing[:, 3:], axis=1), np.arange(len(q)) >= exact
-    good = (np.linalg.norm(missing[:, :3], axis=1) <= SOLUTION * arm.reach) & ~outside(arm, q).any(axis=1)
+    good = (np.linalg.norm(missing[:, :3], axis=1) <= tol.SOLUTION * arm.reach) & ~outside(arm, q).any(axis=1)
     q, angle, searched = q[good], angle[good], searched[good]
     motion = (np.abs(q - near) * np.where(arm.prismatic, 1.0, 180 / np.pi)).sum(axis=1)
     by_angle = np.argsort(angle, kind="stable")
     level = np.empty(len(q), int)  # angles that differ by rounding are one
-    level[by_angle] = np.cumsum(np.diff(angle[by_angle], prepend=0.0) > ONE_MINIMUM)
-    order = np.lexsort((motion.round(EQUAL), searched, level))
+    level[by_angle] = np.cumsum(np.diff(angle[by_angle], prepend=0.0) > tol.ONE_MINIMUM)
+    order = np.lexsort((motion.round(tol.EQUAL), searched, level))
     q, level = q[order], level[order]
     flat = flat_minima(arm, q, target)
     kept: list[int] = []
     for i in range(len(q)):
         same = [j for j in kept if level[j] == level[i]]
         apart = newton.wrapped_distance(arm, q[same], q[i])
-        if not any(d <= ONE_MINIMUM or (flat[i] and flat[j]) for d, j in zip(apart, same, strict=True)):
+        if not any(d <= tol.ONE_MINIMUM or (flat[i] and flat[j]) for d, j in zip(apart, same, strict=True)):
             kept.append(i)
     return q[kept]
 
@@ -165,10 +152,7 @@ def _pool(arm: Arm) -> tuple[Array, Array]:
     A joint in four is on a limit: so are those of many minima.
     """
     rng = np.random.default_rng(12)
-    span = np.where(arm.prismatic, arm.reach, np.pi)
-    low = np.where(np.isfinite(arm.lower), arm.lower, np.minimum(-span, arm.home - span))
-    high = np.where(np.isfinite(arm.upper), arm.upper, np.maximum(span, arm.home + span))
-    q = rng.uniform(low, high, (POOL, arm.n))
+    q = closest.spread(arm, rng, POOL)
     limit = np.where(rng.random(q.shape) < 0.5, arm.lower, arm.upper)
     q = np.where((rng.random(q.shape) < ON_LIMIT) & np.isfinite(limit), limit, q)
     return q, position(arm, q)
@@ -184,7 +168,7 @@ def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, Int]:
     starts = np.concatenate([own, _spread(arm, nearest)], axis=1).reshape(-1, arm.n)
     row = np.repeat(np.arange(len(target)), STARTS + 1)
     q, missed = _to_position(arm, box, starts, point[row], 24)
-    there = missed <= SOLUTION
+    there = missed <= tol.SOLUTION
     return q[there], row[there]
 
 
@@ -211,7 +195,7 @@ def _to_position(arm: Arm, box: Box, q: Array, point: Array, steps: int) -> tupl
         T, J = tip_and_jacobian(arm, q[active])
         c = (point[active] - T[:, :3, 3]) / arm.reach
         missed[active] = np.linalg.norm(c, axis=1)
-        going = missed[active] > SOLUTION * SAME
+        going = missed[active] > tol.SOLUTION * tol.SAME
         active, c, J = active[going], c[going], J[going, :3] * box.unit / arm.reach
         if step == steps or not len(active):
             break
@@ -219,7 +203,7 @@ def _to_position(arm: Arm, box: Box, q: Array, point: Array, steps: int) -> tupl
         for _ in range(2):  # joints that would go beyond a limit stay on it
             stuck |= ((q[active] <= box.lower) & (move < 0)) | ((q[active] >= box.upper) & (move > 0))
             move = _least(np.where(stuck[:, None], 0.0, J), c)
-        move *= np.minimum(1.0, 0.5 / np.maximum(np.abs(move).max(axis=1), TINY))[:, None]
+        move *= np.minimum(1.0, 0.5 / np.maximum(np.abs(move).max(axis=1), tol.TINY))[:, None]
         q[active] = np.clip(q[active] + move * box.unit, box.lower, box.upper)
     return q, missed
 
@@ -227,6 +211,6 @@ def _to_position(arm: Arm, box: Box, q: Array, point: Array, steps: int) -> tupl
 def _least(J: Array, c: Array) -> Array:
     """Damped steps of least norm (M, n) of J d = c, J (M, 3, n)."""
     size = np.einsum("mi,mi->m", c, c)[:, None, None]
-    G = J @ J.swapaxes(1, 2) + (1e-2 * size + WEAK * WEAK) * np.eye(3)
+    G = J @ J.swapaxes(1, 2) + (1e-2 * size + tol.WEAK * tol.WEAK) * np.eye(3)
     step: Array = (J.swapaxes(1, 2) @ np.linalg.solve(G, c[:, :, None]))[:, :, 0]
     return step

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.tolerances import ACCEPTED
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import within_limits
 from armkin.model.arm import Arm
 
@@ -38,7 +38,7 @@ def values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[in
     def by_target(x: Array) -> Array:
         return x.reshape(*x.shape[:-1], *shape[-2:])
 
-    there = by_target(missed) <= ACCEPTED**2
+    there = by_target(missed) <= tol.ACCEPTED**2
     room, may, crossed = np.full(shape, 2 * np.pi), np.zeros(shape, bool), np.zeros(shape, np.int8)
     for j, column in enumerate(columns):
         left = np.full(column.shape, 2 * np.pi)

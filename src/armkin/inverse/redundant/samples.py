@@ -11,7 +11,7 @@ import numpy as np
 
 from armkin.formula.array_tuples import stacked
 from armkin.formula.arrays import Array, Bool, Int, wrapped
-from armkin.inverse.numeric.tolerances import REACH
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.boundaries import on_both_sides
 from armkin.inverse.redundant.interval_pieces import best_samples, holding_none, runs, turning
 from armkin.inverse.redundant.other_joints import Follower, Sampled
@@ -178,7 +178,7 @@ def _runs(found: Sampled, good: Bool, rows: Int) -> Runs:
 
 def _all_short(found: Sampled, row: Int, first: Int, length: Int) -> Bool:
     """Whether no joint moves by REACH along any family of a target (S,), of which runs (R,) of samples are there."""
-    wide = value_at(found.t, row, first + length - 1) - value_at(found.t, row, first) > REACH
+    wide = value_at(found.t, row, first + length - 1) - value_at(found.t, row, first) > tol.REACH
     short = np.asarray(found.valid.any(axis=(1, 2)))
     short[row[wide]] = False
     for k in np.flatnonzero(short).tolist():
@@ -186,5 +186,5 @@ def _all_short(found: Sampled, row: Int, first: Int, length: Int) -> Bool:
         q = found.postures(np.full(K, k), np.arange(K))
         step = np.abs(wrapped(np.roll(q, -1, axis=0) - q))
         way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
-        short[k] = 2.0 * way.max(initial=0.0) < REACH
+        short[k] = 2.0 * way.max(initial=0.0) < tol.REACH
     return short

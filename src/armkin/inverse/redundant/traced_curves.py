@@ -14,7 +14,7 @@ import numpy as np
 from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Bool, Int, wrapped
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import SAME_SEED, SHORTEST_ARC, TINY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.answers_on_planes import Nodes, answered, once
 from armkin.inverse.redundant.curve_points import Points, Ways, onto
 from armkin.inverse.redundant.other_joints import Follower
@@ -68,9 +68,9 @@ class _Curves:
                 failed[whose[left]] = True
                 break
             middle = rows_of(ways, left).at(find, 0.5)
-            points = onto(find, row[left], middle, ways.chord[left] / size[left, None], SAME_SEED)
+            points = onto(find, row[left], middle, ways.chord[left] / size[left, None], tol.SAME_SEED)
             aside = newton.wrapped_distance(find.arm, points.q, middle)
-            good = (points.step < SAME_SEED) & (aside < ASIDE * size[left])
+            good = (points.step < tol.SAME_SEED) & (aside < ASIDE * size[left])
             failed[whose[left[~good]]] = True
             left = left[good]
             new = self._add(Nodes(row[left], np.full(len(left), -1), rows_of(points, good)))
@@ -138,7 +138,7 @@ class _Curves:
             i, k = np.nonzero(own[:, None] == place[asked])
             k = near[asked][k]
             apart = newton.wrapped_distance(self.find.arm, found.points.q[i], self.nodes.points.q[k])
-            number[i[apart < SAME_SEED]] = k[apart < SAME_SEED]
+            number[i[apart < tol.SAME_SEED]] = k[apart < tol.SAME_SEED]
             new = np.flatnonzero(number < 0)
             if not len(new):
                 break
@@ -158,14 +158,14 @@ class _Curves:
         passed, going = [(ray[:0], rows_of(now, ray[:0]))], np.arange(len(ray))
         for _ in range(TRIES):
             here, step = rows_of(now, going), h[going, None]
-            then = onto(find, row[going], here.q + step * here.tangent * unit, here.tangent, SAME_SEED)
+            then = onto(find, row[going], here.q + step * here.tangent * unit, here.tangent, tol.SAME_SEED)
             way = Ways.between(find, here, then)
             aside = np.sqrt(((way.chord - step * here.tangent) ** 2).sum(axis=1))
-            good = (then.step < SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(find, row[going])
+            good = (then.step < tol.SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(find, row[going])
             h[going] = np.where(good, np.minimum(1.5 * h[going], LONGEST), 0.5 * h[going])
             middle = low[going] + 0.5 * wide[going]
             depth, before = (wrapped(one.q[:, j] - middle) for one in (then, here))
-            left = good & (np.abs(depth) >= 0.5 * wide[going]) & (np.abs(depth - before) > TINY)
+            left = good & (np.abs(depth) >= 0.5 * wide[going]) & (np.abs(depth - before) > tol.TINY)
             some, far = going[left], depth[left] > 0
             goal = np.where(far, 0.5, -0.5) * wide[some]
             share = np.clip((goal - before[left]) / (depth[left] - before[left]), 0.0, 1.0)
@@ -178,7 +178,7 @@ class _Curves:
             for one, new, last, final in zip(now, then, end, there, strict=True):
                 one[going[inside]] = new[inside]
                 last[some] = final
-            going = going[~left & (h[going] > SHORTEST_ARC)]
+            going = going[~left & (h[going] > tol.SHORTEST_ARC)]
             if not len(going):
                 break
         return passed, end, plane

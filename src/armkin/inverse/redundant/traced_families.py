@@ -11,8 +11,8 @@ from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import PAIR_SETTLED, REACH, TINY
 from armkin.inverse.redundant.curve_points import Points, Ways, onto
 from armkin.inverse.redundant.interval_pieces import Pieces, best_samples, holding_none, margin, motion, none, runs
 from armkin.inverse.redundant.other_joints import Follower
@@ -74,20 +74,16 @@ class Traced(NamedTuple):
             return curves
         extent = np.zeros(N)
         np.maximum.at(extent, row, 0.5 * np.add.reduceat(np.abs(ways.chord), begin, axis=0).max(axis=1))
-        return curves._replace(pieces=curves._pieces(row, branch), short=(extent > 0) & (extent < REACH))
-
-    def tried(self, pieces: Pieces, near: Array) -> list[Array]:
-        """As `Turning.tried`."""
-        return []
+        return curves._replace(pieces=curves._pieces(row, branch), short=(extent > 0) & (extent < tol.REACH))
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Turning.at`."""
         curve = self.curve[pieces.row, pieces.branch]
         whole = np.floor(parameter)
         point = self.begin[curve] + whole.astype(np.intp) % self.counts[curve]
-        there = self._between(point, parameter - whole, REACH)  # a cubic's miss squared is left
+        there = self._between(point, parameter - whole, tol.REACH)  # a cubic's miss squared is left
         q, legal = nearest_row(self.find.arm, there.q, self.find.near[pieces.row])
-        return q, legal & (there.step < REACH)
+        return q, legal & (there.step < tol.REACH)
 
     def settled(self, pieces: Pieces, q: Array) -> Array:
         """Postures (P, n) of pieces, without what `at` leaves, by steps of least norm."""
@@ -98,7 +94,7 @@ class Traced(NamedTuple):
             q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(find.arm)
         return q
 
-    def _between(self, point: Int, share: Array, enough: float = PAIR_SETTLED) -> Points:
+    def _between(self, point: Int, share: Array, enough: float = tol.PAIR_SETTLED) -> Points:
         """Points of the curves at shares (M,) of the way from points (M,) to those after them."""
         ways = rows_of(self.ways, point)
         last = np.where(ways.chord.any(axis=1, keepdims=True), ways.chord, self.points.tangent[point])
@@ -151,7 +147,7 @@ class Traced(NamedTuple):
         held[index, which] = 1.0
         guess[index, which] += np.sign(off[index, which]) * room[index, which]
         there = onto(self.find, self.row[point], guess, held)
-        good = there.settled & (np.abs(there.q - guess).max(axis=1, initial=0.0) < REACH)
+        good = there.settled & (np.abs(there.q - guess).max(axis=1, initial=0.0) < tol.REACH)
         some = np.flatnonzero(~good)  # it touches its limit alone
         there.q[some] = self._between(point[some], share[some]).q
         return share, there.q
@@ -161,11 +157,13 @@ class Traced(NamedTuple):
         j, ways = self.find.free.joint, rows_of(self.ways, point)
         share = _root(lambda t: ways.slope(t, j), low, low + 1.0 / PARTS)
         there = self._between(point, share)
-        size = np.maximum(np.sqrt((ways.begin**2).sum(axis=1)), TINY)
-        bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, TINY))
+        size = np.maximum(np.sqrt((ways.begin**2).sum(axis=1)), tol.TINY)
+        bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, tol.TINY))
         for _ in range(TURNS if len(point) else 0):
             step = np.clip(
-                -there.tangent[:, j] / np.where(np.abs(bend) > TINY, bend, np.inf), -REACH * size, REACH * size
+                -there.tangent[:, j] / np.where(np.abs(bend) > tol.TINY, bend, np.inf),
+                -tol.REACH * size,
+                tol.REACH * size,
             )
             ahead = there.q + step[:, None] * there.tangent * radian_or_reach(self.find.arm)
             after = onto(self.find, self.row[point], ahead, there.tangent)

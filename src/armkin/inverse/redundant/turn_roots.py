@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.numeric.tolerances import ROUNDING
+from armkin.inverse.numeric import tolerances as tol
 
 TERMS = 12  # of a Taylor series
 WIDE = 0.35  # half a cell times the degree: what is left out is 1e-14 of the polynomial's size
@@ -79,7 +79,7 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
     c = values @ _coefficients(degree)
     # their errors shrink with the order, as the samples lie aside
     c, above = c[:, : degree + 1], np.abs(c[:, degree + 1 :]) * np.exp(ASIDE * np.arange(degree + 1, degree + MORE + 1))
-    slack = SAFE * (2 * degree + 1) * above.max(axis=1) + 10.0 * ROUNDING * np.abs(c).sum(axis=1)
+    slack = SAFE * (2 * degree + 1) * above.max(axis=1) + 10.0 * tol.ROUNDING * np.abs(c).sum(axis=1)
     a = (np.concatenate([c.real, c.imag], axis=1) @ series).reshape(-1, TERMS)
     which, at = np.repeat(np.arange(F), len(middle)), np.tile(middle, F)
     found_which, found_at, decided = [], [], np.ones(F, bool)

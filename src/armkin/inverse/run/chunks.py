@@ -12,21 +12,20 @@ from numpy.typing import NDArray
 
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool, Int, Truth
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.numeric.tolerances import ACCEPTED, NEARBY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.run.edges import AT_ONCE, decided
 from armkin.inverse.run.folds import Doubted, tell
 from armkin.inverse.run.workers import shared
 from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
 from armkin.model.arm import Arm
-from armkin.model.limits import SLACK
 
 TURNED_AT_ONCE = 512  # poses whose columns become rows: both stay in a core's own cache
 
@@ -99,7 +98,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
     return Solved(out, math.prod(runner.axes), target, rounding, edge)
 
 
-def _keep(  # noqa: C901 - one pass over a chunk's arrays
+def _keep(
     goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], near: Array, there: Int | None
 ) -> Doubted:
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
@@ -114,15 +113,12 @@ def _keep(  # noqa: C901 - one pass over a chunk's arrays
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
     miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
-    valid = within = miss <= ACCEPTED**2
+    valid = within = miss <= tol.ACCEPTED**2
     full, legal = bool(valid.all()), np.empty((*axes, arm.n, N))
     for i, value in enumerate(values):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
-        inside: Truth = True
-        if not arm.prismatic[i]:
-            value, inside = nearest_copy(value, float(near[i]) if near.ndim == 1 else near[:, i], lower, upper)
-        elif lower > -np.inf or upper < np.inf:
-            inside = (value >= lower - SLACK) & (value <= upper + SLACK)
+        close = float(near[i]) if near.ndim == 1 else near[:, i]
+        value, inside = nearest_copy(value, close, lower, upper, bool(arm.prismatic[i]))
         legal[..., i, :] = value
         if inside is not True:
             within = (within.reshape(shape) & inside).reshape(B, N)
@@ -156,7 +152,7 @@ def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> Int:
         doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
     doubted = np.flatnonzero(doubt) % N
     if valid is not None:
-        clear = miss > NEARBY**2
+        clear = miss > tol.NEARBY**2
         if np.count_nonzero(clear) + np.count_nonzero(valid) < miss.size:  # nearly there, or not a number
             doubted = np.concatenate([doubted, np.flatnonzero(~(valid | clear)) % N])
     return np.unique(doubted) if len(doubted) else doubted
@@ -194,7 +190,7 @@ def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool 
         *found, doubt, _ = runner.code.run(entries(task, goal), workspace)
         shape = (*runner.axes, N)
         *values, miss = (np.broadcast_to(one, shape).reshape(B, N) for one in found)
-        valid: Bool = np.asarray(miss <= ACCEPTED**2)
+        valid: Bool = np.asarray(miss <= tol.ACCEPTED**2)
         left = np.union1d(_on_edge(doubt, miss, valid), near_itself.reached(arm, task, goal, tip))
         yield Columns(slice(start, start + N), values, miss, valid, left)
 

@@ -10,9 +10,9 @@ import numpy as np
 from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
-from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
-from armkin.inverse.numeric.tolerances import ACCEPTED, FOLD_WAY, NEARBY, SAME
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import components, linkages, near_itself, surfaces
 
 AT_ONCE = 1024  # targets examined together
@@ -127,7 +127,7 @@ def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     tight, (miss, edge, free) = found[:, :, :-3], np.moveaxis(found[:, :, -3:], 2, 0)
     plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
     plain[near_itself.reached(arm, task, target, position(arm, near))] = False
-    gone = plain & (miss > NEARBY**2)
+    gone = plain & (miss > tol.NEARBY**2)
     out = _Doubts(
         rows=rows,
         tight=np.where(gone[:, :, None], np.nan, tight),
@@ -137,33 +137,33 @@ def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
         free=np.asarray((free > 0.0).any(axis=1)),
         ends=np.zeros(len(rows), bool),
         narrow=np.zeros(len(rows), bool),
-        simple=plain & (miss <= ACCEPTED**2),
+        simple=plain & (miss <= tol.ACCEPTED**2),
     )
     part = np.flatnonzero(out.free)
     if len(part):
         goal, close = target[part], near[part]
         first, second, solved = _at_two(runner, goal, close, close + 1.0)
         apart = np.abs(first - second)
-        changed = ~((apart.max(axis=2) < SAME) | plain[part])
+        changed = ~((apart.max(axis=2) < tol.SAME) | plain[part])
         lost = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
         if len(lost):  # solutions for some values of the free joints alone, or for one
             shift, single = runner.best_shift(goal[lost], close[lost], changed[lost])
             best = close[lost] + shift
-            first[lost], second[lost], solved = _at_two(runner, goal[lost], best, best + FOLD_WAY)
+            first[lost], second[lost], solved = _at_two(runner, goal[lost], best, best + tol.FOLD_WAY)
             out.narrow[part[lost]] = solved[1].any(axis=1)
             single &= ~out.narrow[part[lost]]
             out.free[part[lost]], second[lost[single]] = ~single, np.nan  # one value alone is no freedom
         out.first[part] = np.where(plain[part][:, :, None], out.first[part], first)
         out.other[part], out.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
         apart = np.minimum(apart, np.abs(apart - 2 * np.pi))[:, :, list(runner.geometry.ends)]
-        out.ends[part] = (apart > SAME).any(axis=(1, 2))
+        out.ends[part] = (apart > tol.SAME).any(axis=(1, 2))
     return out
 
 
 def _at_two(runner: Recorded, target: Array, values: Array, others: Array) -> tuple[Array, Array, Bool]:
     """Candidates for two values of free joints, (N, B, n) each, and which solve their targets (2, N, B)."""
     found = runner.with_values(np.concatenate([target, target]), np.concatenate([values, others]))
-    solved = found[..., -1].reshape(2, len(target), -1) <= ACCEPTED**2
+    solved = found[..., -1].reshape(2, len(target), -1) <= tol.ACCEPTED**2
     return found[: len(target), :, :-1], found[len(target) :, :, :-1], solved
 
 
@@ -192,8 +192,7 @@ def examined(
         seen = components.examine(some, part, more, None if unsettled is None else unsettled[rows])
         if seen.surface.any():
             seen = surfaces.swept(some, seen)
-        out = wider(out, seen.q.shape[1])
-        write(goals.arm, out, rows, seen.q, seen.valid, seen.label, some.near)
+        out = write(goals.arm, out, rows, seen.q, seen.valid, seen.label, some.near)
         out.status[rows], out.free[rows] = seen.status, seen.free
         out.complete[rows] &= ~seen.again
     return out

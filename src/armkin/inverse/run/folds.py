@@ -18,25 +18,13 @@ from armkin.inverse.answers.batch import Batch, Goals, write
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.closed.candidates import Recorded, as_rows
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import (
-    ACCEPTED,
-    CLOSE_BY,
-    CLOSED,
-    CURVATURE,
-    FOLD_WAY,
-    FOLDED,
-    HIGH,
-    NEARBY,
-    SAME,
-    SEED,
-    SOLUTION,
-)
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import task_jacobian
 from armkin.model.units import radian_or_reach
 
 SURELY = 1.02  # times SOLUTION or its inverse: what lies between is looked at closely
 SYMMETRIC = 0.2  # most that the slopes at a pair's ends differ by, in parts of their size
-APART = 10.0 * SAME  # [rad, reaches] two branches closer than this are looked at closely
+APART = 10.0 * tol.SAME  # [rad, reaches] two branches closer than this are looked at closely
 
 
 class Doubted(NamedTuple):
@@ -59,18 +47,18 @@ def tell(goals: Goals, runner: Recorded, out: Batch, at: Doubted) -> Int:
     What stands alone is in the batch already, but for what misses a little; of two branches that meet the first is
     listed, as the target has it alone.
     """
-    there = at.miss <= SOLUTION**2
-    moved = there & (at.miss >= CLOSED**2)
+    there = at.miss <= tol.SOLUTION**2
+    moved = there & (at.miss >= tol.CLOSED**2)
     # what misses a little more may be a branch
-    far = at.miss > np.where(at.edge, SEED**2, NEARBY**2)
+    far = at.miss > np.where(at.edge, tol.SEED**2, tol.NEARBY**2)
     told: Bool = np.asarray(at.plain & there.any(axis=1) & (there | far).all(axis=1))
     k, b = np.nonzero(moved & told[:, None])
     if len(k):
         at.q[k, b], size = newton.correct(goals.arm, goals.task, at.q[k, b], goals.target[at.rows[k]], steps=3)
-        told[k[size >= CLOSED]] = False
-    second = _pairs(goals, at, there & (at.edge | (at.miss > ACCEPTED**2)), told)
+        told[k[size >= tol.CLOSED]] = False
+    second = _pairs(goals, at, there & (at.edge | (at.miss > tol.ACCEPTED**2)), told)
     meets: Bool = np.asarray(second.any(axis=1))
-    some = np.flatnonzero(told & (meets | (there & (at.miss > ACCEPTED**2)).any(axis=1)))
+    some = np.flatnonzero(told & (meets | (there & (at.miss > tol.ACCEPTED**2)).any(axis=1)))
     if len(some):
         rows, meets, there = at.rows[some], meets[some], there[some] & ~second[some]
         if meets.any():
@@ -96,14 +84,14 @@ def _pairs(goals: Goals, at: Doubted, asked: Bool, told: Bool) -> Bool:
     i, j = number[row, i], number[row, j]
     way = newton.difference(goals.arm, q[j], q[i])
     size = np.abs(way).max(axis=1)
-    close = size < CLOSE_BY
+    close = size < tol.CLOSE_BY
     many = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
     told[k[many > 1]] = told[k[i[size < APART]]] = False
     if not told[k].all():  # no Jacobians of those
         return _pairs(goals, at, asked, told)
     i, j, way = i[close], j[close], way[close]
     inverse, beside = _inverses(goals, q)
-    weak = (inverse * inverse).sum(axis=(1, 2)) * FOLDED**2 >= 1.0
+    weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
     lone = np.flatnonzero(weak & (many == 0) & told[k])
     if len(lone):
         told[k[lone[~_alone(goals, q[lone], inverse[lone], beside[lone])]]] = False
@@ -149,13 +137,13 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
         size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / far, np.abs(rise + fall)
         # the fourth derivative is taken for as large as that of the sharpest fold
         plain = _single(first, lost) & (far > APART) & (uneven < SYMMETRIC * size)
-        alone = plain & (0.125 * far * size - CURVATURE * far**4 / 384.0 > SURELY * SOLUTION)
+        alone = plain & (0.125 * far * size - tol.CURVATURE * far**4 / 384.0 > SURELY * tol.SOLUTION)
         # as far as the residual of two that meet may be 2 SOLUTION
-        end = far + 2.0 * np.sqrt(SOLUTION / bend)
-        straight = 6.0 * uneven / far**2 * end + 0.5 * CURVATURE * end**2 < SYMMETRIC * bend
+        end = far + 2.0 * np.sqrt(tol.SOLUTION / bend)
+        straight = 6.0 * uneven / far**2 * end + 0.5 * tol.CURVATURE * end**2 < SYMMETRIC * bend
         # and the direction that no joint moves the tool in
         across = np.abs(other[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
-        meet = plain & straight & (0.125 * far * (size + across) < SOLUTION / SURELY)
+        meet = plain & straight & (0.125 * far * (size + across) < tol.SOLUTION / SURELY)
     return np.asarray(alone), np.asarray(meet)
 
 
@@ -168,7 +156,7 @@ def _alone(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
     largest = (moved * moved).sum(axis=1).argmax(axis=1)
     v = np.take_along_axis(moved, largest[:, None, None], axis=2)
     v = _unit((moved @ (moved.swapaxes(1, 2) @ v)).swapaxes(1, 2))[:, 0]
-    way = FOLD_WAY * v * radian_or_reach(goals.arm)
+    way = tol.FOLD_WAY * v * radian_or_reach(goals.arm)
     ends, _ = _inverses(goals, np.concatenate([q + way, q - way]), np.concatenate([beside, beside]))
     v = _tangents(v, inverse)
     u = _unit(v @ inverse)
@@ -176,9 +164,9 @@ def _alone(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
         lost, at_ends = inverse @ u.swapaxes(1, 2), ends @ np.concatenate([u, u]).swapaxes(1, 2)
         slope = np.abs(1.0 / (v @ lost)[:, 0, 0])
         ahead, behind = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
-        bend, passed = np.abs(ahead - behind) / (2.0 * FOLD_WAY), 2.0 * SOLUTION / slope
-        steep = slope**2 > SURELY * 2.0 * SOLUTION * (bend + CURVATURE * passed)
-    return np.asarray(_single(inverse, lost) & (passed < FOLD_WAY) & steep)
+        bend, passed = np.abs(ahead - behind) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / slope
+        steep = slope**2 > SURELY * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
+    return np.asarray(_single(inverse, lost) & (passed < tol.FOLD_WAY) & steep)
 
 
 def _tangents(v: Array, inverse: Array) -> Array:
@@ -196,4 +184,4 @@ def _unit(rows: Array) -> Array:
 def _single(inverse: Array, lost: Array) -> Bool:
     """Whether one direction alone is lost, by an upper bound of what the others make of inverses; lost: J^-1 u."""
     rest = (inverse * inverse).sum(axis=(1, 2)) - (lost * lost).sum(axis=(1, 2))
-    return np.asarray(rest * HIGH**2 < 1.0)
+    return np.asarray(rest * tol.HIGH**2 < 1.0)

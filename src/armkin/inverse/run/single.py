@@ -21,7 +21,7 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.whole_turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded
-from armkin.inverse.numeric.tolerances import ACCEPTED, FAR, NEARBY, NO_SIZE, THERE
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.near_itself import COARSE, ROOM
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
@@ -52,7 +52,7 @@ class OneTarget:
         self._point, self._home, self._room = point_numbers(arm), arm.home, ROOM * arm.reach
         self._coarse = COARSE * arm.reach if self.orientation == "full" else 0.0
         self._home_tip = self._point(*arm.home.tolist())
-        self._close = [THERE * unit for unit in radian_or_reach(arm).tolist()]
+        self._close = [tol.THERE * unit for unit in radian_or_reach(arm).tolist()]
         own, axes = runner.code.axes(), runner.axes
         self.count = math.prod(axes)
         self._plain = [not a for a in own]  # outputs that are a number, not a tuple
@@ -91,18 +91,18 @@ class OneTarget:
             point = goal[: self.position]
             if self.orientation == "axis":
                 length = math.sqrt(goal[3] * goal[3] + goal[4] * goal[4] + goal[5] * goal[5])
-                if length < NO_SIZE:
+                if length < tol.NO_SIZE:
                     return None
                 kept[3:] /= length
                 goal = kept.tolist()
-        if self._slides and math.dist(point, self._base) > FAR * self._reach:
+        if self._slides and math.dist(point, self._base) > tol.FAR * self._reach:
             return None
         *values, miss, doubt, _ = self._run(*goal)
         if doubt if self._plain[-2] else any(doubt):
             return None
         misses = self._misses((miss,) if self._plain[-3] else miss)[:-1]
-        there = [b for b, m in enumerate(misses) if m <= ACCEPTED**2]
-        if len(there) < self.count and sum(m > NEARBY**2 for m in misses) + len(there) < self.count:
+        there = [b for b, m in enumerate(misses) if m <= tol.ACCEPTED**2]
+        if len(there) < self.count and sum(m > tol.NEARBY**2 for m in misses) + len(there) < self.count:
             return None
         tip = self._home_tip if near is self._home else self._point(*near.tolist())
         away = math.dist(point, tip[: self.position])

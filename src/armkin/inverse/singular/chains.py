@@ -10,7 +10,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import CLOSED, HIGH, MOVED
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.local_structure import Structure, leaves, members, stretch
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -28,7 +28,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
     inside = members(at, rows, newton.difference(arm, others, q[:, None]))
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
     grown = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
-    left = np.flatnonzero(at.known & at.manifold & ~ended & (grown > CLOSED) & (at.second > HIGH))
+    left = np.flatnonzero(at.known & at.manifold & ~ended & (grown > tol.CLOSED) & (at.second > tol.HIGH))
     if not len(left):
         return inside, ended, ended & at.alone, at.joints
     joints, least, most, alone = at.joints.copy(), at.least.copy(), at.most.copy(), at.alone.copy()
@@ -41,7 +41,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
             break
         own, last, way, rows = who[going], start[going], ahead[going], np.arange(len(going))
         link = stretch(arm, task, last, target[own], span[going])
-        good = link.known & (link.second > HIGH)
+        good = link.known & (link.second > tol.HIGH)
         span[going] *= np.where(good, link.longer, np.minimum(link.longer, 0.5))
         # `q` itself comes again, ahead, on a curve that closes
         apart = newton.difference(arm, np.concatenate([others[own], q[own, None]], axis=1), last[:, None])
@@ -55,8 +55,8 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
         there, onwards = leaves(arm, link, rows, last, way)
         start[going[good]], ahead[going[good]] = there[good], onwards[good]
         done[going] = good & (home | np.isnan(there[:, 0]))
-        going = going[~done[going] & (link.second > HIGH)]
+        going = going[~done[going] & (link.second > tol.HIGH)]
     ended[left] = done.reshape(2, -1).all(axis=0)
     extent = (most - least)[left]
-    joints[left] = extent > MOVED * extent.max(axis=1)[:, None]
+    joints[left] = extent > tol.MOVED * extent.max(axis=1)[:, None]
     return inside, ended, ended & alone, joints

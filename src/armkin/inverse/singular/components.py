@@ -10,32 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.array_tuples import rows_of, widened
+from armkin.formula.array_tuples import replaced, rows_of, widened
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.numeric.tolerances import (
-    CLOSE_BY,
-    CLOSED,
-    DOUBLE,
-    EQUAL_RESIDUALS,
-    FOLDED,
-    HIGH,
-    HOPELESS,
-    MOVING,
-    SAME,
-    SEED,
-    SOLUTION,
-    TURNED,
-    WEAK,
-)
 from armkin.inverse.singular import chains, circuits, meetings, roots, self_motions
 from armkin.inverse.singular.local_structure import beyond_folds, local_structure
 
@@ -56,7 +41,7 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     and for self-motions that may meet others; unsettled: (K,) targets whose candidates may not be all, of a solver
     that loses singular ones: more are asked for these and for what is singular.
     """
-    found = _settle(goals, seeds, SEED)
+    found = _settle(goals, seeds, tol.SEED)
     again = found.again | found.surface | ~(found.valid.any(axis=1) | (found.beyond & (unsettled is None)))
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
@@ -79,12 +64,8 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
         return found._replace(again=again)
     again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
     whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
-    second = _settle(goals.of(rows), Seeds.of(np.concatenate([found.q[rows], others], axis=1), whose), HOPELESS)
-    out = found.wider(second.q.shape[1])
-    arrays: tuple[NDArray[Any], ...] = out
-    for array, some in zip(arrays, second.wider(out.q.shape[1]), strict=True):
-        array[rows] = some
-    return out._replace(again=again)
+    second = _settle(goals.of(rows), Seeds.of(np.concatenate([found.q[rows], others], axis=1), whose), tol.HOPELESS)
+    return replaced(found, rows, second)._replace(again=again)
 
 
 class _Candidates(NamedTuple):
@@ -108,15 +89,15 @@ class _Groups:
         """rests: (K, M) those that no push takes along a self-motion."""
         self.goals, self.at, self.lost, self.rests = goals, at, lost, rests
         K, M, n = at.q.shape
-        self.valid: Bool = np.asarray(at.size <= SOLUTION)
+        self.valid: Bool = np.asarray(at.size <= tol.SOLUTION)
         on: Bool = np.asarray(at.sure.any(axis=2))
         # where one direction alone is lost, joints that rest there and on a part of the self-motion rest on all of it
-        self.resting: Bool = (lost.nullity == 1)[:, :, None] & (np.abs(lost.V[:, :, -1]) < SOLUTION)
+        self.resting: Bool = (lost.nullity == 1)[:, :, None] & (np.abs(lost.V[:, :, -1]) < tol.SOLUTION)
         # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
-        self.rank = np.maximum(at.size, EQUAL_RESIDUALS)
+        self.rank = np.maximum(at.size, tol.EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
         self.open: Bool = self.valid & ~at.simple  # those of no group yet
-        self.weak: Bool = (lost.place >= 0) & (lost.sigma < FOLDED) & ~on
+        self.weak: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLDED) & ~on
         lost.sigma[on] = 0.0
         self.asked: Bool = ~(self.open & self.weak)  # what component it is on; pushed: whether pushes move it
         self.known, self.moves, self.pushed = on.copy(), on.copy(), self.asked.copy()
@@ -134,7 +115,7 @@ class _Groups:
         place, S, n = self.lost.place, self.lost.weak.S, self.goals.arm.n
         out, some = np.zeros(place.shape), place >= 0
         if S.shape[1] >= n > 1:
-            out[some] = SOLUTION / np.maximum(S[place[some], n - 2], WEAK)
+            out[some] = tol.SOLUTION / np.maximum(S[place[some], n - 2], tol.WEAK)
         return out
 
     def _plain(self) -> None:
@@ -147,10 +128,10 @@ class _Groups:
         close = np.zeros((len(valid), M, M), bool)
         k, i, j = np.nonzero(mine[:, :, None] & mine[:, None] & others)
         away = np.abs(newton.difference(self.goals.arm, self.at.q[k, i], self.at.q[k, j])).max(axis=1, initial=0.0)
-        close[k, i, j] = away < CLOSE_BY
+        close[k, i, j] = away < tol.CLOSE_BY
         weak = mine & self.weak
         told = weak & (self.place > 0) & ~self.moves
-        other = weak & ~(told & self.known & (sigma >= SOLUTION))  # may be on a self-motion
+        other = weak & ~(told & self.known & (sigma >= tol.SOLUTION))  # may be on a self-motion
         alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
         told &= ~np.asarray((weak & (self.moves | ~self.pushed)).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[
             :, None
@@ -164,7 +145,7 @@ class _Groups:
             mine &= (one.sum(axis=2) < 2) & ~one[:, :, 0]
             mine &= (~one | mine[:, None]).all(axis=2)
             # the most exact of each, the first of those that need no correction: the same in all arithmetics
-            size = np.maximum(self.at.size[some], np.where(known, CLOSED, 0.0))
+            size = np.maximum(self.at.size[some], np.where(known, tol.CLOSED, 0.0))
             rank = np.argsort(np.argsort(size, axis=1, kind="stable"), axis=1)
             leads = mine & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
             self.chosen[some] |= leads
@@ -193,7 +174,7 @@ class _Groups:
                 arm, task, at, q[i, c], q[i], target[i]
             )
             self.component = np.concatenate([self.component, on])
-        self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < MOVING)
+        self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < tol.MOVING)
         self.rank[k, b] += np.where(self.pushed[k, b] | (b == 0), 0.0, 1.0)  # it may be on a component that is known
 
     def _push(self, k: Int, b: Int) -> None:
@@ -214,7 +195,7 @@ class _Groups:
         at, (arm, task, target, _), sigma = self.at, self.goals, self.lost.sigma
         self.place[k, b] = len(self.component) + np.arange(len(k))
         one, away = roots.alike(arm, task, at.q, k, b, sigma, at.size, target)
-        self.edge[k, b] = (one & self.valid[k] & (away > SAME)).any(axis=1) | (sigma[k, b] < DOUBLE)
+        self.edge[k, b] = (one & self.valid[k] & (away > tol.SAME)).any(axis=1) | (sigma[k, b] < tol.DOUBLE)
         self.component = np.concatenate([self.component, one])
 
     def _lead(self, k: Int, b: Int) -> None:
@@ -225,7 +206,7 @@ class _Groups:
         arm, near = self.goals.arm, self.goals.near
         q, label, size = self.at.q, self.at.label, self.at.size
         sure = self.known[k, b]
-        exact = np.where(sure[:, None], np.maximum(size[k], CLOSED), size[k])  # of known components as in `_plain`
+        exact = np.where(sure[:, None], np.maximum(size[k], tol.CLOSED), size[k])  # of known components as in `_plain`
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
         one: Bool = np.asarray(self.component[self.place[k, b]])
         self._inherit(k, b, one)
@@ -256,8 +237,8 @@ class _Groups:
 
         Where a second direction is all but lost the curve through a candidate beside a manifold may leave it.
         """
-        thick = self.tube[k, b] > TURNED
-        i, c = np.nonzero(one & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & (self.tube[k] > TURNED))
+        thick = self.tube[k, b] > tol.TURNED
+        i, c = np.nonzero(one & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & (self.tube[k] > tol.TURNED))
         self._ask(k[i], c)
         own = one & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & self.known[k] & self.moves[k]
         i, c = np.nonzero(own)
@@ -279,7 +260,7 @@ class _Groups:
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         # (two postures of it, each off by as much as a double root)
         moving = self.moves[k, b] & ~self.ended[k, b]  # of others all that is on them is one with them
-        mine: Bool = moving[:, None] & (held < 3 * TURNED) & (self.lost.sigma[k] < SOLUTION) & self.open[k]
+        mine: Bool = moving[:, None] & (held < 3 * tol.TURNED) & (self.lost.sigma[k] < tol.SOLUTION) & self.open[k]
         far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
         some = np.flatnonzero(far.any(axis=1))
         if len(some):
@@ -314,7 +295,7 @@ class _Groups:
         q, sigma, chosen, each = self.at.q, self.lost.sigma, self.chosen, np.arange(len(self.open))[:, None]
         # also beside a self-motion: a root of high order
         moving = np.asarray(self.curve.any(axis=2))
-        beside = (chosen & (sigma < HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
+        beside = (chosen & (sigma < tol.HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
         rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | beside)
         if len(rows):
             at, kept, curve = q[rows], chosen[rows], self.curve[rows]
@@ -359,10 +340,10 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     size, some = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
     size[some] = newton.missing(arm, task, flat[some], target[goal[some]])
     beyond, first = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
-    free = np.flatnonzero(~(first | sure.reshape(-1, n).any(axis=1) | (size < CLOSED)))
+    free = np.flatnonzero(~(first | sure.reshape(-1, n).any(axis=1) | (size < tol.CLOSED)))
     if len(free):
         some = free[size[free] < most]
-        far = some[size[some] > SOLUTION]
+        far = some[size[some] > tol.SOLUTION]
         beyond[far] = beyond_folds(arm, task, flat[far], target[goal[far]])
         some = some[~beyond[some]]
         # towards a root of third order each step goes a third of the way
@@ -370,16 +351,16 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     q, size = flat.reshape(K, -1, n), size.reshape(K, -1)
     # `near` is taken as it is, or not at all, or is the posture that stands for a self-motion already
     stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)
-    q[stands | (size[:, 0] > SOLUTION), 0], size[stands, 0] = np.nan, np.inf
-    missed = (loose & (size[:, 1:] > SOLUTION)).any(axis=1) | (seeds.loose & ~there).any(axis=1)
+    q[stands | (size[:, 0] > tol.SOLUTION), 0], size[stands, 0] = np.nan, np.inf
+    missed = (loose & (size[:, 1:] > tol.SOLUTION)).any(axis=1) | (seeds.loose & ~there).any(axis=1)
     far = beyond.reshape(K, -1)
     out = far.any(axis=1) & (far | (size > most) | np.isnan(q[..., 0]))[:, 1:].all(axis=1)
     rests: Bool = np.zeros(size.shape, bool)
-    lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)
+    lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     if (lost.nullity[:, 1:] > 1).any():
         q, label, size, rests = meetings.ways_out(goals, q, label, size, lost)
         if q.shape[1] > sure.shape[1]:
             sure, simple = (widened(array, q.shape[1]) for array in (sure, simple))
-            lost = newton.lost_directions(arm, task, q, (size <= SOLUTION) & ~(sure.any(axis=2) | simple), target)
+            lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     at = _Candidates(q, label, size, sure, simple)
     return _Groups(goals, at, lost, rests).settled(np.asarray(missed), np.asarray(out))

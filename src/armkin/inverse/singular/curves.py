@@ -13,7 +13,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import fk
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACROSS, CROSSING, OFF_CURVE, SHORTEST_STEP, TINY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -42,7 +42,7 @@ class Step(NamedTuple):
         """Which postures (P, n) the place-th of these steps pass: (P,)."""
         way, chord = newton.difference(arm, posture, self.before[place]), self.chord[place]
         size = (chord * chord).sum(axis=1)
-        part = np.clip((way * chord).sum(axis=1) / np.maximum(size, TINY), 0.0, 1.0)
+        part = np.clip((way * chord).sum(axis=1) / np.maximum(size, tol.TINY), 0.0, 1.0)
         return np.asarray(np.linalg.norm(way - part[:, None] * chord, axis=1) < PASSED * np.sqrt(size))
 
 
@@ -67,13 +67,13 @@ class Curves:
         there, V, second, size = _across(arm, self._task, start, joints, self._target[rows])
         ahead = _onwards(V, second, last)
         cosine = np.linalg.norm(ahead, axis=1)
-        good = (size < OFF_CURVE) & (cosine > STRAIGHT)
+        good = (size < tol.OFF_CURVE) & (cosine > STRAIGHT)
         before = self.at[rows]
         self.at[rows[good]], self._ahead[rows[good]] = there[good], ahead[good] / cosine[good, None]
         self._pace[rows] = pace = np.minimum(_longest(second), np.where(good, 2.0, 0.5) * pace)
         self._taken[rows] += 1
-        stuck, long = ~good & (pace < SHORTEST_STEP), self._taken[rows] == MOST
-        unsure = (second < CROSSING) | (stuck & (size < OFF_CURVE)) | long
+        stuck, long = ~good & (pace < tol.SHORTEST_STEP), self._taken[rows] == MOST
+        unsure = (second < tol.CROSSING) | (stuck & (size < tol.OFF_CURVE)) | long
         out = Step(rows, before, newton.difference(arm, self.at[rows], before), np.asarray(unsure))
         home = out.passes(arm, self._start[rows], np.arange(len(rows)))
         self.closed[rows] = home & good & (self._taken[rows] > 2)
@@ -84,19 +84,19 @@ class Curves:
 def directions(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Bool]:
     """Directions (M, n) of curves through postures q (M, n), moving joints (M, n); which are crossings (M,)."""
     _, V, second, _ = _across(arm, task, q, joints, target)
-    return V[:, :, 0], np.asarray(second < CROSSING)
+    return V[:, :, 0], np.asarray(second < tol.CROSSING)
 
 
 def _longest(second: Array) -> Array:
     """Steps (M,) beside a second smallest singular value; where another curve crosses, one over the crossing."""
-    return np.asarray(np.where(second < CROSSING, OVER, np.minimum(STEP, BEND * second)))
+    return np.asarray(np.where(second < tol.CROSSING, OVER, np.minimum(STEP, BEND * second)))
 
 
 def _onwards(V: Array, second: Array, last: Array) -> Array:
     """What is lost of the directions last (M, n), those of steps: V (M, n, n) the smallest singular value's first."""
     along = np.einsum("mij,mi->mj", V, last)
     along[:, 2:] = 0.0
-    along[second >= CROSSING, 1] = 0.0
+    along[second >= tol.CROSSING, 1] = 0.0
     return np.asarray(np.einsum("mij,mj->mi", V, along))
 
 
@@ -109,7 +109,7 @@ def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tupl
     r, J = newton.scaled(arm, task, q, target)
     J = J * joints[:, None]
     L, V = np.linalg.eigh(np.swapaxes(J, 1, 2) @ J + np.where(joints[:, :, None], 0.0, np.eye(arm.n)))
-    gain = np.where(L > ACROSS, 1.0 / np.maximum(L, ACROSS), 0.0)
+    gain = np.where(L > tol.ACROSS, 1.0 / np.maximum(L, tol.ACROSS), 0.0)
     gain[:, 0] = 0.0
     back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):

@@ -12,7 +12,7 @@ from armkin.inverse.answers.batch import Batch, Goals
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import SOLUTION, WEAK
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.curves import Curves
 from armkin.inverse.tasks.task import Task
 from armkin.keep_out.clearance import clear
@@ -58,8 +58,8 @@ def followed(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         share = (np.arange(count) / count)[:, None, None]
         between = (step.before + share * step.chord * unit).reshape(-1, arm.n)
         goal = np.repeat(target[None], len(between), axis=0)
-        there, size = newton.correct(arm, task, between, goal, steps=6, least=WEAK)
-        good = size <= SOLUTION
+        there, size = newton.correct(arm, task, between, goal, steps=6, least=tol.WEAK)
+        good = size <= tol.SOLUTION
         pieces.append(there[good])
         walk.going[step.rows] &= good.reshape(count, -1).all(axis=0)  # what else is near is no part of it
     return np.concatenate(pieces)

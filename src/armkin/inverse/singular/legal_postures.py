@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.answers.batch import Batch, Goals, Seeds, wider, write
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, write
 from armkin.inverse.answers.closest import thorough
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, CLOSED, SAME, SOLUTION
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import components, surfaces
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -38,7 +38,7 @@ def with_legal_postures(goals: Goals, out: Batch, rows: Int) -> Batch:
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
         miss, *others = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
         # of a self-motion as exact as what was listed; with a margin, for it has to be taken as a branch
-        if miss > (0.9 * SOLUTION if at_limit else min(max(2.0 * min(others), ACCEPTED), 0.9 * SOLUTION)):
+        if miss > (0.9 * tol.SOLUTION if at_limit else min(max(2.0 * min(others), tol.ACCEPTED), 0.9 * tol.SOLUTION)):
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = out.branch[k, out.valid[k]].astype(np.int64)
@@ -46,9 +46,8 @@ def with_legal_postures(goals: Goals, out: Batch, rows: Int) -> Batch:
         _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
         if not (inside & found.valid[0]).any():
             continue
-        out = wider(out, found.q.shape[1])
         row = np.array([k])
-        write(arm, out, row, found.q, found.valid, found.label, near[row])
+        out = write(arm, out, row, found.q, found.valid, found.label, near[row])
         out.status[k] = max(out.status[k], found.status[0])  # of two roots in one, one was listed
         out.free[k] |= found.free[0]
     return out
@@ -57,7 +56,7 @@ def with_legal_postures(goals: Goals, out: Batch, rows: Int) -> Batch:
 def _at_limits(arm: Arm, q: Array) -> Bool:
     """Which joints of postures (..., n) are within limits or at one."""
     beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
-    return np.asarray(beyond < SAME)
+    return np.asarray(beyond < tol.SAME)
 
 
 def _may_be_legal(goals: Goals, out: Batch, rows: Int) -> Bool:
@@ -71,5 +70,5 @@ def _may_be_legal(goals: Goals, out: Batch, rows: Int) -> Bool:
     some = some[~on[some]]
     if len(some):
         sigma, *_ = newton.null_space(arm, task, out.q[rows[k[some]], b[some]], target[rows[k[some]]])
-        on[some] = sigma < CLOSED
+        on[some] = sigma < tol.CLOSED
     return np.bincount(k[on], minlength=len(rows)) > 0

@@ -16,7 +16,7 @@ from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.closed import four_bars
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import APART_ROOTS, CLOSED, FOLDED, SAME, SOLUTION, TURNED
+from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm
 
 PLACES = np.arange(1.0, 5.0)[:, None]  # [rad] along a line; zero is the fifth
@@ -59,10 +59,10 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     asked = ~np.isnan(q[..., 0]) & loose[:, None]
     size = np.full(asked.shape, np.inf)
     size[asked] = newton.missing(arm, task, q[asked], np.repeat(target, asked.sum(axis=(1, 2)), axis=0))
-    there, own = size < CLOSED, newton.missing(arm, task, near, target)
+    there, own = size < tol.CLOSED, newton.missing(arm, task, near, target)
     known, motions = _motions(goals, q, there, loose)
     lacking = np.asarray((loose & (there.sum(axis=1) < 2)).any(axis=1))
-    known &= ~lacking & ~((own > CLOSED) & (own <= SOLUTION))
+    known &= ~lacking & ~((own > tol.CLOSED) & (own <= tol.SOLUTION))
     one, apart = _columns(arm, motions, loose)
     known &= apart
     circuit = np.zeros((K, S, B), bool)
@@ -82,7 +82,7 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     first, listed = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1) != 0, np.zeros(key.shape, bool)
     np.put_along_axis(listed, order, first, axis=1)
     listed &= key < 2 * B
-    if (stands := known & (own <= CLOSED)).any():
+    if (stands := known & (own <= tol.CLOSED)).any():
         known &= _replaced(goals, q, listed, key, motions, one, loose, stands)
     known &= _one_direction(goals, q, listed & known[:, None], key)
     listed &= known[:, None]
@@ -96,10 +96,10 @@ def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _M
     arm, task, target, _ = goals
     base = np.take_along_axis(q, there.argmax(axis=1)[:, None, :, None], axis=1)[:, 0]
     moving: Bool = np.asarray(
-        ((np.abs(newton.difference(arm, q, base[:, None])) > SAME) & there[..., None]).any(axis=1)
+        ((np.abs(newton.difference(arm, q, base[:, None])) > tol.SAME) & there[..., None]).any(axis=1)
     )
     way = newton.difference(arm, q[:, 1], q[:, 0])
-    even = ((np.abs(np.abs(way) - 1.0) < SAME) & ~arm.prismatic | ~moving).all(axis=2)
+    even = ((np.abs(np.abs(way) - 1.0) < tol.SAME) & ~arm.prismatic | ~moving).all(axis=2)
     first, last, count = moving.argmax(axis=2), arm.n - 1 - moving[:, :, ::-1].argmax(axis=2), moving.sum(axis=2)
     line: Bool = np.asarray(loose & there[:, 0] & there[:, 1] & even & (count == 2) & (last - first == 2))
     d = np.where(line[:, :, None], np.where(moving, np.sign(way), 0.0), moving)
@@ -107,7 +107,7 @@ def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _M
     if len(k):
         places = (q[k, 0, b][:, None] + PLACES * d[k, b][:, None]).reshape(-1, arm.n)
         miss = newton.missing(arm, task, places, np.repeat(target[k], len(PLACES), axis=0)).reshape(-1, len(PLACES))
-        line[k, b] = (miss < CLOSED).all(axis=1)
+        line[k, b] = (miss < tol.CLOSED).all(axis=1)
     joint = np.full(line.shape, -1)
     k, b = np.nonzero(loose & (count == 4))
     bars = np.zeros_like(line)
@@ -136,8 +136,8 @@ def _columns(arm: Arm, at: _Motions, loose: Bool) -> tuple[Int, Bool]:
     sense = at.d.prod(axis=2, where=at.d != 0.0)
     alike &= sense[:, :, None] == sense[:, None]
     pair = loose[:, :, None] & loose[:, None] & ~np.eye(B, dtype=bool)
-    same = pair & alike & (held < TURNED)
-    apart = ~(pair & ~same & ~(held > APART_ROOTS)).any(axis=(1, 2))
+    same = pair & alike & (held < tol.TURNED)
+    apart = ~(pair & ~same & ~(held > tol.APART_ROOTS)).any(axis=(1, 2))
     return np.where(same, np.arange(B), B).min(axis=2, initial=B).clip(max=np.arange(B)), np.asarray(apart)
 
 
@@ -149,7 +149,7 @@ def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
             break
         row, other = np.nonzero(listed[k] & (key[k] == key[k, m][:, None]))
         _, J = newton.scaled(goals.arm, goals.task, q[k[row], other], goals.target[k[row]])
-        fine = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > FOLDED], minlength=len(k)) > 0
+        fine = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > tol.FOLDED], minlength=len(k)) > 0
         k, m, listed = k[~fine], m[~fine], np.ones_like(listed)
     out = np.ones(len(q), bool)
     out[k] = False
@@ -169,8 +169,8 @@ def _replaced(
     held = _held(arm, near[k, None], at.base[k], at.d[k], at.line[k])
     held = np.where(loose[k], held, np.inf)
     b, least = held.argmin(axis=1), held.min(axis=1)
-    known[k[(least >= TURNED) & (least < APART_ROOTS)]] = False
-    k, b = k[least < TURNED], b[least < TURNED]
+    known[k[(least >= tol.TURNED) & (least < tol.APART_ROOTS)]] = False
+    k, b = k[least < tol.TURNED], b[least < tol.TURNED]
     mine = 2 * one[k, b]
     if len(two := np.flatnonzero(at.joint[k, b] >= 0)):
         mine[two] += four_bars.sides(arm, near[k[two]], at.d[k[two], b[two]] != 0.0, at.joint[k[two], b[two]])

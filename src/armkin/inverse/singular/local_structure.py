@@ -16,21 +16,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import fk
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import (
-    ARRIVED,
-    BENT,
-    CLOSED,
-    ERROR,
-    FINEST,
-    FOLD_WAY,
-    HIGH,
-    MOVED,
-    REACH,
-    SMOOTH,
-    SOLUTION,
-    TINY,
-    WEAK,
-)
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -44,7 +30,7 @@ SHRINKS = 3  # as often as this
 LONGER = 0.25, 2.0  # times as long as the last a span is, at least and at most
 STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
-POINTS = np.concatenate([[0.0], np.geomspace(FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
+POINTS = np.concatenate([[0.0], np.geomspace(tol.FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
 SIGNS = np.array([1.0, -1.0])[:, None, None]  # both ways
 BACK = 5  # steps at most back onto the curve
 SERIES = 0.01  # [rad, reaches] as far as a series of second order is compared with g
@@ -98,7 +84,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
         w = _second_order(arm, task, q, target, r, U, S, V, out)
         # first as far as the component goes by the second order, and as far again
         ends = 2.0 * np.maximum(-out.low, out.high)
-        short = ~out.known & (ends > 0.0) & (2.0 * ends < whole) & (out.second > HIGH)
+        short = ~out.known & (ends > 0.0) & (2.0 * ends < whole) & (out.second > tol.HIGH)
         out.span[short], w[~short] = ends[short], 0.0
     left = np.flatnonzero(~out.known)
     for _ in range(SHRINKS + 2):
@@ -106,7 +92,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
             break
         on = _follow(arm, task, q, target, U, V, w, out, left)
         # where two directions are all but lost no shorter curve stays at hand; what leaves a span leaves shorter ones
-        left = left[~out.known[left] & (out.second[left] > HIGH) & (short[left] | ~on)]
+        left = left[~out.known[left] & (out.second[left] > tol.HIGH) & (short[left] | ~on)]
         out.span[left] = np.where(short[left], whole[left], out.span[left] / SHRINK)
         short[left], w[left] = False, 0.0
     return out
@@ -133,7 +119,7 @@ def _unknown(at: newton.Linear) -> Structure:
         joints=np.zeros((M, n), bool),
         low=np.zeros(M),
         high=np.zeros(M),
-        span=1.2 * REACH / np.abs(V[:, -1]).max(axis=1),
+        span=1.2 * tol.REACH / np.abs(V[:, -1]).max(axis=1),
         least=np.zeros((M, n)),
         most=np.zeros((M, n)),
         longer=np.ones(M),
@@ -165,7 +151,7 @@ def _follow(
     span, u = out.span[rows], U[rows, :, n - 1 :]
     on, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
     # where another curve is near, that may be the one which Newton's method found
-    on &= np.abs(x[0]).max(axis=1) <= 4.0 * (SMOOTH * span + SOLUTION / np.maximum(out.second[rows], TINY))
+    on &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH * span + tol.SOLUTION / np.maximum(out.second[rows], tol.TINY))
     some, out.longer[rows] = rows[on], longer
     if len(some):
         out.x[:, some], out.g[:, some], out.alone[some] = x[:, on], g[:, on], alone[on]
@@ -194,37 +180,36 @@ def _second_order(
         f = r - residual(task, fk(arm, ends), ends, goals, arm.reach).reshape(2, *r.shape)
         return np.asarray((f[..., None] * U).sum(axis=2))
 
-    along = both_ways(SIGNS * FOLD_WAY * v).sum(axis=0) / FOLD_WAY**2
-    b, size = along[:, -1], np.maximum(np.abs(along[:, -1]), TINY)
-    inverse = V[:, :-1] / np.maximum(S[:, :-1], WEAK)[:, :, None]
+    along = both_ways(SIGNS * tol.FOLD_WAY * v).sum(axis=0) / tol.FOLD_WAY**2
+    b, size = along[:, -1], np.maximum(np.abs(along[:, -1]), tol.TINY)
+    inverse = V[:, :-1] / np.maximum(S[:, :-1], tol.WEAK)[:, :, None]
     w = -(inverse * along[:, :-1, None]).sum(axis=1)
-    far, near = 4.0 * np.sqrt(SOLUTION / size), 2.0 * SOLUTION / np.maximum(sigma, TINY)
+    far, near = 4.0 * np.sqrt(tol.SOLUTION / size), 2.0 * tol.SOLUTION / np.maximum(sigma, tol.TINY)
     h = np.clip(np.minimum(far, near), SERIES, 4.0 * SERIES)
-    more, close = np.zeros((2, *v.shape)), (r * r).sum(axis=1) < CLOSED**2
-    may = close & (np.where(sigma**2 < 2.0 * SOLUTION * size, far, near) <= h)  # where third is small enough
+    more, close = np.zeros((2, *v.shape)), (r * r).sum(axis=1) < tol.CLOSED**2
+    may = close & (np.where(sigma**2 < 2.0 * tol.SOLUTION * size, far, near) <= h)  # where third is small enough
     for _ in range(BACK):
         if not may.any():
             break
         rest = both_ways(0.5 * (h * h)[:, None] * w + SIGNS * h[:, None] * v + more)
-        g, off = rest[:, :, -1], np.linalg.norm(rest[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], TINY)
+        g, off = rest[:, :, -1], np.linalg.norm(rest[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], tol.TINY)
         cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
         quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * h**2) + n * h * off
         third = (6.0 * cubic + 12.0 * quartic) / h**3
         # what lies beyond h decides nothing, and its product may be no number
         bends, leans = third * np.minimum(far, h), third * np.minimum(near, h)
-        turns = (far <= h) & (bends < 0.2 * size) & (sigma**2 < 2.0 * SOLUTION * (size - bends))
-        alone = (near <= h) & (sigma**2 > 2.0 * SOLUTION * (size + leans))
+        turns = (far <= h) & (bends < 0.2 * size) & (sigma**2 < 2.0 * tol.SOLUTION * (size - bends))
+        alone = (near <= h) & (sigma**2 > 2.0 * tol.SOLUTION * (size + leans))
         bent = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(more, axis=2).max(axis=0) + off
         new = ~out.known & (turns | alone) & (bent < 0.1 * h) & close
         out.known[new], out.boundary[new] = True, turns[new]
         may &= ~out.known
         more -= (inverse * rest[:, :, :-1, None]).sum(axis=2)
     # where |g| is `SOLUTION` first: with the sign of b; and against it, or beyond the turn
-    ahead = 2.0 * SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * SOLUTION * size))
-    rest = np.sqrt(np.maximum(sigma**2 - 2.0 * SOLUTION * size, 0.0))
-    back = np.where(
-        sigma**2 < 2.0 * SOLUTION * size, ahead + 2.0 * sigma / size, 2.0 * SOLUTION / np.maximum(sigma + rest, TINY)
-    )
+    ahead = 2.0 * tol.SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * tol.SOLUTION * size))
+    rest = np.sqrt(np.maximum(sigma**2 - 2.0 * tol.SOLUTION * size, 0.0))
+    beyond = 2.0 * tol.SOLUTION / np.maximum(sigma + rest, tol.TINY)
+    back = np.where(sigma**2 < 2.0 * tol.SOLUTION * size, ahead + 2.0 * sigma / size, beyond)
     out.low[...], out.high[...] = np.where(b > 0.0, [-back, ahead], [-ahead, back])
     out.x[1], out.x[2] = v * span[:, None], 0.5 * w * (span**2)[:, None]
     out.g[1, :, 0], out.g[2, :, 0] = sigma * span, 0.5 * b * span**2
@@ -261,7 +246,7 @@ def _polynomials(
         away[:, going], left[:, going], inverse[:, going] = at + step[:, :, :n], step[:, :, n:], last
         size = np.abs(step[:, :, :n]).max(axis=(0, 2))
         # the next step is about as many times smaller than this as this one's square than the last one's
-        done = (size < ARRIVED) | (size**3 < ERROR * before[going] ** 2)
+        done = (size < tol.ARRIVED) | (size**3 < tol.ERROR * before[going] ** 2)
         near = (np.abs(away[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0)
         on[going], before[going] = done & near, size
         going = going[~done & near]
@@ -273,7 +258,7 @@ def _polynomials(
     # the polynomials are exact on the span if their last coefficients are small
     last = np.abs(chebyshev[-2:]).max(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        off = np.maximum(last[:, :n].max(axis=1) / (SMOOTH * span), last[:, n:].max(axis=1) / (0.01 * SOLUTION))
+        off = np.maximum(last[:, :n].max(axis=1) / (tol.SMOOTH * span), last[:, n:].max(axis=1) / (0.01 * tol.SOLUTION))
         # these grow with as high a power of the span
         longer = np.where(on, np.clip(0.9 * off ** (1.0 / (2 - NODES)), *LONGER), LONGER[0])
         on &= off < 1.0
@@ -322,15 +307,15 @@ def _ends(g: Array) -> tuple[Array, Bool]:
     g = np.concatenate([g * ((-1.0) ** EXPONENTS)[:, None, None], g], axis=1)
     out, ends = np.ones(2 * M), np.zeros(2 * M, bool)
     # the sum of the coefficients' sizes bounds the polynomial on all of the span
-    some = np.flatnonzero(np.linalg.norm(np.abs(g).sum(axis=0), axis=1) > SOLUTION)
-    over: Bool = np.linalg.norm(np.tensordot(POWERS_OF_POINTS, g[:, some], axes=1), axis=2) > SOLUTION
+    some = np.flatnonzero(np.linalg.norm(np.abs(g).sum(axis=0), axis=1) > tol.SOLUTION)
+    over: Bool = np.linalg.norm(np.tensordot(POWERS_OF_POINTS, g[:, some], axes=1), axis=2) > tol.SOLUTION
     first, there = over.argmax(axis=0), over.any(axis=0)
     some, first = some[there], first[there]
     ends[some] = True
     low, high = POINTS[np.maximum(first - 1, 0)], POINTS[first]
     for _ in range(2 if len(some) else 0):
         between = low + FINER * (high - low)
-        beyond = _size(g[:, some], between[1:]) > SOLUTION
+        beyond = _size(g[:, some], between[1:]) > tol.SOLUTION
         beyond[-1] = True
         first = beyond.argmax(axis=0)
         low, high = between[first, np.arange(len(some))], between[first + 1, np.arange(len(some))]
@@ -347,15 +332,15 @@ def _decide(out: Structure, rows: Int) -> None:
     way = _values(x, s)
     out.least[rows], out.most[rows] = way.min(axis=0), way.max(axis=0)
     extent = out.most[rows] - out.least[rows]
-    long = extent.max(axis=1) >= REACH
+    long = extent.max(axis=1) >= tol.REACH
     out.known[rows], out.manifold[rows], short = long | (below & above), long, np.flatnonzero(~long)
     if len(short):
         slope = _values(g[1:, short] * np.arange(1, NODES)[:, None, None], s[:, short]) / span[short, None]
         steepest = np.linalg.norm(slope, axis=2).argmax(axis=0)
         up = slope[steepest, np.arange(len(short))]
-        along = (slope * up).sum(axis=2) / np.maximum(np.linalg.norm(up, axis=1), TINY)
-        out.boundary[rows[short]] = along.min(axis=0) <= SOLUTION
-    out.joints[rows] = long[:, None] & (extent > MOVED * extent.max(axis=1)[:, None])
+        along = (slope * up).sum(axis=2) / np.maximum(np.linalg.norm(up, axis=1), tol.TINY)
+        out.boundary[rows[short]] = along.min(axis=0) <= tol.SOLUTION
+    out.joints[rows] = long[:, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
     out.low[rows], out.high[rows] = low * span, high * span
 
 
@@ -366,11 +351,11 @@ def members(at: Structure, rows: Int, way: Array) -> Bool:
     let it.
     """
     t = (way * at.v[rows, None]).sum(axis=2)  # (m, M)
-    span, slack = at.span[rows], 4.0 * SOLUTION / at.second[rows]
+    span, slack = at.span[rows], 4.0 * tol.SOLUTION / at.second[rows]
     x = _values(at.x[:, rows], np.clip(t / span[:, None], -1.0, 1.0).T).swapaxes(0, 1)
     off = np.abs(way - x).max(axis=2)
     inside = (t >= (at.low[rows] - slack)[:, None]) & (t <= (at.high[rows] + slack)[:, None])
-    return np.asarray(at.known[rows, None] & inside & (off <= (4.0 * SMOOTH * span + slack)[:, None]))
+    return np.asarray(at.known[rows, None] & inside & (off <= (4.0 * tol.SMOOTH * span + slack)[:, None]))
 
 
 def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
@@ -384,13 +369,13 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
         return np.zeros(len(q), bool)
     r, J = newton.scaled(arm, task, q, target)
     U, S, V = np.linalg.svd(J)
-    u, way = U[:, :, -1], FOLD_WAY * V[:, -1] * radian_or_reach(arm)
+    u, way = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
     both = np.concatenate([q + way, q - way])
     goals = np.concatenate([target, target])
     ahead, behind = np.split(residual(task, fk(arm, both), both, goals, arm.reach), 2)
-    bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / FOLD_WAY**2
+    bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
     lost = (u * r).sum(axis=1)
-    rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], HIGH)
-    fold = (S[:, -2] > HIGH) & (S[:, -1] < WEAK) & (np.abs(bend) > BENT)
-    beyond = (lost * bend > 0.0) & (np.abs(lost) > 10.0 * SOLUTION)
-    return np.asarray(fold & beyond & (rest < FOLD_WAY) & (100.0 * rest**2 < np.abs(lost)))
+    rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)
+    fold = (S[:, -2] > tol.HIGH) & (S[:, -1] < tol.WEAK) & (np.abs(bend) > tol.BENT)
+    beyond = (lost * bend > 0.0) & (np.abs(lost) > 10.0 * tol.SOLUTION)
+    return np.asarray(fold & beyond & (rest < tol.FOLD_WAY) & (100.0 * rest**2 < np.abs(lost)))

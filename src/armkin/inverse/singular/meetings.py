@@ -17,7 +17,7 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import fk
 from armkin.inverse.answers.batch import OWN, Goals
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ACCEPTED, BENT, FOLD_WAY, GROWTH, HIGH, SOLUTION
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
@@ -27,7 +27,7 @@ from armkin.model.units import radian_or_reach
 BOW = 0.1  # of its length: a curve is no farther off its chord
 AROUND = 256  # directions in a plane, of which each stands for its opposite, too
 ACROSS = 64  # along the edges of a cube whose sides hold directions in space
-ALL_ROUND = 5.0 * BENT  # [1/rad] curvature in all directions: a residual has passed `SOLUTION` 1e-3 rad away
+ALL_ROUND = 5.0 * tol.BENT  # [1/rad] curvature in all directions: a residual has passed `SOLUTION` 1e-3 rad away
 THIRD = 0.03  # singular value of the third direction, which bends the curves by its inverse
 SPREAD = 5.0  # times that in some direction: no surface of solutions, and the zeros are clear
 
@@ -40,13 +40,13 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost)
     along a self-motion.
     """
     arm, task, target, _ = goals
-    k, b = np.nonzero((size[:, 1:] <= SOLUTION) & (lost.nullity[:, 1:] > 1))
+    k, b = np.nonzero((size[:, 1:] <= tol.SOLUTION) & (lost.nullity[:, 1:] > 1))
     b += 1
     at, nullity = rows_of(lost.weak, lost.place[k, b]), lost.nullity[k, b]
-    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / HIGH)
+    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / tol.HIGH)
     _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     row = k[first]
-    most = np.maximum(ACCEPTED, 2.0 * size[row, b[first]])
+    most = np.maximum(tol.ACCEPTED, 2.0 * size[row, b[first]])
     who, there, rests = _steps_out(arm, task, q[row, b[first]], rows_of(at, first), nullity[first], target[row], most)
     size[k, b] = np.where(np.isin(same.reshape(-1), who), np.inf, size[k, b])
     order = np.argsort(row[who], kind="stable")
@@ -97,10 +97,10 @@ def _tangents(
         unit, products, far = _directions(k)
         pairs, V = list(combinations_with_replacement(range(k), 2)), at.V[rows, n - k :]
         push = np.stack([V[:, i] if i == j else V[:, i] + V[:, j] for i, j in pairs])
-        ends = (q[rows] + np.multiply.outer([FOLD_WAY, -FOLD_WAY], push * radian_or_reach(arm))).reshape(-1, n)
+        ends = (q[rows] + np.multiply.outer([tol.FOLD_WAY, -tol.FOLD_WAY], push * radian_or_reach(arm))).reshape(-1, n)
         goal = np.concatenate([target[rows]] * (2 * len(pairs)))
         r = residual(task, fk(arm, ends), ends, goal, arm.reach).reshape(2, len(pairs), len(rows), n)
-        bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / FOLD_WAY**2
+        bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / tol.FOLD_WAY**2
         own = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
         forms = np.stack([b if i == j else b - own[i] - own[j] for b, (i, j) in zip(bent, pairs, strict=True)])
         grown = forms.transpose(1, 2, 0) @ products  # (m, k, P)
@@ -137,7 +137,7 @@ def _steps_out(
     if not len(who):
         return who, push, rests
     there, size, grown = pushed(arm, task, q[who], np.full(len(who), 10 * STEP), push, target[who])
-    rests[who[grown <= GROWTH]] = False
+    rests[who[grown <= tol.GROWTH]] = False
     unit, way = radian_or_reach(arm), newton.difference(arm, there, q[who])
     some = np.flatnonzero((size <= most[who]) & (np.abs(way).max(axis=1) > 3 * STEP))
     some = some[newton.null_space(arm, task, there[some], target[who[some]])[2] == 1]
@@ -145,5 +145,5 @@ def _steps_out(
     start = q[who[some]] + 0.5 * way[some] * unit
     between, size = follow(arm, task, start, target[who[some]])
     beside = np.abs(newton.difference(arm, between, start)).max(axis=1)
-    some = some[(size <= SOLUTION) & (beside < BOW * np.abs(way[some]).max(axis=1))]
+    some = some[(size <= tol.SOLUTION) & (beside < BOW * np.abs(way[some]).max(axis=1))]
     return who[some], there[some], rests

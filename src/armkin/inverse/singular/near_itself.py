@@ -8,21 +8,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from armkin.formula.array_tuples import stacked
 from armkin.formula.arrays import Array, Int
 from armkin.forward import position
-from armkin.inverse.answers.batch import Batch, Goals, named, wider
+from armkin.inverse.answers.batch import Batch, Goals, empty, named
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import CLOSE_BY, SOLUTION, THERE
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model import limits
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 AT_ONCE = 4096  # targets whose branches are compared with `near` together
-ROOM = 2.0 * SOLUTION  # [reaches] from the tool to a target that `near` might solve: twice the tolerance, for rounding
+ROOM = (
+    2.0 * tol.SOLUTION
+)  # [reaches] from the tool to a target that `near` might solve: twice the tolerance, for rounding
 COARSE = 1e4 * ROOM  # and to a pose that is rounded where its rotation does not show it, to six digits
-ROUNDED = 1.001 * SOLUTION  # residual that solves a rounded target, if it is more
+ROUNDED = 1.001 * tol.SOLUTION  # residual that solves a rounded target, if it is more
 
 
 def reached(
@@ -60,20 +63,20 @@ def _taken(goals: Goals, out: Batch, rows: Int) -> Int:
         return rows
     near, target = goals.near[rows], goals.target[rows]
     if not out.valid.shape[1]:  # an elimination that found nothing at all
-        alone: Int = rows[newton.missing(arm, task, near, target) <= SOLUTION]
+        alone: Int = rows[newton.missing(arm, task, near, target) <= tol.SOLUTION]
         return alone
     away = newton.wrapped_distance(arm, out.q[rows], near[:, None])
     away = np.where(out.valid[rows], away, np.inf)
     place = away.argmin(axis=1)
     least = away.min(axis=1)
-    stays, solves = least <= THERE, np.ones(len(rows), bool)
+    stays, solves = least <= tol.THERE, np.ones(len(rows), bool)
     some = np.flatnonzero(~stays)
     if len(some):
-        solves[some] = newton.missing(arm, task, near[some], target[some]) <= SOLUTION
-        some = some[solves[some] & ((away[some] < CLOSE_BY).sum(axis=1) == 1)]
+        solves[some] = newton.missing(arm, task, near[some], target[some]) <= tol.SOLUTION
+        some = some[solves[some] & ((away[some] < tol.CLOSE_BY).sum(axis=1) == 1)]
         way = newton.difference(arm, out.q[rows[some], place[some]], near[some])
         between = near[some] + 0.5 * way * radian_or_reach(arm)
-        stays[some] = newton.missing(arm, task, between, target[some]) <= SOLUTION
+        stays[some] = newton.missing(arm, task, between, target[some]) <= tol.SOLUTION
     out.q[rows[stays], place[stays]] = near[stays]
     out.within[rows[stays], place[stays]] = True
     left: Int = rows[solves & ~stays]
@@ -109,14 +112,14 @@ def stand(goals: Goals, out: Batch, most: Array) -> Batch:
     away = np.where(out.valid[rows], away, np.inf)
     if not away.shape[1]:
         away = np.full((len(rows), 1), np.inf)
-    place, there = away.argmin(axis=1), away.min(axis=1) <= THERE
+    place, there = away.argmin(axis=1), away.min(axis=1) <= tol.THERE
     some = np.flatnonzero(~there & np.isfinite(away.min(axis=1)))
     way = newton.difference(arm, out.q[rows[some], place[some]], near[rows[some]])
     between = near[rows[some]] + 0.5 * way * radian_or_reach(arm)
     there[some] = newton.missing(arm, task, between, target[rows[some]]) <= most[rows[some]]
     count = out.valid[rows].sum(axis=1)
     place = np.where(there, place, count)
-    out = wider(out, int(place.max()) + 1)
+    out = stacked([out, empty(0, int(place.max()) + 1, arm.n)])
     out.q[rows, place], out.valid[rows, place], out.within[rows, place] = near[rows], True, True
     out.branch[rows] = named(out.branch[rows].astype(np.int64), out.valid[rows])
     out.status[rows[count == 0]] = Status.BOUNDARY

@@ -11,7 +11,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import CLOSE_BY, DOUBLE_ROOT, ERROR, HIGH, SAME, SOLUTION, TINY
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -28,13 +28,13 @@ def joined(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array
     Steps back onto the curve leave out directions weaker than `HIGH`.
     """
     halfway = q + 0.5 * way * radian_or_reach(arm)
-    out = newton.missing(arm, task, halfway, target) <= SOLUTION
+    out = newton.missing(arm, task, halfway, target) <= tol.SOLUTION
     far = np.abs(way).max(axis=1)
-    some = np.flatnonzero(~out & (sigma < HIGH) & (miss > ROOT * far * sigma))
+    some = np.flatnonzero(~out & (sigma < tol.HIGH) & (miss > ROOT * far * sigma))
     if len(some):
-        third, size = newton.correct(arm, task, halfway[some], target[some], steps=3, least=HIGH)
+        third, size = newton.correct(arm, task, halfway[some], target[some], steps=3, least=tol.HIGH)
         off = np.abs(newton.difference(arm, third, halfway[some])).max(axis=1)
-        out[some] = (off < BESIDE * far[some]) & (size <= SOLUTION)
+        out[some] = (off < BESIDE * far[some]) & (size <= tol.SOLUTION)
     return np.asarray(out)
 
 
@@ -47,7 +47,7 @@ def alike(
     """
     away = newton.wrapped_distance(arm, q[k], q[k, b][:, None])
     same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
-    row, column = np.nonzero(~same & (away < CLOSE_BY))
+    row, column = np.nonzero(~same & (away < tol.CLOSE_BY))
     if len(row):
         start = q[k[row], b[row]]
         way = newton.difference(arm, q[k[row], column], start)
@@ -67,4 +67,4 @@ def alike(
 
 def _radius(sigma: Array) -> Array:
     """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
-    return np.asarray(SAME + np.minimum(ERROR / np.maximum(sigma, TINY), DOUBLE_ROOT))
+    return np.asarray(tol.SAME + np.minimum(tol.ERROR / np.maximum(sigma, tol.TINY), tol.DOUBLE_ROOT))

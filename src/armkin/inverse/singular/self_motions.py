@@ -13,21 +13,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import (
-    CLOSE_BY,
-    CLOSED,
-    DRIFT,
-    GROWTH,
-    HIGH,
-    MOVED,
-    REACH,
-    SAME,
-    SOLUTION,
-    STALLED,
-    TINY,
-    TURNED,
-    WEAK,
-)
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import circuits, roots
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -51,15 +37,15 @@ def drop_contained(
     for k in np.flatnonzero((chosen & curve.any(axis=2)).any(axis=1)):
         mine = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
         few = curve[k, mine].sum(axis=1) <= arm.n // 2
-        for i in np.flatnonzero(chosen[k] & (sigma[k] < HIGH) & ~curve[k].any(axis=1)):
+        for i in np.flatnonzero(chosen[k] & (sigma[k] < tol.HIGH) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
-            pairs += [(int(k), int(i), int(j)) for j in mine[(away < CLOSE_BY) & few]]
-        mine = mine[sigma[k, mine] < SOLUTION]  # of double roots the posture listed may be off it
+            pairs += [(int(k), int(i), int(j)) for j in mine[(away < tol.CLOSE_BY) & few]]
+        mine = mine[sigma[k, mine] < tol.SOLUTION]  # of double roots the posture listed may be off it
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]
             away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
-            if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < TURNED).any():
+            if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < tol.TURNED).any():
                 chosen[k, i] = False
     if pairs:
         row, mid, other = np.array(pairs).T
@@ -78,12 +64,12 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     apart = np.where(curve, 0.0, newton.difference(arm, others, q))
     sigma, V, _ = newton.null_space(arm, task, q, target)
     held = np.where(curve, 0.0, V[:, -1])
-    far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), TINY)
-    ahead = apart + np.where(curve, V[:, -1] * np.clip(far, -CLOSE_BY, CLOSE_BY)[:, None], 0.0)
+    far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), tol.TINY)
+    ahead = apart + np.where(curve, V[:, -1] * np.clip(far, -tol.CLOSE_BY, tol.CLOSE_BY)[:, None], 0.0)
     q, goal, sigma = np.concatenate([q, q]), np.concatenate([target, target]), np.concatenate([sigma, sigma])
-    there, size = newton.correct(arm, task, q + np.concatenate([apart, ahead]) * unit, goal, steps=6, least=WEAK)
+    there, size = newton.correct(arm, task, q + np.concatenate([apart, ahead]) * unit, goal, steps=6, least=tol.WEAK)
     way = newton.difference(arm, there, q)
-    near = np.flatnonzero((size <= SOLUTION) & (np.abs(way).max(axis=1) < CLOSE_BY))
+    near = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(way).max(axis=1) < tol.CLOSE_BY))
     miss, out = newton.missing(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
     out[near] = roots.joined(arm, task, q[near], way[near], miss, sigma[near], goal[near])
     return np.asarray(out.reshape(2, -1).any(axis=0))
@@ -111,22 +97,22 @@ def drop_twins(
     same, size = np.zeros(len(k), bool), np.abs(apart)
     # one may be where its own self-motion and the other meet
     turned = np.where(curve[k, i], 0.0, size).max(axis=1)
-    thick = np.maximum(TURNED, tube[k, i] + tube[k, j])
+    thick = np.maximum(tol.TURNED, tube[k, i] + tube[k, j])
     held = (turned < thick) & ((size > thick[:, None]).sum(axis=1) <= ALONG)
     # a joint may move too slowly at one of the two alone to be called free there
     most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
-    slow = ~held & (most > TURNED) & (most < DRIFT)
+    slow = ~held & (most > tol.TURNED) & (most < tol.DRIFT)
     held |= np.equal(j, 0)  # `near` stands for all that meet there
     open_ = np.flatnonzero(held)
     same[open_] = _straight(arm, task, at[open_], apart[open_], target[k[open_]])
     left = np.flatnonzero(slow & ~same)
     if len(left):  # whether the self-motion of the one goes round to the other
-        joints = curve[k[left], i[left]] | (size[left] > SAME)
+        joints = curve[k[left], i[left]] | (size[left] > tol.SAME)
         there, asked = (at[left] + apart[left] * unit)[:, None], np.ones((len(left), 1), bool)
         same[left] = circuits.on_one(arm, task, at[left], joints, there, asked, target[k[left]])[:, 0]
     k, i, j = k[same], i[same], j[same]
     motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
-    nearer = motion[k, i] < motion[k, j] - SAME
+    nearer = motion[k, i] < motion[k, j] - tol.SAME
     i, j = np.where(nearer, j, i), np.where(nearer, i, j)
     for p in np.argsort(motion[k, i], kind="stable"):
         chosen[k[p], i[p]] &= not chosen[k[p], j[p]]
@@ -145,16 +131,16 @@ def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool
     who = np.repeat(np.arange(len(q)), [len(each) for each in ways])
     start = q[who] + np.array([0.25, 0.5, 0.75])[:, None, None] * np.concatenate(ways) * radian_or_reach(arm)
     goal = np.concatenate([target[who]] * 3)
-    there, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=3, least=WEAK)
+    there, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=3, least=tol.WEAK)
     off = np.abs(newton.difference(arm, there, start.reshape(-1, arm.n))).max(axis=1)
-    good = (size <= SOLUTION) & (off < 10 * TURNED)
+    good = (size <= tol.SOLUTION) & (off < 10 * tol.TURNED)
     out[who[good.reshape(3, -1).all(axis=0)]] = True
     return out
 
 
 def _both_ways(arm: Arm, way: Array) -> Array:
     """A way (n,) each way round for joints that turn by about 180 degrees: (m, n)."""
-    half = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(way) < REACH))
+    half = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(way) < tol.REACH))
     flips = np.array(list(itertools.product((0.0, 1.0), repeat=len(half))))
     ways = np.tile(way, (len(flips), 1))
     ways[:, half] -= 2.0 * np.pi * flips * np.sign(way[half])
@@ -163,7 +149,7 @@ def _both_ways(arm: Arm, way: Array) -> Array:
 
 def follow(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tuple[Array, Array]:
     """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
-    return newton.correct(arm, task, q, target, steps=steps, least=WEAK, patience=1, stalled=STALLED)
+    return newton.correct(arm, task, q, target, steps=steps, least=tol.WEAK, patience=1, stalled=tol.STALLED)
 
 
 def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Array, Array, Array]:
@@ -190,7 +176,7 @@ def _moved(away: Array, long: Bool) -> Bool:
     nearby: neither is motion of a joint.
     """
     most = np.abs(away).max(axis=1)
-    return np.asarray(np.where(long[:, None], most[1] > MOVED * 10 * STEP, most[0] > 10 * TURNED))
+    return np.asarray(np.where(long[:, None], most[1] > tol.MOVED * 10 * STEP, most[0] > 10 * tol.TURNED))
 
 
 def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
@@ -202,13 +188,13 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     several = nullity[who] > 1
     first = np.where(several, 10 * STEP, STEP)
     _, _, grown = pushed(arm, task, q[who], first, push, target[who])
-    some = np.flatnonzero(grown <= GROWTH)
+    some = np.flatnonzero(grown <= tol.GROWTH)
     # of those that lose one direction most do not stay on a longer way
-    one = ~several[some] & (grown[some] * first[some] > CLOSED)
+    one = ~several[some] & (grown[some] * first[some] > tol.CLOSED)
     if one.any():
         at = some[one]
         _, _, grown = pushed(arm, task, q[who[at]], 10 * first[at], push[at], target[who[at]])
-        one[one] = ~(grown <= GROWTH)
+        one[one] = ~(grown <= tol.GROWTH)
         some = some[~one]
     if not len(some):
         return moving, joints
@@ -220,10 +206,10 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     there, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[who]] * 8), steps=20)
     away, size = (there.reshape(start.shape)[:, :, 0] - q[who]) / unit, size.reshape(start.shape[:4])
     grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[who]  # (2, m)
-    short, long = (grown <= GROWTH * STEPS) & _apart(away, push)
+    short, long = (grown <= tol.GROWTH * STEPS) & _apart(away, push)
     # where the residual grows at all, it must do so slowly as far as the long step: near a fold the first tenth of a
     # radian costs nothing
-    along = (short & ((grown[0] <= CLOSED) | long)) | (long & several)
+    along = (short & ((grown[0] <= tol.CLOSED) | long)) | (long & several)
     np.logical_or.at(moving, who, along)
     np.logical_or.at(joints, who, along[:, None] & _moved(away, long))
     return moving, joints
@@ -244,7 +230,7 @@ def on_surface(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: A
     lost = newton.null_space(arm, task, there, target[who])[2]
     away = np.abs(newton.difference(arm, there, q[who])).max(axis=1)
     out = np.zeros(len(q), bool)
-    np.logical_or.at(out, who, (size <= SOLUTION) & (lost > 1) & (away > 3 * STEP))
+    np.logical_or.at(out, who, (size <= tol.SOLUTION) & (lost > 1) & (away > 3 * STEP))
     return out
 
 

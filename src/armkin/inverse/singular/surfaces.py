@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armkin.formula.array_tuples import widened
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.numeric.tolerances import FOLDED
 from armkin.inverse.singular.components import More, examine
 from armkin.model.arm import Arm
 from armkin.model.lock import lock
@@ -58,7 +59,8 @@ def _with_curves(goals: Goals, seen: Examined, k: np.intp) -> Examined:
         return seen
     on = _about_one_line(at, pair)
     rows, names = np.concatenate([q[~on], rows]), np.append(label[~on], names)
-    out = seen.wider(len(rows))._replace(free=seen.free.copy())
+    q, valid, label = (widened(array, len(rows)) for array in (seen.q, seen.valid, seen.label))
+    out = seen._replace(q=q, valid=valid, label=label, free=seen.free.copy())
     there = np.arange(out.q.shape[1]) < len(rows)
     out.q[k], out.valid[k], out.label[k] = np.nan, there, OWN
     out.q[k, there], out.label[k, there] = rows, names
@@ -100,9 +102,9 @@ def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:
     arm, task, target, _ = goals
     _, J = newton.scaled(arm, task, q, np.repeat(target, len(q), axis=0))
     S, V = np.linalg.svd(J)[1:]
-    lost = arm.n - (S > FOLDED).sum(axis=1)
+    lost = arm.n - (S > tol.FOLDED).sum(axis=1)
     null = np.arange(arm.n) >= arm.n - lost[:, None]
-    moves = (np.where(null[:, :, None], np.abs(V), 0.0) > FOLDED).any(axis=1)
+    moves = (np.where(null[:, :, None], np.abs(V), 0.0) > tol.FOLDED).any(axis=1)
     return J, np.asarray(~moves & (lost > 1)[:, None])
 
 
@@ -112,7 +114,7 @@ def _about_one_line(J: Array, pair: Pair) -> Bool:
     Where an elbow is stretched they are known to the root of rounding.
     """
     i, j, way = pair
-    return np.asarray(np.abs(J[:, :, j] - way * J[:, :, i]).max(axis=1) < FOLDED)
+    return np.asarray(np.abs(J[:, :, j] - way * J[:, :, i]).max(axis=1) < tol.FOLDED)
 
 
 def _pairs(arm: Arm, J: Array, rests: Bool) -> list[tuple[Pair, Bool]]:

@@ -21,7 +21,7 @@ from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance
 from armkin.inverse.closed.wrist import foot
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import ANSWERED, AT_ZERO, EXACT, PARALLEL
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm, from_links
 from armkin.model.chain import Chain, is_parallel, reverse
@@ -54,12 +54,12 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     def rows(T: Array) -> Rows:
         q, doubt, settled, shaken, guesses = method.solve(prepared, T)
         n = arm.n
-        hit = np.abs(q[:, :, n:]).max(axis=2) < AT_ZERO
+        hit = np.abs(q[:, :, n:]).max(axis=2) < tol.AT_ZERO
         k, b = np.nonzero(hit)
         own = np.full((*q.shape[:2], n), np.nan)
         if len(k):
             better, size = newton.correct(arm, task, q[k, b, :n], T[k])
-            own[k, b] = np.where((size < ANSWERED)[:, None], better, np.nan)
+            own[k, b] = np.where((size < tol.ANSWERED)[:, None], better, np.nan)
         missing = np.isnan(own[:, :, 0])
         count = (~missing).sum(axis=1)
         order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
@@ -93,7 +93,7 @@ def _with_wrist(arm: Arm, task: Task) -> Geometry | None:
     """Five joints, axes 4 and 5 or 1 and 2 meeting: the closed form with a virtual joint through that point."""
     chain = Chain(arm.link, arm.prismatic)
     for first in (False, True):
-        longer = _lengthened(reverse(chain) if first else chain, EXACT * arm.reach)
+        longer = _lengthened(reverse(chain) if first else chain, tol.EXACT * arm.reach)
         if longer is None:
             continue
         six = reverse(longer) if first else longer
@@ -132,7 +132,7 @@ def _lengthened(chain: Chain, tolerance: float) -> Chain | None:
     the wrist is not singular in the postures that people ask for.
     """
     L = chain.link[4]
-    if chain.prismatic[3:].any() or is_parallel(L, PARALLEL):
+    if chain.prismatic[3:].any() or is_parallel(L, tol.PARALLEL):
         return None
     there = (inverse(L) @ [*foot(L), 1.0])[:3]
     if np.hypot(*there[:2]) > tolerance:

@@ -30,19 +30,7 @@ from armkin.inverse.closed.candidates import Recorded, recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.tolerances import (
-    ALIKE,
-    ANSWERED,
-    APART_ROOTS,
-    AT_LEAST,
-    BLURRED,
-    HOPELESS,
-    NEAR,
-    NEARLY_SPECIAL,
-    ROUNDED_ANSWER,
-    SOLUTION,
-    STEADY,
-)
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.solvers import general, pairs, position_pencil
 from armkin.inverse.solvers.pairs import AROUND, around
 from armkin.inverse.tasks.choose_task import NEARLY_PARALLEL
@@ -69,8 +57,8 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if task.orientation == "axis":
         return None  # see `armkin.inverse.solvers.tool_axis`
     wide, narrow = (planar, elbow, three_joints), (spherical, three_parallel)
-    limit = NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
-    classes = [*((module, limit) for module in wide), *((module, NEAR) for module in narrow)]
+    limit = tol.NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
+    classes = [*((module, limit) for module in wide), *((module, tol.NEAR) for module in narrow)]
     found = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
     if not found:
         return None
@@ -78,7 +66,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
     if (
         elimination is not None
-        and off > BLURRED
+        and off > tol.BLURRED
         and (straight := _straight(arm, task, alike, off, elimination())) is not None
     ):
         return straight
@@ -170,7 +158,7 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
     seed, _, _ = recorded(arm, task, alike).rows(target)
     B = seed.shape[1]
     rough = newton.missing(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
-    return float(np.quantile(rough.min(axis=1), 0.8)) + ROUNDED_ANSWER
+    return float(np.quantile(rough.min(axis=1), 0.8)) + tol.ROUNDED_ANSWER
 
 
 def _solve(
@@ -224,20 +212,20 @@ def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
     """Seeds (N, B, n) moved onto the arm: the first `own` in their places, then what else they lead to, once."""
     N, B, n = q.shape
     flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
-    some = np.flatnonzero(newton.missing(arm, task, flat, goals) < HOPELESS)
+    some = np.flatnonzero(newton.missing(arm, task, flat, goals) < tol.HOPELESS)
     size = np.full(len(flat), np.inf)
     flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=20, patience=4)
-    flat[size > SOLUTION] = np.nan
+    flat[size > tol.SOLUTION] = np.nan
     q = _packed(flat.reshape(N, B, n), own)
     for i in range(1, q.shape[1]):
-        again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < ALIKE
+        again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < tol.ALIKE
         q[again.any(axis=1), i] = np.nan
     return _packed(q, own)
 
 
 def _four(arm: Arm, q: Array) -> Bool:
     """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
-    near = newton.distances(arm, q, q) < APART_ROOTS
+    near = newton.distances(arm, q, q) < tol.APART_ROOTS
     there = ~np.isnan(q[:, :, 0])
     return np.asarray((there.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
 
@@ -258,7 +246,7 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     """
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
-    weak = min(STEADY, 1.5 * np.sqrt(off)) + AT_LEAST
+    weak = min(tol.STEADY, 1.5 * np.sqrt(off)) + tol.AT_LEAST
     limit = 9.0 * off_here[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
     for there in around(arm, task, target, AROUND * off_here):
@@ -268,14 +256,14 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)
     rough = newton.missing(arm, task, flat, goals)
-    some = np.flatnonzero(rough < HOPELESS)
+    some = np.flatnonzero(rough < tol.HOPELESS)
     q, size = flat.copy(), np.full(N * B, np.inf)
     q[some], size[some] = newton.correct(arm, task, flat[some], goals[some])
-    branch, good = q.reshape(N, B, n), (size <= ANSWERED).reshape(N, B)
+    branch, good = q.reshape(N, B, n), (size <= tol.ANSWERED).reshape(N, B)
     # what is unreachable for the similar arm may yet be reached
     doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
     for i in range(B):
         for j in range(i):
-            same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < ALIKE
+            same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < tol.ALIKE
             doubt |= same & good[:, i] & good[:, j]
     return _Corrected(branch, good, doubt)

@@ -17,14 +17,16 @@ from armkin.inverse.closed.candidates import Recorded
 from armkin.inverse.closed.geometry import Rows
 from armkin.inverse.closed.newton_steps import ABSENT
 from armkin.inverse.numeric import newton, root_pairs
-from armkin.inverse.numeric.tolerances import ANSWERED, APART_ROOTS
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.rotation import rotation_about
 from armkin.model.units import radian_or_reach
 
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
-TOUCHING = APART_ROOTS**2  # square of half of what lies between complex roots, up to which they may be one real root
+TOUCHING = (
+    tol.APART_ROOTS**2
+)  # square of half of what lies between complex roots, up to which they may be one real root
 MOVED = 0.3  # [rad, reaches] a pair may stand from the class's
 
 
@@ -57,7 +59,7 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
     row, place = np.nonzero(tried)
     q, guesses = np.full_like(seed, np.nan), np.full_like(seed, np.nan)
     better, size = newton.correct(arm, task, seed[row, place], target[row])
-    q[row, place] = np.where((size <= ANSWERED)[:, None], better, np.nan)
+    q[row, place] = np.where((size <= tol.ANSWERED)[:, None], better, np.nan)
     # what moves farther than half the way to its neighbour may not continue it
     beside = (newton.distances(arm, seed, seed) + np.diag(np.full(seed.shape[1], np.inf))).min(axis=2)
     jumped = newton.wrapped_distance(arm, q, seed) > 0.5 * beside
@@ -84,7 +86,7 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
         guess = pair.middle + side * pair.way
         guesses[row, place] = np.where((pair.square < -TOUCHING)[:, None], np.nan, guess)
         better, size = newton.correct(arm, task, guess, target[row])
-        q[row, place] = np.where((found & (pair.square > 0.0) & (size <= ANSWERED))[:, None], better, np.nan)
+        q[row, place] = np.where((found & (pair.square > 0.0) & (size <= tol.ANSWERED))[:, None], better, np.nan)
         doubt[row] |= np.isnan(q[row, place, 0]) & (pair.square > -TOUCHING)
     doubt |= _merged(arm, q).any(axis=1)
     return Rows(q, doubt & ~open_, complete, None, guesses), open_
@@ -92,7 +94,7 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
 
 def _merged(arm: Arm, q: Array) -> Bool:
     """Which branches (N, B, n) all but meet another one: (N, B)."""
-    near = newton.distances(arm, q, q) < APART_ROOTS
+    near = newton.distances(arm, q, q) < tol.APART_ROOTS
     return np.asarray(near.sum(axis=2) > 1)
 
 

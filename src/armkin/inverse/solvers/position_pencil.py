@@ -26,17 +26,8 @@ from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric import newton
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.numeric.tolerances import (
-    ANSWERED,
-    APART_ROOTS,
-    BLUR_OF_PAIRS,
-    DOUBLE_ROOT,
-    EXACT,
-    NEARBY,
-    NO_SECOND,
-    TINY,
-)
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.chain import Chain
@@ -60,17 +51,17 @@ class Pencil:
 
     def __init__(self, arm: Arm, task: Task) -> None:
         tip = arm.link[3][:3, 3]
-        position = Position(Chain(arm.link, arm.prismatic), tip, EXACT, 0.0)
+        position = Position(Chain(arm.link, arm.prismatic), tip, tol.EXACT, 0.0)
         self.arm, self.task, self.scale = arm, task, position.scale
         self.from_base, self.rest = inverse(arm.link[0]), position.rest
         self.weights = np.array([[1.0, 0.0], [0.0, 1.0 / position.scale]])
         U, S, self.V = np.linalg.svd(self.weights @ position.A)
         self.weights = U.T @ self.weights / position.scale
         self.weights[0] /= S[0]
-        self.small, self.tight = float(S[1]), float(S[1] / max(S[0], TINY))
+        self.small, self.tight = float(S[1]), float(S[1] / max(S[0], tol.TINY))
         self.fixed = np.array([position._affine(w, [0.0, 0.0])[:3] for w in self.weights], float)
         self.tip = position.Y / position.scale
-        self.touching = max(DOUBLE_ROOT, BLUR_OF_PAIRS / max(self.tight, NO_SECOND) ** 0.5)
+        self.touching = max(tol.DOUBLE_ROOT, tol.BLUR_OF_PAIRS / max(self.tight, tol.NO_SECOND) ** 0.5)
 
     def roots(self, target: Array) -> _Roots:
         """All four roots of targets (N, 3), complex ones by their real parts."""
@@ -91,7 +82,7 @@ class Pencil:
         gx, gy = (self.V[0, k] * h0 + self.V[1, k] * h1 for k in range(2))
         x, y, z = (at(row) for row in self.tip)
         across = x * x + y * y
-        loose = np.abs(across) < NEARBY
+        loose = np.abs(across) < tol.NEARBY
         across = np.where(loose, 1.0, across)
         c2, s2 = (x * gx + y * gy) / across, (x * gy - y * gx) / across
         off = np.maximum(_imaginary(c, s), _imaginary(c2, s2))
@@ -100,7 +91,7 @@ class Pencil:
         there = np.stack([c2 * x.real - s2 * y.real, s2 * x.real + c2 * y.real, z.real], axis=2)
         there = there @ self.arm.link[1][:3, :3].T + self.arm.link[1][:3, 3] / self.scale
         q1 = np.arctan2(p[:, 1], p[:, 0])[:, None] - np.arctan2(there[..., 1], there[..., 0])
-        free = (np.hypot(there[..., 0], there[..., 1]) < NEARBY) | loose
+        free = (np.hypot(there[..., 0], there[..., 1]) < tol.NEARBY) | loose
         return _Roots(np.stack([q1, q2, q3], axis=2), half.imag == 0.0, off, free.any(axis=1))
 
     def _half_tangents(self, main: Array, alone: Array) -> tuple[NDArray[Any], Array, Array]:
@@ -109,7 +100,7 @@ class Pencil:
         M = np.empty((N, 3, 2, 2))
         M[:, :, 0, 0], M[:, :, 0, 1] = alone - k * self.tip[0], k * (self.tip[1] - main)
         M[:, :, 1, 0], M[:, :, 1, 1] = k * (self.tip[1] + main), alone + k * self.tip[0]
-        turn = np.hypot(alone[:, 1], alone[:, 2]) + TINY
+        turn = np.hypot(alone[:, 1], alone[:, 2]) + tol.TINY
         turn = np.where(alone[:, 0] < 0.0, turn, -turn)[:, None]
         cosine, sine = alone[:, 1:2] / turn, alone[:, 2:3] / turn
         c, s = cosine[:, :, None], sine[:, :, None]
@@ -123,14 +114,14 @@ class Pencil:
 
 def _imaginary(c: NDArray[Any], s: NDArray[Any]) -> Array:
     """The imaginary part [rad] of an angle whose cosine and sine these are."""
-    return np.abs(np.log(np.maximum(np.abs(c + 1j * s), TINY)))
+    return np.abs(np.log(np.maximum(np.abs(c + 1j * s), tol.TINY)))
 
 
 def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | None:
     """All roots of three turning joints near the class of `alike`, whose branches' places they take."""
     pencil = Pencil(arm, task)
     seeds = recorded(arm, task, alike)
-    if pencil.tight < NO_SECOND or np.prod(seeds.axes) != 4:
+    if pencil.tight < tol.NO_SECOND or np.prod(seeds.axes) != 4:
         return None
 
     def rows(target: Array) -> Rows:
@@ -147,11 +138,11 @@ def _solved(pencil: Pencil, target: Array) -> Rows:
     row, place = np.nonzero(found.real)
     better, size = newton.correct(arm, task, found.q[row, place], target[row])
     q = np.full_like(found.q, np.nan)
-    q[row, place] = np.where((size <= ANSWERED)[:, None], better, np.nan)
+    q[row, place] = np.where((size <= tol.ANSWERED)[:, None], better, np.nan)
     missing = np.isnan(q[:, :, 0])
     beside = missing & (found.real | (found.off < pencil.touching))
     apart = newton.distances(arm, q, q) + 9.0 * np.eye(4)
-    merged = (apart < max(APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
+    merged = (apart < max(tol.APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
     doubt = beside.any(axis=1) | merged | found.loose
     return Rows(q, doubt, np.ones(len(target), bool), None, np.where(beside[:, :, None], found.q, np.nan))
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from armkin.errors import UsageError
 from armkin.inverse.closed import anywhere, elbow, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.numeric.tolerances import RANK
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.solvers import general, nearly_special, tool_axis
 from armkin.inverse.tasks.choose_task import default_task, rank, redundant, task_for
 from armkin.inverse.tasks.task import Task
@@ -36,7 +36,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
             f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} leave "
             f"{surplus} degree{'s' if surplus > 1 else ''} of freedom",
         )
-    effective = rank(arm, task, RANK)
+    effective = rank(arm, task, tol.RANK)
     if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
         usual = default_task(arm)
         problem = (

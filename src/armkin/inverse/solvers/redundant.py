@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed import spherical, three_parallel
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
-from armkin.inverse.numeric.tolerances import EXACT, NEAR
+from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task
@@ -78,7 +78,7 @@ def nearly_closed(arm: Arm, free: Redundancy) -> Redundancy:
         if free.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
             continue
         rest = lock(arm, {arm.joint_names[joint]: 0.0})
-        for alike in (module.recognise(rest, free.task, NEAR) for module in (spherical, three_parallel)):
+        for alike in (module.recognise(rest, free.task, tol.NEAR) for module in (spherical, three_parallel)):
             if alike is not None and (one := Redundancy(joint, rest, free.task, alike)).by_formula:
                 return one
     return free
@@ -87,7 +87,7 @@ def nearly_closed(arm: Arm, free: Redundancy) -> Redundancy:
 def _turns_about_the_tool(arm: Arm, task: Task) -> bool:
     """Whether the last joint turns about the tool's z axis, which alone is asked for: it moves no target."""
     off = np.array([arm.link[-1][:2, 3] / arm.reach, arm.link[-1][:2, 2]])
-    return task.orientation == "axis" and task.position == 3 and bool(np.abs(off).max() <= EXACT)
+    return task.orientation == "axis" and task.position == 3 and bool(np.abs(off).max() <= tol.EXACT)
 
 
 def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
