@@ -128,14 +128,14 @@ def python() -> Iterator[str]:
     for name, what in sorted(public.items()):
         if callable(what):
             yield f"## {name}\n"
-            yield from documented(f"armkin.{name}", what)
+            yield from docstring_markdown(f"armkin.{name}", what)
         for inner, member in vars(what).items() if inspect.isclass(what) else ():
             if not inner.startswith("_") and (inspect.isfunction(member) or hasattr(type(member), "__get__")):
                 yield f"### {name}.{inner}\n"
-                yield from documented(f"{name}.{inner}", member)
+                yield from docstring_markdown(f"{name}.{inner}", member)
 
 
-def documented(name: str, what: Any) -> Iterator[str]:
+def docstring_markdown(name: str, what: Any) -> Iterator[str]:
     """A signature, if it is called, and a docstring: its sections as tables, its examples as code."""
     if inspect.isfunction(what):
         signature = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(what)))

@@ -98,5 +98,5 @@ def test_plans_that_were_sent_are_not_kept() -> None:
         del made
     gc.collect()
     assert [one() for one in sent] == [None, None, None]
-    assert planner.done.waypoints == 3
-    assert planner.done.summary()["pulses"] == planner.counts(np.deg2rad([0, 85, -85]))
+    assert planner.total_sent.waypoints == 3
+    assert planner.total_sent.summary()["pulses"] == planner.counts(np.deg2rad([0, 85, -85]))

@@ -131,7 +131,7 @@ def tips(lines: int) -> None:
             curve = plan.motion.stretches[-1]
             assert isinstance(curve, Curve)
             t = np.interp(np.arange(20 * len(curve.times)) / 20, np.arange(len(curve.times)), curve.times)
-            p = armkin.fk(arm, curve.at(t))[:, :3, 3]
+            p = armkin.fk(arm, curve.evaluate(t))[:, :3, 3]
             a, b = (spot(task_for(arm), end).p for end in ends)
             a, b = (np.append(x, p[0, 2])[:3] if len(x) < 3 else x for x in (a, b))
             d = (b - a) / np.linalg.norm(b - a)

@@ -86,7 +86,7 @@ def test_segments_follow_the_plan_in_time_and_place() -> None:
     for segment in move.segments:
         t += cycles_of(segment) / laid.clock
         place += np.array(segment.rates) * segment.ticks / 2**23
-        exact = (stretch.at(np.array([t]))[0] - arm.home) @ arm.motor_gain.T
+        exact = (stretch.evaluate(np.array([t]))[0] - arm.home) @ arm.motor_gain.T
         # What the whole counts at both ends are off is left behind soon; then a segment ends where the motors are.
         assert np.abs(place - exact).max() < (0.15 if 0.3 < t < stretch.duration - 0.3 else 1.0)
     assert np.round(place).tolist() == move.end.tolist() == move.start.tolist()

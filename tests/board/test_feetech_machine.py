@@ -68,7 +68,7 @@ def test_nothing_moves_when_the_motors_go_on() -> None:
         servo.set(registers.GOAL_POSITION, 100)  # an old goal
     machine(port)
     port.advance(0.5)
-    assert [round(servo.at) for servo in port.servos.values()] == HOME
+    assert [round(servo.position) for servo in port.servos.values()] == HOME
 
 
 def test_a_stop_slows_down_on_the_line() -> None:
@@ -83,7 +83,7 @@ def test_a_stop_slows_down_on_the_line() -> None:
     assert 0.05 < gone.mean() < 0.95
     assert np.ptp(gone) < 0.03
     port.advance(0.5)
-    assert np.abs(np.array([servo.at for servo in port.servos.values()]) - one.counts()).max() <= 1
+    assert np.abs(np.array([servo.position for servo in port.servos.values()]) - one.counts()).max() <= 1
 
 
 def test_a_blocked_servo_holds_the_arm() -> None:
@@ -92,7 +92,7 @@ def test_a_blocked_servo_holds_the_arm() -> None:
     port.servos[2].write = lambda address, data: None  # type: ignore[method-assign]
     with pytest.raises(LinkError, match=r"servo 2 \(j2\) is \d+ counts behind: blocked or overloaded"):
         one.run([one.plan(one.counts(), np.deg2rad([0, 120, 0]))])
-    assert abs(port.servos[2].at - HOME[1]) < 1
+    assert abs(port.servos[2].position - HOME[1]) < 1
     assert LAG < 1024
 
 
@@ -131,7 +131,7 @@ def test_relaxed_motors_can_be_moved_by_hand_and_read() -> None:
     one = machine(port)
     one.relax()
     for k, servo in port.servos.items():
-        servo.at += 100 * k
+        servo.position += 100 * k
         servo.advance(0.0)
     assert all(servo.get(registers.TORQUE) == 0 for servo in port.servos.values())
     np.testing.assert_allclose(np.rad2deg(one.read()), np.array([100, -200, 300]) * 360 / 4096, atol=1e-9)
@@ -145,7 +145,7 @@ class Stuck(Servo):
     def advance(self, seconds: float) -> None:
         """Let time pass."""
         super().advance(seconds)
-        self.at = min(self.at, self.stop)
+        self.position = min(self.position, self.stop)
 
 
 def stuck(number: int, after: float) -> tuple[ServoBus, ServoMachine]:
@@ -163,17 +163,17 @@ def test_a_move_has_arrived_when_every_servo_has(number: int) -> None:
     with pytest.raises(LinkError, match=rf"servo {number} \(j{number}\) stands 1[0-9][0-9] counts from its goal"):
         one.run([one.plan(one.counts(), np.deg2rad([20, -20, 20]))])
     blocked = port.servos[number]
-    assert blocked.get(registers.GOAL_POSITION) == pytest.approx(blocked.at, abs=10)  # it pushes no longer
+    assert blocked.get(registers.GOAL_POSITION) == pytest.approx(blocked.position, abs=10)  # it pushes no longer
 
 
 def test_all_servos_are_held_where_they_stand_when_one_falls_behind() -> None:
     port, one = stuck(1, 100)
     with pytest.raises(LinkError, match=r"servo 1 \(j1\) is \d+ counts behind"):
         one.run([one.plan(one.counts(), np.deg2rad([120, -120, 120]))])
-    there = [servo.at for servo in port.servos.values()]
+    there = [servo.position for servo in port.servos.values()]
     assert [servo.get(registers.GOAL_POSITION) for servo in port.servos.values()] == pytest.approx(there, abs=40)
     port.advance(2.0)
-    assert [servo.at for servo in port.servos.values()] == pytest.approx(there, abs=40)
+    assert [servo.position for servo in port.servos.values()] == pytest.approx(there, abs=40)
 
 
 def test_a_goal_outside_a_servo_s_own_limits_is_refused_before_anything_moves() -> None:
@@ -185,7 +185,7 @@ def test_a_goal_outside_a_servo_s_own_limits_is_refused_before_anything_moves() 
     goal = np.deg2rad([10, -30, 10])  # servo 2 is inverted: 2068 + 341
     with pytest.raises(NoSolutionError, match=r"servo 2 \(j2\): 2409 counts is outside its own limits 1500 to 2300"):
         one.run([one.plan(one.counts(), goal)])
-    assert [round(servo.at) for servo in port.servos.values()] == HOME
+    assert [round(servo.position) for servo in port.servos.values()] == HOME
     one.run([one.plan(one.counts(), np.deg2rad([10, -20, 10]))])
     port.servos[2].set(registers.MOST, 2000)  # what it stands at is outside: it may come back, not go farther
     two = machine(port)

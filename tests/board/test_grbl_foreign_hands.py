@@ -13,13 +13,13 @@ import armkin
 from armkin.board.backend import StoppedError
 from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.motor_axes import axes_of
-from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.settings import expected_settings
 from armkin.board.ports import record_path
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError, PositionLostError
 
 ARM = armkin.load("three_dof")
-FITS = {number: value for number, (_, value) in wanted(axes_of(ARM)).items()}
+FITS = {number: value for number, (_, value) in expected_settings(axes_of(ARM)).items()}
 GOAL = np.deg2rad([10, 80, -70])
 _numbers = itertools.count()
 

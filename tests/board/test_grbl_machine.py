@@ -16,7 +16,7 @@ from armkin.board.backend import StoppedError
 from armkin.board.backend.sent_positions import Job
 from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.motor_axes import axes_of
-from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.settings import expected_settings
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError, UsageError
 from armkin.model.build import build
@@ -25,7 +25,7 @@ from armkin.robot_file.robot_keys import Gripper
 from command_line import ROOT, THREE_DOF
 
 ARM = armkin.load("three_dof")
-FITS = {number: value for number, (_, value) in wanted(axes_of(ARM)).items()}
+FITS = {number: value for number, (_, value) in expected_settings(axes_of(ARM)).items()}
 
 
 def board(**more: Any) -> Grbl:

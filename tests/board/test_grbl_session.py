@@ -121,7 +121,7 @@ def test_settings_are_compared_and_only_what_is_wrong_is_serious() -> None:
     found = dict(pair for line in session.ask("$$") if (pair := replies.setting(line)))
     odd = {difference.number: difference.serious for difference in settings.differences(AXES, found)}
     assert odd == {1: False, 3: True, 100: True, 102: True, 110: False, 112: False, 120: False, 122: False}
-    for number, (_, value) in settings.wanted(AXES).items():
+    for number, (_, value) in settings.expected_settings(AXES).items():
         session.ask(f"${number}={value:g}")
     found = dict(pair for line in session.ask("$$") if (pair := replies.setting(line)))
     assert settings.differences(AXES, found) == []

@@ -14,12 +14,12 @@ from armkin.board.backend.sent_positions import Job
 from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.position_watch import Watch
-from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.settings import expected_settings
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError
 
 ARM = armkin.load("three_dof")
-FITS = {number: value for number, (_, value) in wanted(axes_of(ARM)).items()}
+FITS = {number: value for number, (_, value) in expected_settings(axes_of(ARM)).items()}
 Spoil = Callable[[str], str]
 
 
@@ -111,8 +111,8 @@ def test_one_damaged_report_is_not_believed() -> None:
     report = one.session.report
     assert report is not None
     away = report.__class__("Run", 0, (99.0, 0.0, 0.0, 0.0), None, "")
-    assert watch.see(away, 0.1) is None
-    assert watch.see(away, 0.2) == "it has left its path"
+    assert watch.fault(away, 0.1) is None
+    assert watch.fault(away, 0.2) == "it has left its path"
 
 
 def test_settings_are_read_again_before_a_motion() -> None:

@@ -12,7 +12,7 @@ import pytest
 
 import armkin
 from armkin.board.grbl.motor_axes import axes_of
-from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.settings import expected_settings
 from armkin.board.kinds import board_of
 from armkin.board.klipper import extra_axes as klipper_axes
 from armkin.board.ports import record_path
@@ -31,7 +31,7 @@ class Killed(BaseException):
 
 
 def grbl(name: str, *, hal: bool) -> Grbl:
-    settings = {number: value for number, (_, value) in wanted(axes_of(GRBL)).items()}
+    settings = {number: value for number, (_, value) in expected_settings(axes_of(GRBL)).items()}
     port = Grbl(4, name, settings | ({384: 1} if hal else {}), hal=hal)
     port.step = 0.01
     return port

@@ -12,7 +12,7 @@ import pytest
 import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import Machine
-from armkin.board.firmware.segments.remaining_plan import onwards, places_on
+from armkin.board.firmware.segments.remaining_plan import places_on, remaining_trajectory
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
 from armkin.board.firmware.wire.protocol import HALF, STEP
 from armkin.board.ports import note_path
@@ -138,7 +138,7 @@ def test_a_motion_held_in_its_approach_goes_on_with_that(arm: Arm, tmp_path: Pat
     file = tmp_path / "lines.yaml"
     file.write_text("start: home\nmoves: [{line: [390, 60, 300]}, {line: [390, -60, 300]}]\n")
     end = armkin.pulses(armkin.load(THREE_DOF), armkin.path(armkin.load(THREE_DOF), file).motion.end).tolist()
-    assert arm.send(20, 70, -70, "--assume-home")[0] == 0
+    assert arm.send(60, 70, -70, "--assume-home")[0] == 0  # an approach of 1.5 s: held in its middle
     arm.track.clear()
     arm.paused_at = 0.3
     code, err = arm.send("--path", file)
@@ -242,7 +242,7 @@ def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, .
     last = list(dict.fromkeys(map(tuple, stands)))[-14:-1]
     for counts in map(np.array, last):
         place = next(places_on([whole], counts))
-        left = cut(onwards(whole, place, joints(one, counts)), counts, min_interval=448)
+        left = cut(remaining_trajectory(whole, place, joints(one, counts)), counts, min_interval=448)
         assert _moves(left) == whole.end.tolist(), counts
 
 
@@ -265,13 +265,13 @@ def test_what_is_left_of_a_curve_keeps_to_the_joints_limits(begin: float) -> Non
     plan = armkin.path(one, corners, blend=15.0)
     stretch = max(plan.motion.stretches, key=lambda s: s.duration)
     t0 = begin * stretch.duration
-    left = remainder(one, stretch, t0, stretch.at(np.array([t0]))[0])
+    left = remainder(one, stretch, t0, stretch.evaluate(np.array([t0]))[0])
     t = np.linspace(0, left.duration, 4000)
-    assert np.abs(left.at(t, 1) / one.max_speed).max() <= 1.001
-    assert np.abs(left.at(t, 2) / one.max_accel).max() <= 1.02
-    assert np.abs(left.at(t, 1)[[0, -1]]).max() < 1e-6  # from rest to rest
+    assert np.abs(left.evaluate(t, 1) / one.max_speed).max() <= 1.001
+    assert np.abs(left.evaluate(t, 2) / one.max_accel).max() <= 1.02
+    assert np.abs(left.evaluate(t, 1)[[0, -1]]).max() < 1e-6  # from rest to rest
     assert left.end == pytest.approx(stretch.end)
     assert left.duration < stretch.duration - t0 + 1.5
-    way = places(one, stretch.at(np.linspace(t0, stretch.duration, 20_000)))
-    track = [tuple(row) for row in places(one, left.at(t[::40]))]
+    way = places(one, stretch.evaluate(np.linspace(t0, stretch.duration, 20_000)))
+    track = [tuple(row) for row in places(one, left.evaluate(t[::40]))]
     assert distance(track, way) < 0.01

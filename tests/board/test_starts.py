@@ -134,8 +134,8 @@ def test_more_than_a_turn_outside_nobody_believes(kind: str) -> None:
     near.refresh()
     far.refresh()
     assert (near.position(), far.position()) == ("known", "lost")
-    assert "q1 = 481" in far.why.replace("480.99", "481")
-    assert near.why == ""
+    assert "q1 = 481" in far.loss_reason.replace("480.99", "481")
+    assert near.loss_reason == ""
 
 
 def test_a_servo_bus_stands_where_it_measures() -> None:

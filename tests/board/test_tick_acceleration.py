@@ -135,7 +135,7 @@ def test_fewer_pieces_keep_to_their_bound(pieces: Pieces, most: float) -> None:
     for ramp in (0.05, 0.2, 0.5):
         n = round(20_000 * ramp)
         law = trapezoid(1.0, 1 / (1.5 * ramp), 1 / (1.5 * ramp) / ramp)  # a cruise of half a ramp
-        move = straight_lines.along([0, 0], [n, -n // 7], law, min_interval=448, pieces=pieces)
+        move = straight_lines.line_segments([0, 0], [n, -n // 7], law, min_interval=448, pieces=pieces)
         assert leaders_limits(list(move.segments), law, n, 0, 16_000_000)[1] <= most
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import armkin
 from armkin.board.grbl.motor_axes import axes_of
-from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.settings import expected_settings
 from armkin.board.kinds import board_of
 from armkin.board.ports import note_path
 from armkin.board.sim.sim_grbl import Grbl
@@ -79,7 +79,7 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
 
 
 def _wanted(robot: str) -> dict[int, tuple[str, float]]:
-    return wanted(axes_of(armkin.load(robot)))
+    return expected_settings(axes_of(armkin.load(robot)))
 
 
 def test_bus_servos_move_jog_grip_and_tell(bus: str) -> None:
@@ -254,11 +254,11 @@ def test_a_path_grips_with_a_servo_on_the_bus(tmp_path: Path) -> None:
     assert isinstance(port, ServoBus)
     assert arm.gripper is not None
     jaw = port.servos[arm.gripper.id or 0]
-    before = jaw.at
+    before = jaw.position
     with PtyPort(port) as pty:
         done = run("path", "so101", path, "--port", pty.name, "--json")
         assert done.code == 0, done.err
-    assert abs(jaw.at - before) > 100
+    assert abs(jaw.position - before) > 100
 
 
 def test_stop_leaves_a_board_of_others_alone_once_its_own_process_has_stopped_it(grbl: str) -> None:

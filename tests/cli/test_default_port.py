@@ -5,7 +5,7 @@ import pytest
 import armkin
 from armkin.board import ports
 from armkin.board.grbl.motor_axes import axes_of
-from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.settings import expected_settings
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.board.sim.sim_servo_bus import Servo, ServoBus
 from command_line import ROOT, THREE_DOF, run
@@ -57,7 +57,7 @@ def test_several_boards_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_boards_of_others_are_looked_for_as_the_robot_file_says(monkeypatch: pytest.MonkeyPatch) -> None:
     robot, bus_arm = ("tests/robots/three_dof_grbl.yaml", "tests/robots/bus_arm.yaml")
-    settings = {number: value for number, (_, value) in wanted(axes_of(armkin.load(ROOT / robot))).items()}
+    settings = {number: value for number, (_, value) in expected_settings(axes_of(armkin.load(ROOT / robot))).items()}
     servos = ServoBus([Servo(1, 2058), Servo(2, 2068)])
     with PtyPort(Grbl(settings=settings)) as grbl, PtyPort(servos) as bus, PtyPort(ServoBus([Servo(1)])) as other:
         plugged_in(monkeypatch, grbl.name, bus.name, other.name)

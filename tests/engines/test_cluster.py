@@ -26,31 +26,21 @@ from armkin.errors import ClusterError
 from command_line import ROOT, THREE_DOF, run
 from killed_once import square
 
-_CLUSTER = """
-import sys
-from distributed import LocalCluster
-if __name__ == "__main__":
-    cluster = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1")
-    print(cluster.scheduler_address, flush=True)
-    sys.stdin.read()
-"""
-
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A scheduler with two worker processes, whose nannies start another for one that is killed."""
-    script = tmp_path_factory.mktemp("cluster") / "two_workers.py"
-    script.write_text(_CLUSTER)
-    finds = {**os.environ, "PYTHONPATH": os.fspath(ROOT / "tests")}  # where the work is
-    with subprocess.Popen(
-        [sys.executable, script], env=finds, text=True,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-    ) as process:  # fmt: skip
-        assert process.stdin is not None
-        assert process.stdout is not None
-        yield process.stdout.readline().strip()
-        process.stdin.close()
-        process.wait(60)
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[kills.Cluster]:
+    """A scheduler with two worker processes, whose nanny starts another for one that is killed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", os.fspath(ROOT / "tests"))  # where the work is
+        cluster = kills.Cluster(tmp_path_factory.mktemp("cluster"), 2)
+        yield cluster
+        cluster.close()
+
+
+@pytest.fixture
+def address(whole: kills.Cluster) -> str:
+    """The scheduler's; one that was killed has a successor."""
+    return whole.address
 
 
 @pytest.mark.parametrize("where", ["cluster", "pool"])
@@ -125,13 +115,6 @@ def test_a_workspace_is_the_same_bytes_wherever_it_is_sampled(
 
 
 @pytest.fixture(scope="module")
-def kills_cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[kills.Cluster]:
-    cluster = kills.Cluster(tmp_path_factory.mktemp("kills"), 2)
-    yield cluster
-    cluster.close()
-
-
-@pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A batch's input, and the digest of its answers."""
     folder = tmp_path_factory.mktemp("undisturbed")
@@ -143,11 +126,11 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 @pytest.mark.parametrize("who", ["worker", "client", "scheduler"])
 def test_a_kill_costs_at_most_the_chunks_in_hand(
-    who: str, kills_cluster: kills.Cluster, undisturbed: tuple[Path, str], tmp_path: Path
+    who: str, whole: kills.Cluster, undisturbed: tuple[Path, str], tmp_path: Path
 ) -> None:
     """One of each here; twenty of each: tests/bench/bench_kills.py."""
     given, expected = undisturbed
-    told = kills.disturbed(given, tmp_path / "two.csv", expected, who, kills_cluster, Random(len(who)), count=3)
+    told = kills.disturbed(given, tmp_path / "two.csv", expected, who, whole, Random(len(who)), count=3)
     assert told.same, told
     assert told.redone == 0
     assert told.code in {"worker": (0, 3), "client": (0, 3, -9), "scheduler": (0, 1, 3)}[who], told

@@ -45,7 +45,7 @@ class Laid:
     def off(self, counts: Array) -> Array:
         """Distance [mm] of the tip at counts (N, motors) from the curve."""
         tip = armkin.fk(self.arm, armkin.joints(self.arm, counts))[:, :3, 3]
-        way = armkin.fk(self.arm, self.curve.at(np.linspace(0.0, self.curve.duration, 2000)))[:, :3, 3]
+        way = armkin.fk(self.arm, self.curve.evaluate(np.linspace(0.0, self.curve.duration, 2000)))[:, :3, 3]
         out = np.full(len(tip), np.inf)
         near = np.array([((way - p) ** 2).sum(axis=1).argmin() for p in tip])
         for a in (np.maximum(near - 1, 0), np.minimum(near, len(way) - 2)):  # the chords on either side

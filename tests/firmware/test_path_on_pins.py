@@ -105,7 +105,7 @@ def test_a_curve_held_or_cut_off_stays_on_its_way_and_known(
     assert got.off_way_mm <= 0.05 + HALF_A_STEP
     assert got.accel <= 1.6
     if not cable:  # 5/8 of the accelerations: slower than with all of them, unless the plan is slower by itself
-        speed = circle.curve.at(np.array([share * circle.curve.duration]), 1)[0]
+        speed = circle.curve.evaluate(np.array([share * circle.curve.duration]), 1)[0]
         ramp = (np.abs(circle.arm.motor_gain @ speed) / motor_accel(circle.arm)).max()
         assert 0.92 < got.milliseconds / 1000 / (ramp / 0.625) < 1.05
 

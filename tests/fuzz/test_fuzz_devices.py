@@ -13,7 +13,7 @@ from armkin import load
 from armkin.board.firmware import streaming
 from armkin.board.firmware.wire import session
 from armkin.board.grbl.motor_axes import axes_of
-from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.settings import expected_settings
 from armkin.board.klipper.extra_axes import axes_of as klipper_axes_of
 from armkin.board.klipper.extra_axes import settings_of
 from armkin.board.ports import Port
@@ -26,7 +26,7 @@ from armkin.board_catalogue import BOARDS
 from command_line import ROOT
 
 GRBL_ARM = ROOT / "tests/robots/three_dof_grbl.yaml"
-FITS = {number: value for number, (_, value) in wanted(axes_of(load(GRBL_ARM))).items()}
+FITS = {number: value for number, (_, value) in expected_settings(axes_of(load(GRBL_ARM))).items()}
 KLIPPER_ARM = ROOT / "tests/robots/three_dof_klipper.yaml"
 SECTIONS = settings_of(klipper_axes_of(load(KLIPPER_ARM)))
 BOARDS_OF: dict[str, Callable[[random.Random], Port]] = {

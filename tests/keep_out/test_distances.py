@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array
 from armkin.keep_out.shapes.box import Box
 from armkin.keep_out.shapes.capsule import Capsule
 from armkin.keep_out.shapes.floor import Floor
-from armkin.keep_out.shapes.segment_distances import between
+from armkin.keep_out.shapes.segment_distances import segment_distance
 from armkin.model.rotation import transform
 
 MANY = 4000
@@ -52,13 +52,13 @@ def test_segments_are_as_far_apart_as_the_search_finds() -> None:
     (a, b), (c, d) = (_segments(rng, MANY, 300.0) for _ in range(2))
     third = np.arange(MANY) % 3 == 0  # parallel, and nearly so
     d = np.where(third, c + (b - a) * rng.uniform(-2, 2, MANY) + rng.choice([0.0, 1e-9, 1e-5], MANY), d)
-    found = between(a, b, c, d)
+    found = segment_distance(a, b, c, d)
     assert np.abs(found - _least(lambda s: _point_to_segment(a + s * (b - a), c, d), MANY)).max() < 1e-9
 
 
 def test_crossing_segments_touch() -> None:
     a, b, c, d = np.array([[-1.0, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0]]).T.reshape(3, 4).T.reshape(4, 3, 1)
-    assert between(a, b, c, d).item() == 0.0
+    assert segment_distance(a, b, c, d).item() == 0.0
 
 
 def _signed(box: Box, p: Array) -> Array:

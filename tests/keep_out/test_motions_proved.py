@@ -100,7 +100,7 @@ def test_parts_of_cubics_go_no_farther_than_told() -> None:
     end = begin + rng.uniform(0, 1, 200) * (7 - begin)
     told = way.variation(begin, end)
     places = begin[:, None] + np.linspace(0, 1, 400) * (end - begin)[:, None]
-    gone = np.abs(np.diff(way.at(places.ravel()).reshape(200, 400, 2), axis=1)).sum(axis=1)
+    gone = np.abs(np.diff(way.joints_at(places.ravel()).reshape(200, 400, 2), axis=1)).sum(axis=1)
     assert (gone <= told + 1e-12).all()
     whole = way.variation(np.zeros(1), np.full(1, 7.0))[0]
     assert whole == pytest.approx(np.abs(np.diff(way.points, axis=0)).sum(axis=(0, 1)))

@@ -212,7 +212,7 @@ def test_many_rests_are_planned_at_once_as_each_alone(
         assert plan.limits[share].max() <= 1.001
     for one, other in zip(plan.motion.stretches, alone.motion.stretches, strict=True):
         np.testing.assert_allclose(one.end, other.end, atol=1e-9)
-        assert np.abs(one.at(np.array([0.0, one.duration]), 1)).max() <= 1e-9
+        assert np.abs(one.evaluate(np.array([0.0, one.duration]), 1)).max() <= 1e-9
     tip = armkin.fk(three_dof, plan.q(plan.motion.begins[1:]))[:, :3, 3]
     np.testing.assert_allclose(tip, saw, atol=1e-6)
 
@@ -232,7 +232,7 @@ def test_long_chords_beside_short_ones_are_kept_to(seed: int) -> None:
     """A spline with a knot at each place that it is held to swung 9 mm out between them."""
     points = ragged(seed)
     curve = fit_points.fitted(points, 0.05)
-    u = np.unique(np.concatenate([curve.at, np.linspace(curve.begin[0], curve.begin[-1], 20_000)]))
+    u = np.unique(np.concatenate([curve.parameters, np.linspace(curve.begin[0], curve.begin[-1], 20_000)]))
     far, excess = worst_miss(points, curve.values(u)[0], 0.05)
     assert far <= 0.051
     assert excess <= 0.051

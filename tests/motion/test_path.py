@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -154,3 +155,12 @@ def test_a_path_that_begins_on_a_boundary_is_carried_by_the_branches_that_meet_t
     tip = armkin.fk(three_dof, q)[:, :3, 3]
     assert np.abs(tip[:, 1:] - [10, 170]).max() < 1e-6
     assert plan.deviation <= plan.tolerance
+
+
+def test_one_jerk_for_all_joints_is_each_ones_where_a_joint_is_redundant() -> None:
+    arm = replace(armkin.load("panda"), max_accel=np.full(7, 2.0))
+    goals = np.repeat(armkin.fk(arm, arm.home)[None], 2, axis=0)
+    goals[1, :3, 3] += [0, 2, -2]
+    one, each = (armkin.path(arm, goals, jerk=jerk, samples=9) for jerk in (50.0, np.full(7, 50.0)))
+    assert one.held == each.held
+    assert one.duration == each.duration

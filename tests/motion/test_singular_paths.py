@@ -57,8 +57,8 @@ def test_acceleration_is_kept_inside_the_intervals_of_the_grid(seed: int) -> Non
     plan = armkin.path(arm, ends, hold=None)
     for curve in plan.motion.stretches:
         t = np.linspace(0.0, curve.duration, 40_000)
-        assert np.abs(curve.at(t, 2) / arm.max_accel).max() <= 1.002
-        assert np.abs(curve.at(t, 1) / arm.max_speed).max() <= 1.002
+        assert np.abs(curve.evaluate(t, 2) / arm.max_accel).max() <= 1.002
+        assert np.abs(curve.evaluate(t, 1) / arm.max_speed).max() <= 1.002
 
 
 def test_a_limit_ends_the_run_and_split_changes_the_branch_there() -> None:
@@ -92,7 +92,7 @@ def test_free_joints_stay_where_the_whole_way_is_singular(name: str) -> None:
     plan = armkin.path(arm, {"task": "pose", "moves": moves}, hold=None)
     assert len(plan.runs) == 1
     curve = plan.motion.stretches[-1]
-    q = curve.at(np.linspace(0.0, curve.duration, 500))
+    q = curve.evaluate(np.linspace(0.0, curve.duration, 500))
     assert np.ptp(q[:, [3, 5]], axis=0).max() < 1e-6
     assert np.abs(q[:, 4]).max() < 1e-6
     assert np.ptp(q[:, 1]) == pytest.approx(0.4, abs=1e-6)

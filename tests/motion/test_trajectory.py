@@ -24,7 +24,7 @@ def three_dof() -> Arm:
 def test_a_trapezoid_is_bounded_and_ends_at_rest(length: float, speed: float, accel: float) -> None:
     law = trapezoid(length, speed, accel)
     t = np.linspace(0, law.duration, 500)
-    x, v, a = (law.at(t, order) for order in range(3))
+    x, v, a = (law.evaluate(t, order) for order in range(3))
     assert x[0] == 0
     assert x[-1] == pytest.approx(length)
     assert np.all(np.diff(x) >= -1e-12 * length)

@@ -241,7 +241,7 @@ def test_without_webgl_everything_else_works(browser: Browser) -> None:
         settled(page)
         page.click("#send")
         idle(page, "send: done")
-        assert server.actions.stands() == tuple(COUNTS)
+        assert server.actions.standing_pulses() == tuple(COUNTS)
 
 
 def test_the_program_is_saved_and_loaded(tab: Page, tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_it_follows_the_page_that_switched_it_on_alone(following: Page) -> None:
     late = following.server.actions.tabs.find(following.id)
     assert watcher.act("take")[0] == 200
     assert watcher.act("follow", on=True) == (200, {"on": True})
-    board.shown(late, following.server.actions.arm.home)
+    board.follow_pose(late, following.server.actions.arm.home)
     assert rests(watcher)
     watcher.close()
 
@@ -111,10 +111,10 @@ def test_a_line_that_breaks_ends_following(following: Page, monkeypatch: pytest.
 
 
 def test_a_lost_position_is_not_followed_from(sim: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sim.server.actions, "stands", lambda: None)
+    monkeypatch.setattr(sim.server.actions, "standing_pulses", lambda: None)
     board = sim.server.actions.board
     assert board is not None
-    monkeypatch.setattr(board.thread, "stands", lambda: None)
+    monkeypatch.setattr(board.thread, "standing_pulses", lambda: None)
     status, answer = sim.act("follow", on=True)
     assert (status, "position" in answer["error"]) == (502, True)
     assert not sim.state()["follows"]
@@ -139,7 +139,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
 
         def still(counts: object) -> bool:
             page.wait_for_timeout(500)
-            return bool(server.actions.stands() == counts)
+            return bool(server.actions.standing_pulses() == counts)
 
         # A drag is followed; what has been shown before it is not.
         page.fill("#box-1", "60")
@@ -157,7 +157,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
         page.check("#best")
         settled(page)
         assert page.is_checked("#follow")
-        at = server.actions.stands()
+        at = server.actions.standing_pulses()
         for button in ("#branch-0", "#branch-1"):
             page.click(button)
             settled(page)
@@ -184,7 +184,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
         idle(page, "jog: done")
         settled(page)
         unfollowed()
-        assert still(server.actions.stands())
+        assert still(server.actions.standing_pulses())
         # A page that takes over has it off, and its own drag moves nothing.
         follow()
         assert other.act("take")[0] == 200
@@ -192,7 +192,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
         other.close()
         page.click("#take")
         until(page, "!document.querySelector('#panels').inert")
-        at = server.actions.stands()
+        at = server.actions.standing_pulses()
         drag(0, 37.5)
         assert still(at)
 

@@ -61,7 +61,7 @@ def directions(board: Board, person: Operator) -> set[int]:
     _able_to_jog(board, person)
     person.say("Directions: hold + to move a joint by up to 2 degrees (mm), - to take it back; Enter when you saw it.")
     for j, name in enumerate(arm.joint_names):
-        person.say(f"{name}, +: {_expected(arm, board.machine.joints() if _known(board) else arm.home, j)}")
+        person.say(f"{name}, +: {_expected(arm, board.machine.joints() if _position_text(board) else arm.home, j)}")
         board.machine.refresh()
         place = float(board.machine.joints()[j])
         while True:
@@ -93,7 +93,7 @@ def zeros(board: Board, person: Operator, *, forget: bool = False) -> dict[int, 
         return dict(enumerate(np.rint(counts).astype(int).tolist()))
     _able_to_jog(board, person)
     machine.refresh()
-    if _known(board):
+    if _position_text(board):
         person.say(f"Zeros: the board knows where the arm stands: {_standing(board)}.")
         if person.ask("Does it stand so? y yes, n no", "yn") == "n":
             raise UsageError(
@@ -158,12 +158,12 @@ def pad(board: Board, person: Operator, *, narrower: bool = False) -> dict[int, 
 _KEYS = "123456789abc"  # of up to twelve joints
 
 
-def _narrow(board: Board, person: Operator, found: dict[int, tuple[float, float]], j: int, *, upper: bool) -> None:
+def _narrow(board: Board, person: Operator, limits: dict[int, tuple[float, float]], j: int, *, upper: bool) -> None:
     """Make where joint j stands its limit, rounded inwards to a tenth."""
     arm, name = board.arm, board.arm.joint_names[j]
     rows = np.stack([arm.lower, arm.upper, arm.home, board.machine.joints()])
     low, high, home, here = (round(value, 9) for value in units.joints_out(arm, rows)[:, j].tolist())
-    low, high = found.get(j, (low, high))
+    low, high = limits.get(j, (low, high))
     value = round(float(np.floor(here * 10 + 1e-6) if upper else np.ceil(here * 10 - 1e-6)) / 10, 1) + 0.0
     pair = (low, value) if upper else (value, high)
     if not np.isfinite(pair).all():
@@ -171,7 +171,7 @@ def _narrow(board: Board, person: Operator, found: dict[int, tuple[float, float]
     elif not pair[0] <= home <= pair[1] or pair[0] >= pair[1]:
         person.say(f"{name}: {pair[0]:g} to {pair[1]:g} would leave its home ({home:g}) out: not taken.")
     else:
-        found[j] = pair
+        limits[j] = pair
         person.say(f"{name}: limits {pair[0]:g} to {pair[1]:g}.")
 
 
@@ -212,17 +212,17 @@ def _nudge(board: Board, person: Operator, j: int, place: float) -> None:
             person.say(f"{arm.joint_names[j]} has moved by {STEP:g}: {'-+'[sign < 0]} takes it back, Enter goes on.")
 
 
-def _jog(board: Board, person: Operator, j: int, sign: int, seconds: float, more: Callable[[], bool]) -> None:
+def _jog(board: Board, person: Operator, j: int, sign: int, seconds: float, goes_on: Callable[[], bool]) -> None:
     """Jog a joint at a tenth of its speed; what stops it is told."""
     rate = sign * SHARE * float(board.arm.max_speed[j])
     try:
-        board.jog(j, board.ready_to_jog(j, rate), seconds, more)
+        board.jog(j, board.ready_to_jog(j, rate), seconds, goes_on)
     except NoSolutionError as error:
         person.say(error.message.splitlines()[0])
     board.machine.refresh()
 
 
-def _known(board: Board) -> bool:
+def _position_text(board: Board) -> bool:
     return board.machine.position() != "lost"
 
 

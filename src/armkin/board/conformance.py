@@ -95,48 +95,50 @@ def _started(start: Start) -> Iterator[Emulated]:
                 os.unlink(path)
 
 
-def _pins(one: Emulated) -> list[int]:
-    return [round(value) for value in one.pins()]
+def _pins(emulated: Emulated) -> list[int]:
+    return [round(value) for value in emulated.pins()]
 
 
-def _connected(one: Emulated, stop: Callable[[], bool] = lambda: False) -> Backend:
+def _connected(emulated: Emulated, stop: Callable[[], bool] = lambda: False) -> Backend:
     """The arm, whose place is known: from the board, or on the word of somebody who looks."""
-    machine = one.board.connect(one.line, stop)
+    machine = emulated.board.connect(emulated.line, stop)
     lost = machine.position() == "lost"
-    machine.prepare(assume=joints(machine.arm, _pins(one)) if lost else None)
+    machine.prepare(assume=joints(machine.arm, _pins(emulated)) if lost else None)
     return machine
 
 
-def _near(one: Emulated, counts: Sequence[int]) -> bool:
-    return bool(np.abs(np.array(counts) - one.pins()).max() <= one.tolerance)
+def _near(emulated: Emulated, counts: Sequence[int]) -> bool:
+    return bool(np.abs(np.array(counts) - emulated.pins()).max() <= emulated.tolerance)
 
 
-def _check_truth(one: Emulated) -> str:
+def _check_truth(emulated: Emulated) -> str:
     """What the board says of its position, which must be true: known, lost, or an error in words."""
-    one.line.spoil, one.line.cut = bytes, False
-    _rest(one)
+    emulated.line.spoil, emulated.line.cut = bytes, False
+    _wait_for_rest(emulated)
     try:
-        machine = one.board.connect(one.line)
+        machine = emulated.board.connect(emulated.line)
     except LinkError as error:
         return str(error)
     known = machine.position() != "lost"
-    assert not known or _near(one, machine.counts()), f"a false position: {machine.counts()}, pins at {_pins(one)}"
+    assert not known or _near(emulated, machine.counts()), (
+        f"a false position: {machine.counts()}, pins at {_pins(emulated)}"
+    )
     return "known" if known else "lost"
 
 
-def _rest(one: Emulated) -> None:
+def _wait_for_rest(emulated: Emulated) -> None:
     """Wait until nothing moves any more."""
-    end, before = one.line.now() + PATIENCE, list[int]()
-    while before != (now := _pins(one)) and one.line.now() < end:
+    end, before = emulated.line.now() + PATIENCE, list[int]()
+    while before != (now := _pins(emulated)) and emulated.line.now() < end:
         before = now
-        until = one.line.now() + 1.0
-        while one.line.now() < until:
-            one.port.read(0.05)
+        until = emulated.line.now() + 1.0
+        while emulated.line.now() < until:
+            emulated.port.read(0.05)
 
 
-def _carried_out(one: Emulated, machine: Backend, goal: Array, speed: float = 1.0) -> bool:
+def _carried_out(emulated: Emulated, machine: Backend, goal: Array, speed: float = 1.0) -> bool:
     """Run a motion; False if it was refused or broke off in words. What is said to be done must be done."""
-    began = one.line.now()
+    began = emulated.line.now()
     plan = machine.plan(machine.counts(), goal, speed=speed)
     try:
         machine.run([plan])
@@ -144,13 +146,13 @@ def _carried_out(one: Emulated, machine: Backend, goal: Array, speed: float = 1.
         done = False
     else:
         done = True
-        assert _near(one, plan.end.tolist()), f"said to be done: {plan.end.tolist()}, pins at {_pins(one)}"
-    assert one.line.now() - began < plan.duration + PATIENCE, "a hang"
+        assert _near(emulated, plan.end.tolist()), f"said to be done: {plan.end.tolist()}, pins at {_pins(emulated)}"
+    assert emulated.line.now() - began < plan.duration + PATIENCE, "a hang"
     return done
 
 
-def _goals(one: Emulated, seed: int, size: float = 0.15) -> Iterator[Array]:
-    rng, arm = np.random.default_rng(seed), one.board.arm
+def _goals(emulated: Emulated, seed: int, size: float = 0.15) -> Iterator[Array]:
+    rng, arm = np.random.default_rng(seed), emulated.board.arm
     span = np.where(np.isfinite(arm.upper - arm.lower), arm.upper - arm.lower, 1.0)
     while True:
         yield np.clip(arm.home + rng.uniform(-size, size, arm.n) * np.minimum(span, 1.0), arm.lower, arm.upper)
@@ -192,7 +194,7 @@ def answers_that_are_lost_doubled_or_damaged_make_nothing_false(start: Start, ti
                         _connected(one)
 
 
-def _while_moving(one: Emulated, asks: int, act: Callable[[], object] | None) -> bool:
+def _while_moving(emulated: Emulated, asks: int, act: Callable[[], object] | None) -> bool:
     """A motion in which something happens, or that is held (None), when a stop has been asked for so many times."""
     count, moving = itertools.count(), list[bool]()
 
@@ -203,15 +205,15 @@ def _while_moving(one: Emulated, asks: int, act: Callable[[], object] | None) ->
             act()
         return reached and act is None
 
-    machine = _connected(one, stop)
+    machine = _connected(emulated, stop)
     moving.append(True)
-    return _carried_out(one, machine, _away(one), 0.5)
+    return _carried_out(emulated, machine, _distant_goal(emulated), 0.5)
 
 
-def _away(one: Emulated) -> Array:
+def _distant_goal(emulated: Emulated) -> Array:
     """A goal some way from where the arm stands."""
-    here = joints(one.board.arm, _pins(one))
-    return max(itertools.islice(_goals(one, 7, 0.4), 20), key=lambda q: float(np.abs(q - here).max()))
+    here = joints(emulated.board.arm, _pins(emulated))
+    return max(itertools.islice(_goals(emulated, 7, 0.4), 20), key=lambda q: float(np.abs(q - here).max()))
 
 
 def a_reset_in_a_motion_is_told(start: Start, times: int = 5) -> None:
@@ -270,14 +272,14 @@ def a_hold_keeps_the_position_and_the_next_motion_goes_on(start: Start, times: i
         for k in range(times):
             _while_moving(one, 1 + 3 * k, None)
             assert _check_truth(one) == "known", "a hold has lost the position"
-            assert _carried_out(one, _connected(one), _away(one))
+            assert _carried_out(one, _connected(one), _distant_goal(one))
 
 
 def a_plan_that_begins_elsewhere_moves_nothing(start: Start, times: int = 1) -> None:
     """It is a bug of who made it, and no motion."""
     with _started(start) as one:
         machine = _connected(one)
-        before, there = _pins(one), machine.plan(machine.counts(), _away(one))
+        before, there = _pins(one), machine.plan(machine.counts(), _distant_goal(one))
         plan = machine.plan(there.end.tolist(), machine.arm.home)
         try:
             machine.run([plan])
@@ -285,7 +287,7 @@ def a_plan_that_begins_elsewhere_moves_nothing(start: Start, times: int = 1) -> 
             pass
         else:
             raise AssertionError("a plan that begins elsewhere was carried out")
-        _rest(one)
+        _wait_for_rest(one)
         assert np.abs(np.array(before) - one.pins()).max() <= one.tolerance
 
 

@@ -46,5 +46,5 @@ def open_board(
         link.close()
 
 
-def _log(when: str, machine: Backend) -> None:
-    LOG.info("%s: position %s, counts %s", when, machine.position(), list(machine.counts()))
+def _log(event: str, machine: Backend) -> None:
+    LOG.info("%s: position %s, counts %s", event, machine.position(), list(machine.counts()))

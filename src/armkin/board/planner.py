@@ -34,7 +34,7 @@ class Planner:
     def __init__(self, board: Board, speed: float, blend: float = 0.0) -> None:
         """blend: how far from a waypoint its rounding begins [deg | mm]; 0: stop in each."""
         self.arm, self.board, self.speed, self.blend = board.arm, board, speed, blend
-        self.done = Total(board.arm)  # what has been sent
+        self.total_sent = Total(board.arm)  # what has been sent
 
     def counts(self, q: Array) -> list[int]:
         """Counts at joint values."""
@@ -49,10 +49,10 @@ class Planner:
         return self.board.lay(way, counts)
 
     def noted(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
-        """Pass plans on and sum them up in `done`; none is kept, as rows may come for hours."""
+        """Pass plans on and sum them up in `total_sent`; none is kept, as rows may come for hours."""
         for made in plans:
             if made is not None:
-                self.done.add(made)
+                self.total_sent.add(made)
             yield made
 
 

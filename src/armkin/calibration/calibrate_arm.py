@@ -20,6 +20,8 @@ from armkin.export import conventions
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints
+from armkin.inverse.tasks.choose_task import task_for
+from armkin.robot_file.robot_file_text import text
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -63,8 +65,6 @@ class Calibration:
     @property
     def text(self) -> str:
         """The corrected robot file."""
-        from armkin.robot_file.robot_file_text import text
-
         return text(self.data)
 
     @property
@@ -170,8 +170,6 @@ def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterabl
 
 def holding(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
     """What is not corrected, kinds and single corrections, and the kinds that the arm's task holds, in words."""
-    from armkin.inverse.tasks.choose_task import task_for
-
     try:
         task = task_for(arm).name
     except UsageError:

@@ -11,6 +11,7 @@ import numpy as np
 from armkin.calibration.robust_fit import Measured
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
+from armkin.forward import position
 from armkin.model import units
 from armkin.model.units import radian_or_reach
 
@@ -73,8 +74,6 @@ class _Reading(NamedTuple):
 
 def _meaning(arm: Arm, data: Measured) -> None:
     """Units and columns: whether another reading of the rows fits far better than the one given."""
-    from armkin.forward import position
-
     expected = position(arm, data.c)
     size = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
     miss, plain = _aligned(expected, data.position), _plain(expected, data.position)

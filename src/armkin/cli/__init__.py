@@ -28,7 +28,7 @@ progress_bar.py  how far a long command has come, with rate and time left
 render.py        JSON and aligned columns; ik_answer.py: ik's JSON; ik_text.py, info_text.py, path_text.py: as text
 
 A command is a function of the same name in a module of the same name, written for Typer:
-`armkin.cli.commands.fk.fk`. A module is imported when its command runs, and imports nothing but typer and its
+`armkin.cli.commands.fk.fk`. A module is imported when its command runs, and imports nothing but typer, armkin and its
 neighbours at its top, so that ``armkin --help`` stays cheap.
 """
 

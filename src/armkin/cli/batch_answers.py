@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import IO, Any, NamedTuple, Protocol
 
-from armkin import __version__
+from armkin import __version__, files
 from armkin.cli import output
 from armkin.cli.batch_pieces import Piece, Rows, parsed
 from armkin.cli.render import to_json
@@ -235,7 +235,6 @@ def _binary(out: str | None) -> Iterator[Callable[[bytes], object]]:
         with output.destination(out) as write:
             yield lambda data: write(data.decode())
         return
-    from armkin import files
 
     with files.whole(out, "wb") as file:
         yield file.write
@@ -245,8 +244,6 @@ class _ToFile:
     """A batch whose answers become a file: more than one piece keep their answers beside it until all are there."""
 
     def __init__(self, batch: Batch, format: Format, job: Job, tally: Tally, size: int | None) -> None:
-        from armkin import files
-
         self.batch, self.format, self.job, self.tally = batch, format, job, tally
         self.path = str(batch.out)
         files.check(self.path)
@@ -311,8 +308,6 @@ class _ToFile:
         self.tally.add(done.tally)
 
     def _write(self) -> None:
-        from armkin import files
-
         held = self.parts.held
         try:
             with files.whole(self.path, "wb") as file:

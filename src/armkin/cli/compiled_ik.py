@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import armkin
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -15,8 +17,6 @@ if TYPE_CHECKING:
 
 def prepare(arm: Arm, task: str | None = None) -> None:
     """Build the machine code, before there are processes, which then have it, too."""
-    import armkin
-
     armkin.compile(arm, task)
 
 
@@ -24,15 +24,11 @@ def ik(
     arm: Arm, targets: Array, task: str | None = None, near: Array | None = None, rounding: Array | None = None
 ) -> Solutions:
     """`armkin.ik`."""
-    import armkin
-
     return armkin.compile(arm, task).ik(targets, task, near, rounding=rounding)
 
 
 def fk(arm: Arm, q: Array, task: str | None = None) -> Array:
     """`armkin.fk`; task: whose library serves."""
-    import armkin
-
     return armkin.compile(arm, task).fk(q)
 
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+import armkin
+
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
@@ -68,7 +70,6 @@ def assignments(ctx: typer.Context) -> Iterable[str]:
 @_quiet
 def branches(ctx: typer.Context) -> Iterable[str]:
     """Names of the robot's branches, written without blanks: left/elbow-up."""
-    import armkin
     from armkin.inverse.tasks.choose_task import task_for
     from armkin.inverse.tasks.task import targets_of
 

@@ -106,9 +106,7 @@ class Columns:
         lower = [cell.lower() for cell in cells]
         found = {name: _places(lower, name.lower()) for name in self.names}
         if not any(found.values()):
-            if len(cells) > 1 and all(_WORD.fullmatch(cell) for cell in cells):
-                hint = _TARGETS if {"x", "y"} <= set(lower) and "x" not in self.names else ""
-                raise UsageError(f"a heading without the columns {', '.join(self.names)}{hint}")
+            self._refuse_another(cells)
             return False
         double = [name for name, places in found.items() if len(places) > 1]
         if double:
@@ -120,6 +118,12 @@ class Columns:
         self.heading = cells
         self.places = [places[0] for places in found.values()]
         return True
+
+    def _refuse_another(self, cells: list[str]) -> None:
+        """Raise UsageError for a line of words alone: the heading of another table."""
+        if len(cells) > 1 and all(_WORD.fullmatch(cell) for cell in cells):
+            hint = _TARGETS if {"x", "y"} <= {cell.lower() for cell in cells} and "x" not in self.names else ""
+            raise UsageError(f"a heading without the columns {', '.join(self.names)}{hint}")
 
 
 def batch_rows(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import armkin
 from armkin.cli import render
 from armkin.model import units
 
@@ -78,7 +79,6 @@ def _closest(
 
     None where every branch within limits hits something. nearest: if it is known.
     """
-    import armkin
     from armkin.inverse import choose_branch
 
     arm = request.arm

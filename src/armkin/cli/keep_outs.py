@@ -91,7 +91,7 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
         held = guard(one.arm)
         apart = held.clearances(one.q(np.linspace(0.0, one.duration, _SHOWN))).min(axis=0, initial=np.inf)
         for k in np.flatnonzero(apart < 0).tolist():
-            deepest[held.of(k)] = max(deepest.get(held.of(k), 0.0), float(-apart[k]))
+            deepest[held.pair_names(k)] = max(deepest.get(held.pair_names(k), 0.0), float(-apart[k]))
     if deepest:
         ordered = sorted(deepest.items(), key=lambda item: -item[1])
         words = hits_text([{"body": body, "with": other, "depth_mm": mm} for (body, other), mm in ordered])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.cli import arguments, output, render
 from armkin.errors import UsageError
+from armkin.files import keep
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ def record(
 
     check: compares them with the servos, where a port is named, and says which that is.
     """
-    from armkin.files import keep
     from armkin.robot_file import parse
     from armkin.robot_file.catalogue import locate
     from armkin.robot_file.replace_values import replaced

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import wraps
 from inspect import Parameter, signature
@@ -44,7 +45,6 @@ class Listening:
 
     def __enter__(self) -> None:
         import logging
-        import sys
 
         self._log = logging.getLogger("armkin.board")
         self._before = self._log.level

@@ -128,7 +128,6 @@ Cluster = Annotated[
 def _built(wanted: bool) -> bool:
     """Say on a terminal that something is built, which takes seconds the first time."""
     if wanted and sys.stderr is not None and sys.stderr.isatty():
-        from armkin.cli import output
         from armkin.compiled import toolchain
 
         toolchain.announce = lambda: output.note("compiling for this computer, once for each arm: some seconds")

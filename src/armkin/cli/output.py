@@ -3,6 +3,7 @@
 import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol, TextIO
@@ -189,7 +190,6 @@ def progress(what: str, total: int | Callable[[], int | None] | None = None) -> 
     if sys.stderr is None or not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
         yield lambda done, total=None: None
         return
-    import time
 
     known = total() if callable(total) else total
     began = last = time.monotonic()

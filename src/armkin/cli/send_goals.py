@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+import armkin
 from armkin.cli import arguments, lock_and_sweep, piped_answers
 from armkin.cli.csv_to_numbers import streamed_rows
 from armkin.cli.number_parsing import decimals
@@ -19,25 +20,27 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
+class Wanted(NamedTuple):
+    """`--target`, and the options that belong to it."""
+
+    target: str | None
+    task: str | None = None
+    branch: str | None = None
+    lock: Sequence[str] | None = None
+    near: str | None = None
+
+
 def goals(
-    robot: str | None,
-    q: list[str] | None,
-    target: str | None,
-    branch: str | None,
-    task: str | None,
-    batch: str | None,
-    lock: Sequence[str] | None = None,
-    near: str | None = None,
-    scene: str | None = None,
-    tool: str | None = None,
+    robot: str | None, q: list[str] | None, wanted: Wanted, batch: str | None, scene: str | None, tool: str | None
 ) -> tuple[Arm, Goals | Stream]:
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
+    target = wanted.target
     given = [name for name, what in (("Q...", q), ("--target", target), ("--batch", batch)) if what]
     if target is not None and q and robot is not None and batch is None:
-        arguments.check_commas(arguments.load(robot), task, target, q)
+        arguments.check_commas(arguments.load(robot), wanted.task, target, q)
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)}: give one of them")
-    if target is None and (branch is not None or task is not None or near is not None or lock):
+    if target is None and any(option not in (None, []) for option in wanted):
         raise UsageError("--branch, --task, --near and --lock belong to --target")
     if not given:
         return _from_pipe(robot, scene, tool)
@@ -45,28 +48,26 @@ def goals(
         raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
     arm = arguments.load(robot, scene, tool)
     if target is not None:
-        return arm, _of_target(arm, target, task, branch, lock, near)
+        return arm, _of_target(arm, target, wanted)
     if batch is not None:
         return arm, _of_rows(arm, batch)
     return arm, _checked(arm, [], [arguments.joints(arm, q)])
 
 
-def _of_target(
-    arm: Arm, target: str, task: str | None, branch: str | None, lock: Sequence[str] | None, near: str | None
-) -> Goals:
+def _of_target(arm: Arm, target: str, wanted: Wanted) -> Goals:
     """`--target`, which is solved when it is known where the arm stands."""
     import numpy as np
 
     from armkin.inverse.answers.rounding import printed
     from armkin.inverse.tasks.choose_task import task_for
 
-    what = task_for(arm, task)
+    what = task_for(arm, wanted.task)
     values = np.array([arguments.target_list(arm, what, target)])
-    close = None if near is None else arguments.joint_list(arm, near, "--near")
+    close = None if wanted.near is None else arguments.joint_list(arm, wanted.near, "--near")
     shown = [[decimals(word) for word in target.split(",")]]
     rounding = printed(label_units(what.labels), values, arm.reach, shown)
-    held = lock_and_sweep.locks(arm, lock)
-    return Goals(None, [1], targets_in(what.labels, values), what.name, branch, held, close, rounding)
+    held = lock_and_sweep.locks(arm, wanted.lock)
+    return Goals(None, [1], targets_in(what.labels, values), what.name, wanted.branch, held, close, rounding)
 
 
 def _of_rows(arm: Arm, batch: str) -> Goals | Stream:
@@ -135,8 +136,6 @@ def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -
 def _from_pipe(robot: str | None, scene: str | None, tool: str | None) -> tuple[Arm, Goals]:
     import numpy as np
 
-    import armkin
-
     answer = piped_answers.read(robot)
     arm = arguments.load(answer.robot_file, scene, tool)
     if answer.scene_sha256 is not None and answer.scene_sha256 != arm.scene_sha256:
@@ -172,7 +171,6 @@ def _of_pulses(arm: Arm, q: Array, counts: list[int]) -> Array:
     """
     import numpy as np
 
-    import armkin
     from armkin.motors import resolution
 
     if len(counts) != len(arm.motor_gain):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -90,7 +91,6 @@ def keys() -> Iterator[Keys]:
 
 
 def _posix(seconds: float) -> str:
-    import os
     import select
 
     if not select.select([sys.stdin], [], [], seconds)[0]:

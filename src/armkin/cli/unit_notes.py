@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from armkin.cli import output
@@ -11,6 +11,7 @@ from armkin.model.target_numbers import label_units
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+    from armkin.robot_file import RobotFile
 
 _METRES = 2.0  # mm: a target this near to the base, or an arm this short, was meant in metres
 _RADIANS = 3.2  # deg: a little more than pi
@@ -20,23 +21,35 @@ _TURNS = (math.pi / 2, math.pi)
 
 def robot_file(arm: Arm) -> None:
     """Lengths that together make two millimetres, angles of 1.5708 degrees."""
-    file = arm.file
-    if file is None:
+    if arm.file is None:
         return
-    lengths = [abs(x) for joint in file.joints if joint.dh is not None for x in (joint.dh.a, joint.dh.d)]
-    lengths += [abs(x) for pose in (file.base, file.tool, file.zero_pose) if pose is not None for x in pose.xyz]
-    if 0 < sum(lengths) < _METRES:
+    total = sum(map(abs, _lengths(arm.file)))
+    if 0 < total < _METRES:
+        output.note(f"all lengths in {arm.path} together are {total:.4g} mm; if they are metres, multiply them by 1000")
+    angle = next(filter(_is_turn, _angles(arm.file)), None)
+    if angle is not None:
         output.note(
-            f"all lengths in {arm.path} together are {sum(lengths):.4g} mm; if they are metres, multiply them by 1000"
+            f"{arm.path} has an angle of {angle:g} degrees; if it is in radians, write {math.degrees(angle):.4g}"
         )
-    angles = [x for joint in file.joints if joint.dh is not None for x in (joint.dh.alpha, joint.dh.theta)]
-    angles += [x for pose in (file.base, file.tool, file.zero_pose) if pose is not None for x in pose.rpy]
-    for angle in angles:
-        if any(abs(abs(angle) - turn) < 1e-3 for turn in _TURNS):
-            output.note(
-                f"{arm.path} has an angle of {angle:g} degrees; if it is in radians, write {math.degrees(angle):.4g}"
-            )
-            return
+
+
+def _lengths(file: RobotFile) -> Iterator[float]:
+    for joint in file.joints:
+        yield from () if joint.dh is None else (joint.dh.a, joint.dh.d)
+    for pose in (file.base, file.tool, file.zero_pose):
+        yield from () if pose is None else pose.xyz
+
+
+def _angles(file: RobotFile) -> Iterator[float]:
+    for joint in file.joints:
+        yield from () if joint.dh is None else (joint.dh.alpha, joint.dh.theta)
+    for pose in (file.base, file.tool, file.zero_pose):
+        yield from () if pose is None else pose.rpy
+
+
+def _is_turn(angle: float) -> bool:
+    """Whether it is a right or a straight angle in radians."""
+    return any(abs(abs(angle) - turn) < 1e-3 for turn in _TURNS)
 
 
 def joint_values(arm: Arm, values: Sequence[float], what: str = "joint values") -> None:
@@ -53,7 +66,7 @@ def target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> None:
     if position and max(map(abs, position)) < _METRES and any(map(_has_digits, position)) and arm.reach > _BIG:
         output.note(f"targets are millimetres, and this looks like metres ({', '.join(f'{v:g}' for v in position)})")
     angles = [v for v, unit in zip(values, label_units(labels), strict=True) if unit == "deg"]
-    if angles and any(map(_has_digits, angles)) and any(abs(abs(v) - turn) < 1e-3 for v in angles for turn in _TURNS):
+    if any(map(_has_digits, angles)) and any(map(_is_turn, angles)):
         output.note(f"angles are degrees, and these look like radians ({', '.join(f'{v:g}' for v in angles)})")
 
 

@@ -90,18 +90,23 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
-        folds = _part("no_folds")
-        if geometry is not None and _judges(arm, task, geometry) and branches <= LANES:
-            parts.append(c_functions.jacobian(arm))
-            folds = c_program.filled(
-                _part("folds").replace("@followed@", _part("branch_to_fold") + "\n"), _of_folds(arm, task) | fields
-            )
-        parts += [_part("lane_sizes"), solve, part("whole_turns"), _choose(arm, branches)]
+        jacobian, folds = _folds(arm, task, geometry, branches, fields)
+        parts += [*jacobian, _part("lane_sizes"), solve, part("whole_turns"), _choose(arm, branches)]
         parts += [_part(gather), folds, _part("batch")]
         parts += [_part("elimination_rows")] if has_rows(task, geometry) else []
     text = c_program.filled("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
     return Library(text.replace("@content@", content), content, branches, level)
+
+
+def _folds(
+    arm: Arm, task: Task, geometry: Geometry | None, branches: int, fields: dict[str, str]
+) -> tuple[list[str], str]:
+    """How targets on an edge are told, and in front of it the Jacobian where C tells them."""
+    if geometry is None or not _judges(arm, task, geometry) or branches > LANES:
+        return [], _part("no_folds")
+    text = _part("folds").replace("@followed@", _part("branch_to_fold") + "\n")
+    return [c_functions.jacobian(arm)], c_program.filled(text, _of_folds(arm, task) | fields)
 
 
 def has_rows(task: Task, geometry: Geometry | None) -> bool:

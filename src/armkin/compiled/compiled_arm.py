@@ -102,7 +102,7 @@ class CompiledArm:
         Returns:
             (..., 4, 4) [mm] homogeneous transforms.
         """
-        return self._any().of_joints.fk(q, workers)
+        return self._any().joint_functions.fk(q, workers)
 
     def position(self, q: ArrayLike, *, workers: int = 1) -> Array:
         """Position of the tool alone.
@@ -114,7 +114,7 @@ class CompiledArm:
         Returns:
             (..., 3) [mm] x, y, z.
         """
-        return self._any().of_joints.position(q, workers)
+        return self._any().joint_functions.position(q, workers)
 
     def clearance(self, q: ArrayLike) -> Clearance:
         """How far the arm is from hitting anything, as `armkin.clearance`.
@@ -125,7 +125,7 @@ class CompiledArm:
         Returns:
             The least distances (...) [mm] and the names of the pairs that have them.
         """
-        return self._any().of_joints.clearance(q)
+        return self._any().joint_functions.clearance(q)
 
     def ik(
         self,
@@ -182,7 +182,7 @@ class _CompiledTask:
         library = c_source.library(arm, self.turned, which, form)
         code = toolchain.load(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
-        self.of_joints = JointFunctions(arm, code)
+        self.joint_functions = JointFunctions(arm, code)
         self.branches = library.branches
         if not self.branches:
             return
@@ -212,6 +212,12 @@ class _CompiledTask:
             return found
         if self.turned is not self.arm:
             return self._commanded(targets, near, workers, said)
+        return self._solve_batch(targets, near, workers, said)
+
+    def _solve_batch(
+        self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None
+    ) -> Solutions:
+        """As `ik`, of an arm whose joints move as they are commanded."""
         given = arrays.real(targets, "targets")
         m = len(self.goal_shape)
         if given.shape[-m:] != self.goal_shape or given.ndim < m:

@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from armkin import robot_file
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
+from armkin.forward import fk
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
-from armkin.model.rotation import FLIP, inverse
-from armkin.robot_file.robot_file_text import pose, tidy
+from armkin.model.build import build
+from armkin.model.rotation import FLIP, inverse, transform
+from armkin.robot_file.robot_file_text import pose, text, tidy
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -101,7 +105,6 @@ def tool_of(arm: Arm) -> Array:
     """The fixed frame that the robot file has after its last joint."""
     if arm.file is None:
         return np.eye(4)
-    from armkin.model.rotation import transform
 
     return transform(arm.file.tool.xyz, arm.file.tool.rpy)
 
@@ -200,15 +203,7 @@ def _file(
 def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
     """What a change of convention leaves alone: the file's head, the joints without geometry, and the rest."""
     if arm.file is None:
-        joints = []
-        limits, home = units.limits_out(arm), units.home_out(arm)
-        for i, name in enumerate(arm.joint_names):
-            joint: dict[str, Any] = {"name": name}
-            joint |= {"type": "prismatic"} if arm.prismatic[i] else {}
-            joint |= {"limits": list(limits[i])} if np.isfinite(limits[i]).all() else {}
-            joint |= {"home": home[i]} if home[i] else {}
-            joints.append(joint)
-        return {"name": arm.name}, joints, {}
+        return {"name": arm.name}, _joints_without_a_file(arm), {}
     data = arm.file.model_dump(exclude_unset=True, exclude_none=True)
     joints = [{k: v for k, v in joint.items() if k not in ("dh", "screw", "ratio")} for joint in data["joints"]]
     for joint, ratio in zip(joints, arm.ratio.tolist(), strict=True):
@@ -218,10 +213,21 @@ def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any
     return head, joints, rest
 
 
+def _joints_without_a_file(arm: Arm) -> list[dict[str, Any]]:
+    """The keys of joints, geometry apart, that say what the arm's arrays do."""
+    joints = []
+    limits, home = units.limits_out(arm), units.home_out(arm)
+    for i, name in enumerate(arm.joint_names):
+        joint: dict[str, Any] = {"name": name}
+        joint |= {"type": "prismatic"} if arm.prismatic[i] else {}
+        joint |= {"limits": list(limits[i])} if np.isfinite(limits[i]).all() else {}
+        joint |= {"home": home[i]} if home[i] else {}
+        joints.append(joint)
+    return joints
+
+
 def _same_pitch(arm: Arm, data: dict[str, Any]) -> dict[str, Any]:
     """The pitch of targets counts from where it did: another table's constant angles go to `pitch_offset`."""
-    from armkin.inverse.tasks.choose_task import task_for
-
     for name in ("xyz_pitch", "xyz_pitch_roll"):
         try:
             before = task_for(arm, name).offsets[0]
@@ -242,8 +248,6 @@ def _same_pitch(arm: Arm, data: dict[str, Any]) -> dict[str, Any]:
 
 def differences(arm: Arm, data: dict[str, Any]) -> list[str]:
     """What the other table's targets count from elsewhere, in words; [] for most arms."""
-    from armkin.inverse.tasks.choose_task import task_for
-
     try:
         before, after = task_for(arm), task_for(_built(data))
     except UsageError:
@@ -258,17 +262,11 @@ def differences(arm: Arm, data: dict[str, Any]) -> list[str]:
 
 
 def _built(data: dict[str, Any]) -> Arm:
-    from armkin import robot_file
-    from armkin.model.build import build
-    from armkin.robot_file.robot_file_text import text
-
     return build(robot_file.parse(text(data), str(data["name"])))
 
 
 def _check(arm: Arm, data: dict[str, Any], links: Array) -> None:
     """The table gives the arm's poses, or UsageError says which axes spoil it."""
-    from armkin.forward import fk
-
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (20, arm.n)) * np.where(arm.prismatic, 100.0, 1.0)
     sizes = [abs(v) for joint in data["joints"] for v in (joint["dh"]["a"], joint["dh"]["d"])]
     if max(sizes) < 1e7:

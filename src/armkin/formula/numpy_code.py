@@ -87,7 +87,7 @@ class _Buffers:
         for x in nodes:
             self._free.setdefault(self._kinds[id(x)], []).append(self.names[id(x)])
 
-    def follow(self, node: Node, over: list[Node]) -> None:
+    def take_over(self, node: Node, over: list[Node]) -> None:
         """A buffer for a value that is the last to read some others: one of theirs, unless a flip would read it."""
         if node.op in FLIPS:
             self.take(node)
@@ -107,13 +107,13 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
     terms = {id(node): _term(node) for node in recording.nodes}
     both_signs, buffers = _both_signs(recording, terms), _Buffers(recording)
     written = [node for node in recording.nodes if id(node) not in both_signs]
-    reads = [_read(node, both_signs) for node in written]
+    reads = [_operands(node, both_signs) for node in written]
     last = _last_lines([*reads, recording.outputs])
     lines: list[str] = []
     for k, node in enumerate(written):
         signed = term if id(term := terms[id(node)]) in both_signs else None
         arguments = [buffers.name(x) for x in node.args] if signed is None else []
-        buffers.follow(node, [x for x in reads[k] if x.op != "input" and last[id(x)] == k])
+        buffers.take_over(node, [x for x in reads[k] if x.op != "input" and last[id(x)] == k])
         lines += [_call(buffers, node, arguments)] if signed is None else _halves(buffers, node, signed)
     parameters = [buffers.names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers.all))]
     outputs = list(map(buffers.name, recording.outputs))
@@ -129,7 +129,7 @@ def _functions(recording: Recording, scalar: bool) -> dict[str, Any]:
     return found | {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in found}
 
 
-def _read(node: Node, both_signs: set[int]) -> list[Node]:
+def _operands(node: Node, both_signs: set[int]) -> list[Node]:
     """The values that a node's line reads, each once: of a value with both signs those that it is made of."""
     arguments = [y for x in node.args for y in (x.args if id(x) in both_signs else [x])]
     return list({id(y): y for y in arguments if isinstance(y, Node)}.values())

@@ -12,7 +12,7 @@ from armkin.errors import RobotFileError
 from armkin.formula.arrays import Array
 from armkin.keep_out.bodies import Bodies, bodies, ends
 from armkin.keep_out.shapes import Shape, shape_of
-from armkin.keep_out.shapes.segment_distances import between
+from armkin.keep_out.shapes.segment_distances import segment_distance
 from armkin.robot_file.keep_out_keys import SELF, names, problems
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Guard:
             found = [np.minimum.reduceat(shape.distance(begin, end) - less, self.first) for _, shape in self.obstacles]
         if len(self.ours):
             i, j = self.ours, self.theirs
-            apart = between(a[:, i], b[:, i], a[:, j], b[:, j])
+            apart = segment_distance(a[:, i], b[:, i], a[:, j], b[:, j])
             apart -= (radius[owner[i]] + radius[owner[j]])[:, None]
             found.append(np.minimum.reduceat(apart, self.starts))
         return np.concatenate(found) if found else np.empty((0, len(q)))
@@ -109,7 +109,9 @@ class Guard:
             else:
                 one, two = i[s], j[s]
                 exact = (
-                    between(a[:, one, n], b[:, one, n], a[:, two, n], b[:, two, n]) - radius[one, 0] - radius[two, 0]
+                    segment_distance(a[:, one, n], b[:, one, n], a[:, two, n], b[:, two, n])
+                    - radius[one, 0]
+                    - radius[two, 0]
                 )
             found[row + s, n] = exact
             row += len(far)
@@ -124,7 +126,7 @@ class Guard:
         crossing = np.searchsorted(self.starts, np.arange(len(self.ours)), side="right") - 1
         return np.concatenate([*of_obstacles, crossing + len(self.obstacles) * len(self.first)]).astype(np.intp)
 
-    def of(self, pair: int) -> tuple[str, str]:
+    def pair_names(self, pair: int) -> tuple[str, str]:
         """The names of a pair: body, and what it is held against."""
         return self.bodies.names[self.pairs[pair].body], self.pairs[pair].name
 
@@ -135,17 +137,17 @@ def guard(arm: Arm) -> Guard:
     entries = list(zip(names(arm.keep_out), arm.keep_out, strict=True))
     obstacles = tuple((name, shape_of(entry)) for name, entry in entries if entry.kind != SELF)
     if not any(entry.kind == SELF for _, entry in entries):
-        return _of(arm, obstacles, [], ())
+        return _guard_of_pairs(arm, obstacles, [], ())
     form = bodies(arm)
     there = [k for k in range(arm.n + 1) if form.exists(k)]
     pairs = [(later, earlier) for later in there for earlier in there if later - earlier >= 2]
-    apart = _of(arm, (), pairs, ()).distances(postures(arm)).max(axis=0, initial=-np.inf)
+    apart = _guard_of_pairs(arm, (), pairs, ()).distances(postures(arm)).max(axis=0, initial=-np.inf)
     kept = [pair for pair, most in zip(pairs, apart, strict=True) if most >= 0.0]
     left = tuple((form.names[i], form.names[j]) for i, j in pairs if (i, j) not in kept)
-    return _of(arm, obstacles, kept, left)
+    return _guard_of_pairs(arm, obstacles, kept, left)
 
 
-def _of(
+def _guard_of_pairs(
     arm: Arm,
     obstacles: tuple[tuple[str, Shape], ...],
     pairs: list[tuple[int, int]],

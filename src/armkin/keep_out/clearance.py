@@ -69,7 +69,7 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
 def named(arm: Arm, mm: Array, which: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
     """Clearances (N,) of pairs (N,) with their names, in the shape of a batch."""
     held = _guard(arm)
-    bodies, others = (np.array([held.of(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
+    bodies, others = (np.array([held.pair_names(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
     return Clearance(mm.reshape(lead)[()], bodies[which].reshape(lead)[()], others[which].reshape(lead)[()])
 
 
@@ -102,7 +102,9 @@ def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
     found = []
     for row in held.clearances(full):
         deep = [k for k in np.argsort(row, kind="stable") if row[k] < 0]
-        hit: list[Hit] = [{"body": held.of(k)[0], "with": held.of(k)[1], "depth_mm": float(-row[k])} for k in deep]
+        hit: list[Hit] = [
+            {"body": held.pair_names(k)[0], "with": held.pair_names(k)[1], "depth_mm": float(-row[k])} for k in deep
+        ]
         found.append((float(row.min()) if len(row) else None, hit))
     return found
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armkin.keep_out.body_pairs import Guard
 
 
-def levers(held: Guard, out: Array) -> Array:
+def levers(guard: Guard, out: Array) -> Array:
     """Of every pair how far its bodies come nearer, at most, for a unit of each joint: (n, pairs) [mm/rad, mm/mm].
 
     out: (n,) [mm] how far a slide is out at most during the motion. Seen from the earlier body (an obstacle: from
@@ -20,19 +20,19 @@ def levers(held: Guard, out: Array) -> Array:
     leads from that axis to it along the chain, each link stretched out; of the first link only the part across
     the axis counts.
     """
-    arm, form = held.arm, held.bodies
-    found = np.zeros((arm.n, len(held.pairs)))
-    of_body = {body: _of(held, body, out) for body in {pair.body for pair in held.pairs}}
-    for k, pair in enumerate(held.pairs):
+    arm, form = guard.arm, guard.bodies
+    found = np.zeros((arm.n, len(guard.pairs)))
+    of_body = {body: _body_levers(guard, body, out) for body in {pair.body for pair in guard.pairs}}
+    for k, pair in enumerate(guard.pairs):
         found[pair.other or 0 :, k] = of_body[pair.body][pair.other or 0 :]
         if pair.other and (form.slide & (form.owner == pair.other)).any():
             found[pair.other - 1, k] = 1.0  # the earlier body's slide grows, seen from its own end
     return found * np.abs(arm.ratio)[:, None]
 
 
-def _of(held: Guard, body: int, out: Array) -> Array:
+def _body_levers(guard: Guard, body: int, out: Array) -> Array:
     """Levers of a body on every axis: (n,); 0 on those behind it."""
-    arm, form = held.arm, held.bodies
+    arm, form = guard.arm, guard.bodies
     own = form.owner == body
     ends = np.concatenate([form.end[own], form.begin[own & ~form.slide]])
     across, far = float(np.hypot(ends[:, 0], ends[:, 1]).max()), float(np.linalg.norm(ends, axis=1).max())

@@ -47,9 +47,9 @@ def load(
     return checked(file, around, tool)
 
 
-def checked(file: RobotFile, around: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
+def checked(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
     """The arm of a robot file and a scene. Raises RobotFileError if a keep-out is hit in every posture."""
-    arm = build(file, around, tool)
+    arm = build(file, scene, tool)
     if arm.keep_out:
         from armkin.keep_out.body_pairs import check
 

@@ -21,7 +21,7 @@ class Way(Protocol):
     def cells(self) -> int:
         """How many: places go from 0 to this."""
 
-    def at(self, place: Array) -> Array:
+    def joints_at(self, place: Array) -> Array:
         """Joint values (P, n) [rad | mm] at places (P,)."""
 
     def variation(self, begin: Array, end: Array) -> Array:
@@ -49,7 +49,7 @@ class Cubics:
         each = np.abs(np.diff(self.points, axis=0)).sum(axis=0)
         return np.concatenate([np.zeros((1, each.shape[1])), np.cumsum(each, axis=0)])
 
-    def at(self, place: Array) -> Array:
+    def joints_at(self, place: Array) -> Array:
         """Joint values (P, n) at places (P,)."""
         cell = np.clip(place.astype(int), 0, self.cells - 1)
         share = place - cell

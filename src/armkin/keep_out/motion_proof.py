@@ -49,44 +49,44 @@ class Proof:
     postures: int
 
 
-def prove(held: Guard, way: Way, *, tight: bool = False, allowed: tuple[int, ...] | None = None) -> Proof:
+def prove(guard: Guard, way: Way, *, tight: bool = False, ignored_pairs: tuple[int, ...] | None = None) -> Proof:
     """Prove a motion free, or find its first hit.
 
-    tight: look on until the bound of the clearance is near the least that was seen. allowed: pairs that may be too
-    near to begin with, by default those that are.
+    tight: look on until the bound of the clearance is near the least that was seen. ignored_pairs: those that may be
+    too near to begin with, by default those that are.
     """
-    if not held.pairs:
+    if not guard.pairs:
         return Proof(True, 0.0, None, np.inf, (), 0)
     places = np.unique(np.round(np.linspace(0.0, way.cells, min(way.cells, _FIRST) + 1)))
-    q = way.at(places)
+    q = way.joints_at(places)
     out = np.abs(q).max(axis=0) + way.variation(np.zeros(1), np.array([float(way.cells)]))[0]
-    lever = levers(held, out)
-    apart = held.clearances(q)
+    lever = levers(guard, out)
+    apart = guard.clearances(q)
     start = apart[0] < 0.0
-    if allowed is not None:
-        start = start & np.isin(np.arange(len(start)), allowed)
+    if ignored_pairs is not None:
+        start = start & np.isin(np.arange(len(start)), ignored_pairs)
     while True:
         round_ = _Round(places, apart, way.variation(places[:-1], places[1:]) @ lever, start)
         middle = round_.to_halve(tight)
         if not len(middle):
             return round_.result()
-        q = way.at(middle)
+        q = way.joints_at(middle)
         where = np.searchsorted(places, middle)
         places = np.insert(places, where, middle)
-        apart = np.insert(apart, where, held.clearances(q), axis=0)
+        apart = np.insert(apart, where, guard.clearances(q), axis=0)
 
 
-def hit_samples(held: Guard, q: Array) -> NDArray[np.bool_]:
+def hit_samples(guard: Guard, q: Array) -> NDArray[np.bool_]:
     """Which of many neighbouring postures (N, n) hit something; most are told by those that stand some way off."""
     count = len(q)
     hit: NDArray[np.bool_] = np.zeros(count, np.bool_)
-    if not held.pairs or not count:
+    if not guard.pairs or not count:
         return hit
     gone = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(np.abs(np.diff(q, axis=0)), axis=0)])
-    lever = levers(held, np.abs(q).max(axis=0))
+    lever = levers(guard, np.abs(q).max(axis=0))
     known = np.arange(0, count, _STRIDES[0])
     known = np.append(known, count - 1) if known[-1] < count - 1 else known
-    apart = held.clearances(q[known])
+    apart = guard.clearances(q[known])
     for stride in (*_STRIDES[1:], 0):
         hit[known] = (apart < 0).any(axis=1)
         free = (apart[:-1] + apart[1:] >= (gone[known[1:]] - gone[known[:-1]]) @ lever).all(axis=1)
@@ -95,20 +95,20 @@ def hit_samples(held: Guard, q: Array) -> NDArray[np.bool_]:
             break
         more = np.concatenate([np.arange(known[k] + stride, known[k + 1], stride) for k in rows])
         where = np.searchsorted(known, more)
-        known, apart = np.insert(known, where, more), np.insert(apart, where, held.clearances(q[more]), axis=0)
+        known, apart = np.insert(known, where, more), np.insert(apart, where, guard.clearances(q[more]), axis=0)
     return hit
 
 
 class _Round:
-    """What is known once clearances `apart` (N, pairs) stand at places (N,), with bodies moving by `moved` between."""
+    """What is known once `clearances` (N, pairs) stand at places (N,), with bodies moving by `moved` between."""
 
-    def __init__(self, places: Array, apart: Array, moved: Array, start: NDArray[np.bool_]) -> None:
-        self.places, self.apart, self.start = places, apart, start
-        self.bound = (apart[:-1] + apart[1:] - moved) / 2
-        best = np.maximum.accumulate(apart, axis=0)
+    def __init__(self, places: Array, clearances: Array, moved: Array, start: NDArray[np.bool_]) -> None:
+        self.places, self.clearances, self.start = places, clearances, start
+        self.bound = (clearances[:-1] + clearances[1:] - moved) / 2
+        best = np.maximum.accumulate(clearances, axis=0)
         least = np.where(start & (best < 0.0), best - STEP, 0.0)  # what a pair has to keep from here on
         here = np.concatenate([least[:1], least[:-1]])
-        bad = (apart < here).any(axis=1)
+        bad = (clearances < here).any(axis=1)
         self.hit = int(np.argmax(bad)) if bad.any() else len(places)  # the first place that is one
         self.open: NDArray[np.bool_] = np.asarray((self.bound < least[:-1]).any(axis=1))
         self.open[self.hit :] = False
@@ -123,7 +123,7 @@ class _Round:
         rows = np.flatnonzero(self.open)
         if tight and not len(rows) and self.hit == self.stuck == len(self.places):
             others = np.where(self.start, np.inf, self.bound).min(axis=1, initial=np.inf)
-            seen = float(np.where(self.start, np.inf, self.apart).min(initial=np.inf))
+            seen = float(np.where(self.start, np.inf, self.clearances).min(initial=np.inf))
             rows = np.flatnonzero(others < seen - max(_ROUGH[0], _ROUGH[1] * seen)) if np.isfinite(seen) else rows
         rows = rows[:_AT_ONCE]
         low, high = self.places[rows], self.places[rows + 1]
@@ -137,15 +137,17 @@ class _Round:
         count = len(self.places)
         if self.stuck < count:
             pair = int(np.argmin(self.lacking[self.stuck]))
-            found = float(self.apart[self.stuck : self.stuck + 2, pair].min())
+            found = float(self.clearances[self.stuck : self.stuck + 2, pair].min())
             return Proof(False, float(self.places[self.stuck]), pair, found, escaping, count)
         if self.hit < count:
-            pair = int(np.argmin(self.apart[self.hit]))
-            return Proof(False, float(self.places[self.hit]), pair, float(self.apart[self.hit, pair]), escaping, count)
+            pair = int(np.argmin(self.clearances[self.hit]))
+            return Proof(
+                False, float(self.places[self.hit]), pair, float(self.clearances[self.hit, pair]), escaping, count
+            )
         bound = np.where(self.start, np.inf, self.bound)
         if not len(bound) or not np.isfinite(bound).any():
-            pair = int(np.argmin(self.apart[0]))
-            return Proof(True, 0.0, pair, float(self.apart[:, pair].min()), escaping, count)
+            pair = int(np.argmin(self.clearances[0]))
+            return Proof(True, 0.0, pair, float(self.clearances[:, pair].min()), escaping, count)
         row, pair = divmod(int(np.argmin(bound)), bound.shape[1])
-        nearer = row + int(self.apart[row + 1, pair] < self.apart[row, pair])
+        nearer = row + int(self.clearances[row + 1, pair] < self.clearances[row, pair])
         return Proof(True, float(self.places[nearer]), pair, float(bound[row, pair]), escaping, count)

@@ -45,7 +45,7 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
         name=file.name,
         frame=frame,
         base=base,
-        **_of_joints(file.joints, unit),
+        **_joint_fields(file.joints, unit),
         pitch_offset=math.radians(file.pitch_offset),
         task=file.task,
         motor_gain=gain,
@@ -64,7 +64,7 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
     )
 
 
-def _of_joints(joints: Sequence[Joint], unit: Array) -> dict[str, Any]:
+def _joint_fields(joints: Sequence[Joint], unit: Array) -> dict[str, Any]:
     """The arm's fields that have an entry for each joint; unit: (n,) rad | mm of the file's degree | mm."""
     return {
         "joint_names": tuple(j.name for j in joints),

@@ -40,7 +40,7 @@ def note(plan: PathPlan, carried: Carried, near: Array) -> None:
     for k, run in enumerate(carried.runs):
         for window in run.chain.windows:
             if c.s[run.first] <= window.begin and window.end <= c.s[run.last]:
-                plan.passed.append(Passed(base + window.begin, base + window.end, window.turned, window.aside))
+                plan.passed.append(Passed(base + window.begin, base + window.end, window.turned, window.tip_offset))
         q = run.chain.run(run.first, run.last, near)
         begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
         if end > begin:
@@ -59,7 +59,7 @@ def _names(c: Columns, run: Run, base: float) -> list[tuple[float, str]]:
 def _branches(arm: Arm, carried: Carried, near: Array) -> list[Branch]:
     """The branches at the start, the one that carries farthest first; of equals the one that is taken."""
     c, found, chosen = carried.columns, [], None
-    for chain in carried.all:
+    for chain in carried.chains:
         if chain.first == 0:
             e = chain.carries(0)
             q = (chain.run(0, e, near) if e >= 0 else chain.q)[0].copy()  # a view would keep the whole chain
@@ -128,60 +128,82 @@ def passes(plan: PathPlan) -> list[str]:
 def answer(plan: PathPlan) -> dict[str, Any]:
     """A plan as data of JSON [mm, deg, s]; of one that was refused what is known of it."""
     arm = plan.arm
-    out = units.joints_out
-    planned = plan.trajectory is not None
     worst = plan.nearest_singularity
     return {
         "task": None if plan.task is None else plan.task.name,
         "length_mm": plan.length,
-        "duration_s": plan.duration if planned else None,
+        "duration_s": None,
         "samples": plan.samples,
         "complete": plan.complete,
         "tolerance_mm": plan.tolerance,
-        "deviation_mm": plan.deviation if planned else None,
+        "deviation_mm": None,
         "blends_reduced": plan.reduced.count,
         "joint_units": units.names(arm),
-        "start_joints": out(arm, plan.motion.start).tolist() if planned else None,
-        "joints": out(arm, plan.motion.end).tolist() if planned else None,
-        "runs": [
-            {
-                "s_mm": [run.begin, run.end],
-                "branches": [{"s_mm": s, "name": name} for s, name in run.names],
-                "start_joints": out(arm, run.start_joints).tolist(),
-                "end_joints": out(arm, run.end_joints).tolist(),
-            }
-            for run in plan.runs
-        ],
-        "reconfigurations": [
-            {
-                "s_mm": one.s,
-                "why": one.why,
-                "joint": one.joint,
-                "value": None if one.value is None or one.index is None else _shown(arm, one.index, one.value),
-                "status_beyond": one.beyond,
-            }
-            for one in plan.reconfigurations
-        ],
-        "branches": [
-            {
-                "name": branch.name,
-                "start_joints": out(arm, branch.start_joints).tolist(),
-                "carries_mm": branch.carries,
-                "ends_because": branch.ends_because,
-            }
-            for branch in plan.branches
-        ],
-        "limits": {key: dict(zip(arm.joint_names, shares.tolist(), strict=True)) for key, shares in plan.limits.items()}
-        if planned
-        else None,
+        "start_joints": None,
+        "joints": None,
+        "runs": [_run(arm, run) for run in plan.runs],
+        "reconfigurations": [_reconfiguration(arm, one) for one in plan.reconfigurations],
+        "branches": [_branch(arm, branch) for branch in plan.branches],
+        "limits": None,
         "nearest_singularity": None
         if worst is None
         else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
-        **({"held": held(plan)} if plan.held else {}),
-        **({} if plan.turned is None else {"turned_deg": float(np.rad2deg(plan.turned))}),
-        **({"wrists_passed": [_passed(one) for one in plan.passed]} if plan.passed else {}),
-        **({} if plan.approach is None else {"approach": _approach(plan.approach)}),
-        **({} if plan.clearance is None else {"clearance": plan.clearance}),
+        **({} if plan.trajectory is None else _motion_fields(plan)),
+        **_optional_fields(plan),
+    }
+
+
+def _motion_fields(plan: PathPlan) -> dict[str, Any]:
+    """What is known of a plan's motion; keys that are None where there is none."""
+    motion, names = plan.motion, plan.arm.joint_names
+    return {
+        "duration_s": plan.duration,
+        "deviation_mm": plan.deviation,
+        "start_joints": units.joints_out(plan.arm, motion.start).tolist(),
+        "joints": units.joints_out(plan.arm, motion.end).tolist(),
+        "limits": {key: dict(zip(names, shares.tolist(), strict=True)) for key, shares in plan.limits.items()},
+    }
+
+
+def _optional_fields(plan: PathPlan) -> dict[str, Any]:
+    """Keys that a plan without such things does not have."""
+    said: dict[str, Any] = {"held": held(plan)} if plan.held else {}
+    if plan.turned is not None:
+        said["turned_deg"] = float(np.rad2deg(plan.turned))
+    if plan.passed:
+        said["wrists_passed"] = [_passed(one) for one in plan.passed]
+    if plan.approach is not None:
+        said["approach"] = _approach(plan.approach)
+    if plan.clearance is not None:
+        said["clearance"] = plan.clearance
+    return said
+
+
+def _run(arm: Arm, run: PathRun) -> dict[str, Any]:
+    return {
+        "s_mm": [run.begin, run.end],
+        "branches": [{"s_mm": s, "name": name} for s, name in run.names],
+        "start_joints": units.joints_out(arm, run.start_joints).tolist(),
+        "end_joints": units.joints_out(arm, run.end_joints).tolist(),
+    }
+
+
+def _reconfiguration(arm: Arm, one: Reconfiguration) -> dict[str, Any]:
+    return {
+        "s_mm": one.s,
+        "why": one.why,
+        "joint": one.joint,
+        "value": None if one.value is None or one.index is None else _shown(arm, one.index, one.value),
+        "status_beyond": one.beyond,
+    }
+
+
+def _branch(arm: Arm, branch: Branch) -> dict[str, Any]:
+    return {
+        "name": branch.name,
+        "start_joints": units.joints_out(arm, branch.start_joints).tolist(),
+        "carries_mm": branch.carries,
+        "ends_because": branch.ends_because,
     }
 
 

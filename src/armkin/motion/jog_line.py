@@ -60,7 +60,7 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
     most = max(int(min(LONGEST * abs(share) * top, np.pi * 0.9 if turns else 2 * arm.reach) / abs(step)), 1)
     count, why = _carried(arm, task, q, axis, frame, step, most)
     while count:
-        target = _beside(arm, task, q, axis, frame, step * count)
+        target = _shifted_target(arm, task, q, axis, frame, step * count)
         [line] = targets_out(task.labels, target[None])
         try:
             speed = {"speed": 100 * abs(share)} if turns else {"tool_speed": abs(share) * TOP}
@@ -79,7 +79,7 @@ def _carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step: floa
     stuck = bool(arm.keep_out) and float(clearance(arm, q).mm) < 0
     before, leaving = np.inf, False  # an arm that stands near a singularity may leave it
     for k in range(1, most + 1):
-        goal = _beside(arm, task, q, axis, frame, step * k)[None]
+        goal = _shifted_target(arm, task, q, axis, frame, step * k)[None]
         r, J = scaled(arm, task, here[None], goal)
         move = np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0]
         lost = np.linalg.norm(J[0] @ move - r[0]) > 0.1 * np.linalg.norm(r[0])  # no joint speed leads there
@@ -111,19 +111,19 @@ def _why_not_there(arm: Arm, q: Array, stuck: bool) -> str:
     return ""
 
 
-def _beside(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, by: float) -> Array:
-    """The target that is `by` [mm | rad] away along an axis from where joint values (n,) are."""
+def _shifted_target(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, distance: float) -> Array:
+    """The target that is `distance` [mm | rad] away along an axis from where joint values (n,) are."""
     T = fk(arm, q)
     target = np.array(targets_of(task, T[None], q[None])[0])
     if axis[-1] not in "xyz":
-        target[task.labels.index(axis)] += by
+        target[task.labels.index(axis)] += distance
         return target
     unit: Array = np.eye(3)["xyz".index(axis[-1])]
     if axis[0] == "r":
-        turn = _about(unit, by)
+        turn = _about(unit, distance)
         target[:3, :3] = T[:3, :3] @ turn if frame == "tool" else turn @ T[:3, :3]
         return target
-    way = by * (T[:3, :3] @ unit if frame == "tool" else unit)
+    way = distance * (T[:3, :3] @ unit if frame == "tool" else unit)
     place = target[:3, 3] if task.orientation == "full" else target[: task.position]
     place += way[: len(place)]
     return target

@@ -82,16 +82,16 @@ def straight(
 
 
 def approach(
-    arm: Arm, here: Array, start: Array, speed: float = 1.0, share: float = 1.0, jerk: Array | None = None
+    arm: Arm, standing: Array, start: Array, speed: float = 1.0, share: float = 1.0, jerk: Array | None = None
 ) -> Trajectory | None:
     """The joint move from where an arm stands, (n,), to where a plan starts; None if it stands there.
 
     An arm whose motors have the same counts in both stands there. speed, share, jerk: as in `straight`.
     """
-    near = np.abs(start - here).max() <= 1e-12
-    if near or (arm.motors and not undriven(arm) and np.array_equal(pulses(arm, start), pulses(arm, here))):
+    near = np.abs(start - standing).max() <= 1e-12
+    if near or (arm.motors and not undriven(arm) and np.array_equal(pulses(arm, start), pulses(arm, standing))):
         return None
-    return Trajectory(arm, here, (straight(arm, here, start, speed, share, jerk),))
+    return Trajectory(arm, standing, (straight(arm, standing, start, speed, share, jerk),))
 
 
 def check_jerk(arm: Arm, jerk: ArrayLike | None) -> Array | None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def _joint(walk: Walk, move: Move, value: Any) -> None:
     walk.close()
-    walk.others, walk.refused = (), None
+    walk.untried_postures, walk.refused = (), None
     goal = path_numbers.joints(walk.arm, walk.q, value)
     walk.append_joint_move(goal, move)
     walk.clear(None)
@@ -29,7 +29,7 @@ def _joint(walk: Walk, move: Move, value: Any) -> None:
 def _point(walk: Walk, move: Move, value: list[float]) -> None:
     goal = walk.target(value)
     walk.close()
-    walk.leads, walk.others, walk.refused = move, (), None
+    walk.leads, walk.untried_postures, walk.refused = move, (), None
     walk.clear(goal, move.branch)
 
 
@@ -55,10 +55,13 @@ def _gather(walk: Walk, move: Move, targets: list[list[float]]) -> None:
     """Put targets to the points that become one smooth curve."""
     if walk.dense is None:
         walk.dense = Polyline(walk.task, walk.spot)
-        walk.group = (walk.group if walk.goal is not None or walk.pieces else walk.at)[0], walk.at[1]
+        walk.group = (
+            (walk.group if walk.goal is not None or walk.pieces else walk.current_moves)[0],
+            walk.current_moves[1],
+        )
     speed = None if move.speed is None else move.speed / 100 * walk.pace.speed
     walk.dense.add(targets, speed, move.tool_speed)
-    walk.group = walk.group[0], walk.at[1]
+    walk.group = walk.group[0], walk.current_moves[1]
 
 
 def _arc(walk: Walk, move: Move, value: Any) -> None:

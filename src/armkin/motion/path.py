@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.path_planner import HOLD, planned
+from armkin.motion.path_planner import HOLD, PathRequest, planned
 from armkin.motion.path_redundant import path_redundant
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.tool_path import path_numbers
@@ -79,13 +79,11 @@ def path(
     >>> armkin.fk(arm, plan.q(plan.duration))[:3, 3].round(6).tolist()
     [390.0, -80.0, 300.0]
     """
-    options: dict[str, Any] = {
-        "start": start, "near": near, "branch": branch, "task": task, "tolerance": tolerance, "corners": corners,
-        "blend": blend, "speed": speed, "accel": accel, "tool_speed": tool_speed, "jerk": jerk, "hold": hold,
-        "split": split, "samples": samples,
-    }  # fmt: skip
+    asked = PathRequest(
+        start, near, branch, task, tolerance, corners, blend, speed, accel, tool_speed, jerk, hold, split, samples
+    )
     check_rates(arm)
     file = path_numbers.moves(arm, moves, task)
     if (spare := redundancy(arm, task or file.task)) is not None and path_numbers.of_tool(file):
-        return path_redundant(arm, file, spare, **options)
-    return planned(arm, file, **options)
+        return path_redundant(arm, file, spare, asked)
+    return planned(arm, file, asked)

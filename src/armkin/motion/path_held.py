@@ -7,14 +7,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.model.lock import lock, unlock
 from armkin.motion.joint_moves import approach, check_jerk, check_rates, straight
-from armkin.motion.path_planner import planned
+from armkin.motion.path_planner import PathRequest, planned
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.proved_free import checked
 from armkin.motion.timing.cubic_knots import Knots
@@ -28,40 +27,34 @@ if TYPE_CHECKING:
 
 
 def path_held(
-    arm: Arm,
-    moves: Any,
-    held: Mapping[str, float],
-    *,
-    start: ArrayLike | None = None,
-    near: ArrayLike | None = None,
-    jerk: Array | None = None,
-    begin: Array | None = None,
-    **options: Any,
+    arm: Arm, moves: Any, held: Mapping[str, float], asked: PathRequest, begin: Array | None = None
 ) -> PathPlan:
     """`armkin.path` with joints held: joint name -> value [rad | mm]. The plan is one of the whole arm.
 
-    start, near, jerk: (n,) of all joints, options as in `armkin.path`. The held joints go to their values in the plan's
-    approach; begin: (n,) where the motion begins instead, with a joint move to its first posture. Raises as
+    asked: its start, near and jerk are those of all joints. The held joints go to their values in the plan's approach;
+    begin: (n,) where the motion begins instead, with a joint move to its first posture. Raises as
     `armkin.path` does, NoSolutionError also for a value outside its joint's limits.
     """
     check_rates(arm)
     free = lock(arm, held)
     kept = [k for k, name in enumerate(arm.joint_names) if name not in held]
-    here = arm.home if start is None else np.asarray(start, dtype=float)
+    here = asked.start_joints(arm)
     ready = unlock(arm, held, here[kept])
     check_limits(arm, ready[None])
-    parts: dict[str, Any] = {
-        name: np.asarray(value)[kept] for name, value in (("near", near), ("jerk", jerk)) if value is not None
-    }
+    near, jerk = (
+        None if value is None else np.broadcast_to(np.asarray(value, dtype=float), arm.n)[kept]
+        for value in (asked.near, asked.jerk)
+    )
+    of_free = replace(asked, start=here[kept], near=near, jerk=jerk)
     try:
-        plan = planned(free, path_numbers.moves(free, moves, options.get("task")), start=here[kept], **parts, **options)
+        plan = planned(free, path_numbers.moves(free, moves, asked.task), of_free)
     except NoSolutionError as error:
         if error.plan is not None:
             error.plan = _of_all(error.plan, arm, held)
         raise
     whole, begun = _of_all(plan, arm, held), unlock(arm, held, plan.motion.start)
     made = [_widened(one, arm, held) for one in plan.motion.stretches]
-    pace = plan.speed, options.get("accel", 1.0), check_jerk(arm, jerk)
+    pace = plan.speed, asked.accel, check_jerk(arm, asked.jerk)
     if begin is not None and (first := straight(arm, begin, begun, *pace)).duration > 0:
         made, begun, shift = [first, *made], begin, 1
     else:

@@ -30,18 +30,18 @@ def routes(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Array]]:
     corner = corners_wished(file, None, None)
     pace = Pace(tolerance=file.tolerance or TOLERANCE)
     outline = _Outline(arm, file, pace, arm.home, PathOptions(file.task, corner, None, None, False, None))
-    outline.step, outline.found = step, []
+    outline.step, outline.targets_per_route = step, []
     outline.walked(MOVES)
-    if not outline.found:
+    if not outline.targets_per_route:
         raise UsageError("the path has no target of the tool: it says nothing of where to put an arm")
-    return outline.task, outline.found
+    return outline.task, outline.targets_per_route
 
 
 class _Outline(Walk):
     """A walk that notes the routes and plans nothing."""
 
     step: float
-    found: list[Array]
+    targets_per_route: list[Array]
 
     def _begin(self) -> None:
         start = self.file.start
@@ -58,9 +58,9 @@ class _Outline(Walk):
                 route, _ = joined(self.task, self.pieces, self.blends, frozenset(self.pauses), self.pace.tolerance)
                 even = np.linspace(0.0, route.length, max(int(np.ceil(route.length / self.step)) + 1, 3))
                 s = np.union1d(even, route.breaks)
-                self.found.append(route.targets(s))
+                self.targets_per_route.append(route.targets(s))
             else:
-                self.found.append(line(self.task, self.goal, self.goal).targets(np.zeros(1)))
+                self.targets_per_route.append(line(self.task, self.goal, self.goal).targets(np.zeros(1)))
         elif self.pieces:
             raise UsageError(
                 "this way begins where joint values leave the tool, which moves with the arm: put a point before it"

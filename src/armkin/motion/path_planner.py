@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
+from armkin.formula.arrays import Array
 from armkin.motion.branches import wrist_turn
 from armkin.motion.branches.branch_path import Pace
 from armkin.motion.joint_moves import check_jerk, check_share
@@ -25,54 +27,66 @@ TOLERANCE = 0.05  # [mm]
 HOLD = 1.5  # of max_accel, on a hold
 
 
-def planned(
-    arm: Arm,
-    file: PathFile,
-    *,
-    start: ArrayLike | None = None,
-    near: ArrayLike | None = None,
-    branch: str | None = None,
-    task: str | None = None,
-    tolerance: float | None = None,
-    corners: str | None = None,
-    blend: float | None = None,
-    speed: float = 1.0,
-    accel: float = 1.0,
-    tool_speed: float | None = None,
-    jerk: ArrayLike | None = None,
-    hold: float | None = HOLD,
-    split: bool = False,
-    samples: int | None = None,
-) -> PathPlan:
+@dataclass(frozen=True)
+class PathRequest:
+    """What `armkin.path` is asked for beside arm and moves: its docstring says what each is."""
+
+    start: ArrayLike | None = None
+    near: ArrayLike | None = None
+    branch: str | None = None
+    task: str | None = None
+    tolerance: float | None = None
+    corners: str | None = None
+    blend: float | None = None
+    speed: float = 1.0
+    accel: float = 1.0
+    tool_speed: float | None = None
+    jerk: ArrayLike | None = None
+    hold: float | None = HOLD
+    split: bool = False
+    samples: int | None = None
+
+    def start_joints(self, arm: Arm) -> Array:
+        """Where the arm stands: (n,) [rad | mm]."""
+        return arm.home if self.start is None else np.asarray(self.start, dtype=float)
+
+
+def planned(arm: Arm, file: PathFile, asked: PathRequest) -> PathPlan:
     """`armkin.path` of an arm none of whose joints is redundant, and whose rates are checked: as that says."""
     from armkin.path_file import check_robot
-    from armkin.path_file.path_keys import LEAST_TOLERANCE, LEAST_TOOL_SPEED
 
     check_robot(file, arm.name, arm.path)
-    for name, value in (("speed", speed), ("accel", accel)):
-        check_share(name, value)
-    for name, least, given in (("tool_speed", LEAST_TOOL_SPEED, tool_speed), ("tolerance", LEAST_TOLERANCE, tolerance)):
-        if given is not None and not least <= given < np.inf:
-            raise UsageError(
-                f"{name} {given:g} is not possible; it is at least {least:g} mm{'/s' * (name == 'tool_speed')}"
-            )
-    pace = Pace(
-        (file.speed or 100.0) / 100 * speed,
-        accel,
-        tool_speed if tool_speed is not None else file.tool_speed,
-        check_jerk(arm, jerk),
-        hold,
-        tolerance or file.tolerance or TOLERANCE,
-        np.deg2rad(file.turn_tolerance or 0.0),
-    )
+    pace = _pace(arm, file, asked)
     if pace.turn:
         wrist_turn.check(arm)
-    here = arm.home if start is None else np.asarray(start, dtype=float)
+    here = asked.start_joints(arm)
     if arm.motors and not undriven(arm):
         here = legal_with_same_pulses(arm, here)
-    near = None if near is None else np.asarray(near, dtype=float)
-    wish = corners_wished(file, corners, blend)
-    return checked(Walk(arm, file, pace, here, PathOptions(task, wish, near, branch, split, samples)).walked(MOVES))
+    near = None if asked.near is None else np.asarray(asked.near, dtype=float)
+    wish = corners_wished(file, asked.corners, asked.blend)
+    options = PathOptions(asked.task, wish, near, asked.branch, asked.split, asked.samples)
+    return checked(Walk(arm, file, pace, here, options).walked(MOVES))
+
+
+def _pace(arm: Arm, file: PathFile, asked: PathRequest) -> Pace:
+    """How fast and how exactly a path is moved along. Raises UsageError for what is out of range."""
+    from armkin.path_file.path_keys import LEAST_TOLERANCE, LEAST_TOOL_SPEED
+
+    check_share("speed", asked.speed)
+    check_share("accel", asked.accel)
+    for name, least, unit in (("tool_speed", LEAST_TOOL_SPEED, "mm/s"), ("tolerance", LEAST_TOLERANCE, "mm")):
+        given = getattr(asked, name)
+        if given is not None and not least <= given < np.inf:
+            raise UsageError(f"{name} {given:g} is not possible; it is at least {least:g} {unit}")
+    return Pace(
+        (file.speed or 100.0) / 100 * asked.speed,
+        asked.accel,
+        asked.tool_speed if asked.tool_speed is not None else file.tool_speed,
+        check_jerk(arm, asked.jerk),
+        asked.hold,
+        asked.tolerance or file.tolerance or TOLERANCE,
+        np.deg2rad(file.turn_tolerance or 0.0),
+    )
 
 
 def corners_wished(file: PathFile, corners: str | None, blend: float | None) -> float | Literal["default"] | None:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
@@ -24,6 +24,7 @@ from armkin.motion.tool_path import path_numbers
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
+    from armkin.motion.path_planner import PathRequest
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import Move, PathFile
 
@@ -36,34 +37,24 @@ MOST = 6  # values that are planned for
 SAME = 1e-9  # [rad] values of joint moves that are one
 
 
-def path_redundant(
-    arm: Arm,
-    file: PathFile,
-    spare: Redundancy,
-    *,
-    start: ArrayLike | None = None,
-    near: ArrayLike | None = None,
-    task: str | None = None,
-    **options: Any,
-) -> PathPlan:
+def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, asked: PathRequest) -> PathPlan:
     """`armkin.path` of an arm with a redundant joint, whose plan says in `held` where that is held.
 
     The file's joint moves say where; else it is where `near` has it, by default where it stands when the path begins,
     if that carries the path, or the nearest value that does. Raises as `armkin.path` does, UsageError also for joint
     moves that want the joint at different values.
     """
-    name, here = arm.joint_names[spare.joint], arm.home if start is None else np.asarray(start, dtype=float)
+    name, here = arm.joint_names[spare.joint], asked.start_joints(arm)
     begin = _begin(arm, file, here)
     said = _said(arm, file, spare.joint, here)
     stands = here if begin is None else begin
-    close = stands if near is None else np.asarray(near, dtype=float)
+    close = stands if asked.near is None else np.asarray(asked.near, dtype=float)
     others = _of_others(arm, file, spare.joint)
     refused: NoSolutionError | None = None
-    for value in (
-        _values(arm, file, task, float(close[spare.joint]), float(stands[spare.joint])) if said is None else [said]
-    ):
+    near = float(close[spare.joint]), float(stands[spare.joint])
+    for value in _values(arm, file, asked.task, *near) if said is None else [said]:
         try:
-            return path_held(arm, others, {name: value}, start=start, near=near, task=task, begin=begin, **options)
+            return path_held(arm, others, {name: value}, asked, begin)
         except NoSolutionError as error:
             refused = refused or error
     assert refused is not None

@@ -21,7 +21,7 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, outside_text
 from armkin.motion import branch_report
-from armkin.motion.branches.branch_path import Pace, carry, stands, stretches
+from armkin.motion.branches.branch_path import Pace, carry, starts_at, stretches
 from armkin.motion.branches.route_grid import Missed, deviation, missed
 from armkin.motion.branches.wrist_window import detoured
 from armkin.motion.joint_moves import approach, straight
@@ -63,17 +63,17 @@ class Walk:
     _spot: Spot | None = None
     opening = False  # whether the path's first posture is not chosen yet
     leads: Move | None = None  # the move of the file that leads to a group's first point
-    others: tuple[Array, ...] = ()  # postures of the last target that were not tried
+    untried_postures: tuple[Array, ...] = ()  # postures of the last target that were not tried
     refused: NoSolutionError | None = None  # why the first of them does not do
-    before: tuple[dict[str, Any], dict[str, Any]] = ({}, {})  # the walk and its plan, before it was reached
-    at = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
+    saved_state: tuple[dict[str, Any], dict[str, Any]] = ({}, {})  # the walk and its plan, before it was reached
+    current_moves = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
 
-    def __init__(self, arm: Arm, file: PathFile, pace: Pace, here: Array, options: PathOptions) -> None:
+    def __init__(self, arm: Arm, file: PathFile, pace: Pace, start: Array, options: PathOptions) -> None:
         self.arm, self.file, self.pace, self.options = arm, file, pace, options
         with _of_key(file, "task"):
             self.plan = PathPlan(arm, _task(arm, file, options.task or file.task), pace.tolerance, pace.speed)
-        self.q = here  # where the joints are when all so far is done
-        self.made: list[Stretch] = []
+        self.q = start  # where the joints are when all so far is done
+        self.stretches: list[Stretch] = []
         self.markers: list[Marker] = []  # what happens between stretches
         self.clear(None)
 
@@ -93,7 +93,7 @@ class Walk:
 
     def clear(self, goal: Spot | None, branch: str | None = None) -> None:
         """Begin a group: at a target whose branch is free, or where the joints are."""
-        self.goal, self.goal_branch, self.group = goal, branch, self.at
+        self.goal, self.goal_branch, self.group = goal, branch, self.current_moves
         self._spot = goal
         self.pieces: list[Piece] = []
         self.blends: list[float | None] = []
@@ -112,11 +112,11 @@ class Walk:
                 number += 1
             except NoSolutionError as error:
                 self.refused = self.refused or error
-                if not self.others:
+                if not self.untried_postures:
                     raise self.refused from None
                 number = self._back()
         self.plan.approach = approach(self.arm, here, self.begun, self.pace.speed, self.pace.accel, self.pace.jerk)
-        return self.plan.finished(self.begun, self.made, self.markers)
+        return self.plan.finished(self.begun, self.stretches, self.markers)
 
     def _do(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]], number: int) -> None:
         """Do a move; behind the last one, what has gathered."""
@@ -125,7 +125,7 @@ class Walk:
                 self.close()
             return
         move = self.file.moves[number]
-        self.at = number, number
+        self.current_moves = number, number
         with _of_moves(self):
             kinds[move.kind](self, move, getattr(move, move.kind))
 
@@ -134,11 +134,11 @@ class Walk:
         if self.goal is None or self.pieces:
             self.close()
             return
-        found = self.others or _postures(self, self.goal, self.goal_branch)
-        self.goal_branch, self.others = None, found[1:]
-        if self.others:
-            self.before = {}, {}
-            self.before = _kept(vars(self)), _kept(vars(self.plan))
+        found = self.untried_postures or _postures(self, self.goal, self.goal_branch)
+        self.goal_branch, self.untried_postures = None, found[1:]
+        if self.untried_postures:
+            self.saved_state = {}, {}
+            self.saved_state = _copied_state(vars(self)), _copied_state(vars(self.plan))
         self.append_joint_move(found[0], self.leads)
         for kind, value in self.pauses.get(0, ()):
             self.emit_event(kind, value)
@@ -146,10 +146,12 @@ class Walk:
 
     def _back(self) -> int:
         """Be again where a posture was taken, with the others left; the number of that move."""
-        others, refused, (state, plan) = self.others, self.refused, self.before
-        vars(self).update({**_kept(state), "others": others, "refused": refused, "before": self.before})
-        vars(self.plan).update(_kept(plan))
-        return self.at[0]
+        others, refused, (state, plan) = self.untried_postures, self.refused, self.saved_state
+        vars(self).update(
+            {**_copied_state(state), "untried_postures": others, "refused": refused, "saved_state": self.saved_state}
+        )
+        vars(self.plan).update(_copied_state(plan))
+        return self.current_moves[0]
 
     def _begin(self) -> None:
         """Where the path begins: where the arm stands, in a posture, or at a point, which the first moves choose."""
@@ -199,15 +201,18 @@ class Walk:
 
     def emit_event(self, kind: str, value: Any) -> None:
         if kind == "wait" and value == "enter":
-            self.markers.append(Marker(len(self.made), "pause", None))
+            self.markers.append(Marker(len(self.stretches), "pause", None))
         elif kind == "wait":
-            self.made.append(Straight(self.q, self.q, at_rest(float(value))))
+            self.stretches.append(Straight(self.q, self.q, at_rest(float(value))))
         else:
-            self.markers.append(Marker(len(self.made), kind, value))
+            self.markers.append(Marker(len(self.stretches), kind, value))
 
     def add(self, move: Move, piece: Piece) -> None:
         speed = None if move.speed is None else move.speed / 100 * self.pace.speed
-        self.group = (self.group if self.goal is not None or self.pieces else self.at)[0], self.at[1]
+        self.group = (
+            (self.group if self.goal is not None or self.pieces else self.current_moves)[0],
+            self.current_moves[1],
+        )
         self.lay_dense()
         self.pieces.append(replace(piece, speed=speed, tool_speed=move.tool_speed or piece.tool_speed))
         self.blends.append(self.corner(move))
@@ -220,10 +225,10 @@ class Walk:
 
     def close(self) -> None:
         """Plan the group of tool moves that has gathered; what is wrong with it is said of its moves."""
-        now, self.at = self.at, self.group
+        now, self.current_moves = self.current_moves, self.group
         self.lay_dense()
         self._plan_group()
-        self.at = now
+        self.current_moves = now
 
     def _plan_group(self) -> None:
         if not self.pieces:
@@ -242,7 +247,7 @@ class Walk:
         near = self.q if self.options.near is None else self.options.near
         s, runs = self._runs(route, near, free=free)
         for k, run in enumerate(runs):
-            fixed = self.q if not free and k == 0 and run.first == 0 and stands(run.chain, self.q) else None
+            fixed = self.q if not free and k == 0 and run.first == 0 and starts_at(run.chain, self.q) else None
             curves, given = _curves(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
                 self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
@@ -273,8 +278,8 @@ class Walk:
             path_ = way_of(curve)
             for kind, value in at.pop(round(float(path_.s[0]), 6), ()):
                 self.emit_event(kind, value)
-            self.plan.along(len(self.made), curve, self.plan.length)
-            self.made.append(curve)
+            self.plan.along(len(self.stretches), curve, self.plan.length)
+            self.stretches.append(curve)
             self.q = curve.end
         _measure(self.plan, route, ways_of(curves), given)
 
@@ -288,7 +293,7 @@ class Walk:
             self.begun, self.opening = goal, False
         else:
             one = straight(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
-            self.made += [one] if one.duration > 0 else []
+            self.stretches += [one] if one.duration > 0 else []
         self.q = goal
 
 
@@ -315,7 +320,7 @@ def _curves(
 
 def _measure(plan: PathPlan, route: Route, path: Knots, given: Missed) -> None:
     """Note how far a curve leaves the route, or given points, and how near it comes to a singularity."""
-    off = route.aside + deviation(plan.arm, route, path) if given is None else given[0]
+    off = route.largest_detour + deviation(plan.arm, route, path) if given is None else given[0]
     if given is not None and off > plan.deviation:
         plan.rounded_most = plan.length + given[1]
     plan.deviation = max(plan.deviation, off)
@@ -339,18 +344,18 @@ def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
     return postures
 
 
-def _no_posture(found: Solutions, goal: Spot, wanted: str | None, free: Bool | None) -> NoSolutionError:
-    """Why a target has none: it is out of reach, or of its branches (those `wanted`) none is free or within limits."""
+def _no_posture(solutions: Solutions, goal: Spot, branches: str | None, free: Bool | None) -> NoSolutionError:
+    """Why a target has none: it is out of reach, or of its `branches` none is free or within limits."""
     what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
-    if found.status == Status.UNREACHABLE:
+    if solutions.status == Status.UNREACHABLE:
         return NoSolutionError(f"{what} is out of reach: nothing was moved")
-    on = f" on branch '{wanted}'" if wanted else ""
-    if free is not None and (found.within_limits & ~free).any():
+    on = f" on branch '{branches}'" if branches else ""
+    if free is not None and (solutions.within_limits & ~free).any():
         return NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
     return NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
 
 
-def _kept(state: dict[str, Any]) -> dict[str, Any]:
+def _copied_state(state: dict[str, Any]) -> dict[str, Any]:
     """A state whose lists do not change with the original's."""
     return {key: copy(each) if isinstance(each, list | dict | Reduced) else each for key, each in state.items()}
 
@@ -382,6 +387,6 @@ def _of_moves(walk: Walk) -> Iterator[None]:
     try:
         yield
     except (UsageError, NoSolutionError) as error:
-        if not (place := walk.file.place_of(*walk.at)):
+        if not (place := walk.file.place_of(*walk.current_moves)):
             raise
-        raise error.within(place, move=walk.at[0] + 1) from None
+        raise error.within(place, move=walk.current_moves[0] + 1) from None

@@ -22,8 +22,8 @@ _STEP = 0.002  # [s] of the plan's time between grid points
 _SHORT = 0.05  # [s] of the plan's time: what is left of it is slow, and as good as straight
 
 
-def remainder(arm: Arm, stretch: Stretch, begin: float, here: Array) -> Stretch:
-    """What a stretch has left at its time `begin` [s], where the arm stands still at joint values `here` (n,).
+def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stretch:
+    """What a stretch has left at its time `begin` [s], where the arm stands still at joint values `standing` (n,).
 
     The plan's own time law, but for a run-up: its time s passes at a rate that grows from 0 to 1 as the joints'
     accelerations allow, |q'(s) u + q''(s) x| <= max_accel with x = (ds/dt)^2 and u half its slope; they allow u >= 0
@@ -31,19 +31,19 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, here: Array) -> Stretch:
     """
     left = stretch.duration - begin
     if np.array_equal(stretch.start, stretch.end):
-        if np.array_equal(pulses(arm, here), pulses(arm, stretch.end)):
+        if np.array_equal(pulses(arm, standing), pulses(arm, stretch.end)):
             return Straight(stretch.end, stretch.end, at_rest(max(left, 0.0)))  # a pause
-        return straight(arm, here, stretch.end)
+        return straight(arm, standing, stretch.end)
     if isinstance(stretch, Straight) and stretch.law.is_trapezoid:
-        share = max(1.0 - float(stretch.law.at(np.array([begin]))[0]), 1e-9)
+        share = max(1.0 - float(stretch.law.evaluate(np.array([begin]))[0]), 1e-9)
         # Whole steps make a short way another one for some joints: they keep to their own limits there.
-        fastest = straight(arm, here, stretch.end).law
+        fastest = straight(arm, standing, stretch.end).law
         top, accel = min(stretch.law.peak / share, fastest.peak), min(stretch.law.accel / share, fastest.accel)
-        return Straight(here, stretch.end, trapezoid(1.0, top, accel) if fastest.length else fastest)
+        return Straight(standing, stretch.end, trapezoid(1.0, top, accel) if fastest.length else fastest)
     if left < _SHORT:
-        return straight(arm, here, stretch.end)
+        return straight(arm, standing, stretch.end)
     s = _grid(stretch, begin)
-    path = Knots(s, stretch.at(s), stretch.at(s, 1))
+    path = Knots(s, stretch.evaluate(s), stretch.evaluate(s, 1))
     return Curve(path, _run_up(arm, path))
 
 
@@ -58,7 +58,7 @@ def _grid(stretch: Stretch, begin: float) -> Array:
 def _run_up(arm: Arm, path: Knots) -> Array:
     """(ds/dt)^2 at the grid points of a way that is parametrised by its plan's time: from 0 up to 1."""
     most = np.concatenate([arm.max_accel, motor_accel(arm)])
-    second = path.second()
+    second = path.second_derivatives()
 
     def rows(d: Array) -> Array:
         return np.concatenate([d, d @ arm.motor_gain.T], axis=-1)

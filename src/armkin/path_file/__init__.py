@@ -15,13 +15,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from armkin.errors import FileError, PathFileError
 from armkin.path_file.path_keys import Move, PathFile, Source
-from armkin.robot_file import strict_yaml
+from armkin.robot_file import catalogue, strict_yaml
 
 if TYPE_CHECKING:
     from armkin.path_file.drawing import DrawingOptions, Placing
@@ -130,8 +131,6 @@ def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:
 
 def _same(said: str, robot_file: str, folder: str) -> bool:
     """Whether a shipped robot's name, or a file's as seen from here or from the path's folder, is the robot file."""
-    from armkin.robot_file import catalogue
-
     for one in (said, os.path.join(folder, said)):
         with suppress(OSError, ValueError, FileError):
             if os.path.samefile(catalogue.locate(one), catalogue.locate(robot_file)):
@@ -149,7 +148,6 @@ def json_schema() -> dict[str, Any]:
 def _alike(name: str) -> str:
     """Path files of the same folder with such a name, as the end of a message."""
     import difflib
-    from pathlib import Path
 
     folder = Path(name).parent
     try:

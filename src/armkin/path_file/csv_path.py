@@ -15,6 +15,7 @@ _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
 # What a batch of `armkin ik` says beside the joints.
 _OF_ANSWERS = ("row", "status", "branch", "within_limits", "residual_mm", "residual_deg", "motion")
+Row = tuple[int, list[str]]  # its number in the file, its cells
 _UNITS = ("_mm", "_deg", "/mm", "/deg")
 
 
@@ -34,11 +35,7 @@ def parse(raw: bytes, name: str) -> PathFile:
     rows = _filled(text, name)
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
-    header: list[str] | None = None
-    if any(_value(cell) is None for cell in rows[0][1]):
-        kept = [i for i, cell in enumerate(rows[0][1]) if cell.strip() not in _OF_ANSWERS]
-        rows = [(number, [row[i] for i in kept if i < len(row)]) for number, row in rows]
-        header = _header(rows.pop(0)[1], name)
+    header, rows = _header_and_rows(rows, name)
     if len(rows) > MOST_POINTS:
         raise PathFileError(
             f"{name}: has more than {MOST_POINTS} rows, and a path no more: give it in parts", file=name
@@ -51,6 +48,15 @@ def parse(raw: bytes, name: str) -> PathFile:
     return PathFile.model_construct(moves=moves, corners="tolerance" if smooth else None).read_from(
         Source(name, places, rows=True)
     )
+
+
+def _header_and_rows(rows: list[Row], name: str) -> tuple[list[str] | None, list[Row]]:
+    """The columns' names, None where the first row has numbers alone, and the rows below without a batch's words."""
+    if all(_value(cell) is not None for cell in rows[0][1]):
+        return None, rows
+    kept = [i for i, cell in enumerate(rows[0][1]) if cell.strip() not in _OF_ANSWERS]
+    first, *rest = [(number, [row[i] for i in kept if i < len(row)]) for number, row in rows]
+    return _header(first[1], name), rest
 
 
 def _header(cells: list[str], name: str) -> list[str]:
@@ -67,7 +73,7 @@ def _header(cells: list[str], name: str) -> list[str]:
     return header
 
 
-def _filled(text: str, name: str) -> list[tuple[int, list[str]]]:
+def _filled(text: str, name: str) -> list[Row]:
     """Rows that are neither empty nor a comment, with their numbers: at most a header, and one too many."""
     lines = csv.reader(io.StringIO(text))
     filled = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from armkin.path_file.path_keys import EXAMPLES, KINDS, Arc, Circle, Move, Offset, PathFile, Start
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
 Place = tuple[str | int, ...]
+Words = Callable[[list[str], Any], str]  # of the keys that lead to an error, and the error
 _OWNERS: dict[str, type[BaseModel]] = {"moves": Move, "arc": Arc, "circle": Circle, "offset": Offset, "start": Start}
 _SYNONYMS = {
     "center": "centre", "lin": "line", "ptp": "joint", "joints": "joint", "circ": "arc", "mid": "via", "end": "to",
@@ -63,31 +64,48 @@ def _where(at: Place) -> str:
 
 
 def _text(at: Place, one: Any) -> str:
-    kind, context = one["type"], one.get("ctx", {})
     names = [part for part in at if isinstance(part, str)]
-    key = names[-1] if names else ""
-    if kind == "extra_forbidden":
-        owner = _OWNERS.get(names[-2], PathFile) if len(names) > 1 else PathFile
-        near = _nearest(key, list(owner.model_fields))
-        hint = f"did you mean {near}?" if near else f"the keys here are {', '.join(owner.model_fields)}"
-        return f"unknown key; {hint}"
-    if kind == "missing":
-        return "is required: a list of moves, for example - line: [390, 160, 300]" if key == "moves" else "is required"
-    if kind == "problem":
-        return str(one["msg"])
-    if kind in ("greater_than", "less_than_equal", "greater_than_equal", "less_than"):
-        sign = {"greater_than": "above", "greater_than_equal": "at least", "less_than_equal": "at most"}
-        bound = context.get("gt", context.get("ge", context.get("le", context.get("lt"))))
-        return f"must be {sign.get(kind, 'below')} {bound:g}, not {shown(one['input'])}"
-    if kind in ("too_short", "too_long"):
-        least = context.get("min_length")
-        bound = f"at least {least}" if least is not None else f"at most {context['max_length']}"
-        count = context["actual_length"]
-        return f"has {count} item{'s' * (count != 1)}, and must have {bound}"
-    if kind == "finite_number":
-        return "must be a finite number"
+    words = _WORDS.get(one["type"])
+    if words is not None:
+        return words(names, one)
     example = next((EXAMPLES[name] for name in reversed(names) if name in EXAMPLES), None)
     return f"is {shown(one['input'])}" + (f"; for example {example}" if example else f": {one['msg'].lower()}")
+
+
+def _unknown(names: list[str], one: Any) -> str:
+    owner = _OWNERS.get(names[-2], PathFile) if len(names) > 1 else PathFile
+    near = _nearest(names[-1] if names else "", list(owner.model_fields))
+    hint = f"did you mean {near}?" if near else f"the keys here are {', '.join(owner.model_fields)}"
+    return f"unknown key; {hint}"
+
+
+def _missing(names: list[str], one: Any) -> str:
+    example = ": a list of moves, for example - line: [390, 160, 300]" if names[-1:] == ["moves"] else ""
+    return f"is required{example}"
+
+
+def _bound(sign: str, key: str) -> Words:
+    return lambda names, one: f"must be {sign} {one['ctx'][key]:g}, not {shown(one['input'])}"
+
+
+def _length(names: list[str], one: Any) -> str:
+    context, count = one["ctx"], one["ctx"]["actual_length"]
+    bound = f"at least {context['min_length']}" if "min_length" in context else f"at most {context['max_length']}"
+    return f"has {count} item{'s' * (count != 1)}, and must have {bound}"
+
+
+_WORDS: dict[str, Words] = {  # pydantic's kind of error -> what is said of it
+    "extra_forbidden": _unknown,
+    "missing": _missing,
+    "problem": lambda names, one: str(one["msg"]),
+    "greater_than": _bound("above", "gt"),
+    "greater_than_equal": _bound("at least", "ge"),
+    "less_than_equal": _bound("at most", "le"),
+    "less_than": _bound("below", "lt"),
+    "too_short": _length,
+    "too_long": _length,
+    "finite_number": lambda names, one: "must be a finite number",
+}
 
 
 def _nearest(word: str, choices: list[str]) -> str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
@@ -129,11 +129,18 @@ def _frame(root: _Element) -> Matrix:
         raise ShapeError("viewBox needs x y width height, the last two above 0")
     if not box:
         return _MM, 0.0, 0.0, -_MM, 0.0, (size[1] or 0.0) * _MM
-    scales = [None if s is None else s / b for s, b in zip(size, box[2:], strict=True)]
-    sx, sy = scales[0] or scales[1] or 1.0, scales[1] or scales[0] or 1.0
-    if root.attributes.get("preserveAspectRatio", "").split()[:1] != ["none"]:
-        sx = sy = max(sx, sy) if "slice" in root.attributes.get("preserveAspectRatio", "") else min(sx, sy)
+    sx, sy = _scales(size, box[2:], root.attributes.get("preserveAspectRatio", ""))
     return sx * _MM, 0.0, 0.0, -sy * _MM, -box[0] * sx * _MM, (box[1] + box[3]) * sy * _MM
+
+
+def _scales(size: Sequence[float | None], box: Sequence[float], ratio: str) -> tuple[float, float]:
+    """The drawing's length of a unit of the viewBox along x and y; ratio: what preserveAspectRatio says."""
+    across, down = (None if s is None else s / b for s, b in zip(size, box, strict=True))
+    sx, sy = across or down or 1.0, down or across or 1.0
+    if ratio.split()[:1] == ["none"]:
+        return sx, sy
+    both = max(sx, sy) if "slice" in ratio else min(sx, sy)
+    return both, both
 
 
 @dataclass

@@ -279,32 +279,41 @@ def _values(d: str, at: int, command: str) -> tuple[list[float], int]:
 def _command(pen: _Outline, command: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point] | None:
     """Draw one command; returns what a smooth one after it mirrors."""
     kind, (x, y) = command.upper(), pen.at
-    if command.islower() and kind != "A":
-        shift = {"H": (x,), "V": (y,)}.get(kind, (x, y))
-        v = [value + shift[k % len(shift)] for k, value in enumerate(v)]
-    elif command == "a":
-        v = [*v[:5], v[5] + x, v[6] + y]
+    v = _absolute(command, v, pen.at)
+    if kind in "CSQT":
+        return _curve(pen, kind, v, bent)
     if kind == "M":
         pen.move((v[0], v[1]))
-    elif kind in "LHV":
-        pen.line((v[0], v[1]) if kind == "L" else (v[0], y) if kind == "H" else (x, v[0]))
     elif kind == "A":
         _arc(pen, v)
     else:
-        curve = "C" if kind in "CS" else "Q"
-        first = (v[0], v[1])
-        if kind in "ST":
-            before = bent[1] if bent is not None and bent[0] == curve else (x, y)
-            first = (2 * x - before[0], 2 * y - before[1])
-        end = (v[-2], v[-1])
-        if curve == "C":
-            second = (v[-4], v[-3])
-            pen.bezier(first, second, end)
-            return "C", second
-        a, b = ((p[0] + 2 * (first[0] - p[0]) / 3, p[1] + 2 * (first[1] - p[1]) / 3) for p in ((x, y), end))
-        pen.bezier(a, b, end)
-        return "Q", first
+        pen.line({"H": (v[0], y), "V": (x, v[0])}.get(kind) or (v[0], v[1]))
     return None
+
+
+def _absolute(command: str, v: list[float], at: Point) -> list[float]:
+    """A command's numbers from the drawing's zero: small letters count from where the pen is."""
+    if command.isupper():
+        return v
+    if command == "a":
+        return [*v[:5], v[5] + at[0], v[6] + at[1]]
+    shift = {"h": at[:1], "v": at[1:]}.get(command, at)
+    return [value + shift[k % len(shift)] for k, value in enumerate(v)]
+
+
+def _curve(pen: _Outline, kind: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point]:
+    """A cubic (C, S) or quadratic (Q, T) curve; S and T mirror the last control point of a curve before, `bent`."""
+    curve, at, first, end = "C" if kind in "CS" else "Q", pen.at, (v[0], v[1]), (v[-2], v[-1])
+    if kind in "ST":
+        before = bent[1] if bent is not None and bent[0] == curve else at
+        first = (2 * at[0] - before[0], 2 * at[1] - before[1])
+    if curve == "C":
+        second = (v[-4], v[-3])
+        pen.bezier(first, second, end)
+        return "C", second
+    a, b = ((p[0] + 2 * (first[0] - p[0]) / 3, p[1] + 2 * (first[1] - p[1]) / 3) for p in (at, end))
+    pen.bezier(a, b, end)
+    return "Q", first
 
 
 def _arc(pen: _Outline, v: list[float]) -> None:

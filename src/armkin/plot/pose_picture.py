@@ -57,7 +57,7 @@ def plot_poses(
     shown = poses if names is not None else poses[_spread(len(poses))]
     bones = [skeleton(arm, pose) for pose in shown]
     legal: list[bool] = np.logical_not(outside(arm, shown).any(axis=1)).tolist()
-    hit = _hit(arm, shown)
+    hit = _hit_texts(arm, shown)
     legend = ["start", "end"] if names is None else _legend(names, legal, hit)
     with picture(out, 8.0 if alone else 9.6, 5.8) as figure:
         track = None if alone or names is not None else fk(arm, _way(poses))[:, :3, 3]
@@ -125,7 +125,7 @@ def _legend(names: Sequence[str], legal: Sequence[bool], hit: Sequence[str]) -> 
     return ["\n".join([name, *wrap(what, _WIDE)]) for name, what in zip(legend, hit, strict=True)]
 
 
-def _hit(arm: Arm, poses: Array) -> list[str]:
+def _hit_texts(arm: Arm, poses: Array) -> list[str]:
     """What each pose hits, in words: nothing where there are no keep-outs."""
     return [_briefly(found) for _, found in hits(arm, poses)] if arm.keep_out else [""] * len(poses)
 

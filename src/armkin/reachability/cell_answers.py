@@ -26,6 +26,7 @@ from armkin.inverse.solve import ik
 from armkin.model.limits import SLACK
 from armkin.motors import joints_per_pulse
 from armkin.reachability.cells import STRAIGHT, Grid
+from armkin.reachability.measures import measure
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -339,8 +340,6 @@ _ONES = np.array([bin(i).count("1") for i in range(256)], dtype=np.int64)
 
 def _manipulability(arm: Arm, q: Array) -> Array:
     """See `armkin.reachability.measures`."""
-    from armkin.reachability.measures import measure
-
     return measure(arm, "manipulability")(q) if len(q) else np.zeros(0)
 
 

@@ -16,6 +16,7 @@ from armkin.keep_out.body_pairs import guard
 from armkin.keep_out.clearance import clear
 from armkin.model.rotation import rotation_about
 from armkin.model.units import DEGREE
+from armkin.robot_file.scene_file import read
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -40,8 +41,6 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
     own = len(arm.keep_out) - arm.of_scene
     mine, there, clearance, sha256 = arm.keep_out[:own], list(arm.keep_out[own:]), arm.clearance, arm.scene_sha256
     if scene is not None:
-        from armkin.robot_file.scene_file import read
-
         more = read(os.fspath(scene))
         there, clearance, sha256 = [*there, *more.keep_out], max(clearance, more.clearance), more.sha256
     if not there:

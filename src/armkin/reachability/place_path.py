@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armkin import path_file
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.reachability.place_arm import Around, standing
@@ -38,12 +39,9 @@ def path_of(given: Any) -> PathFile | None:
         name = os.fspath(given)
         if Path(name).suffix.lower() not in (".yaml", ".yml"):
             raise UsageError(f"{name}: a path to place an arm for is a .yaml file; targets are given as an array")
-        from armkin import path_file
 
         return path_file.read(name)
     if isinstance(given, Mapping):
-        from armkin import path_file
-
         return path_file.validated(dict(given))
     return given if hasattr(given, "moves") else None
 

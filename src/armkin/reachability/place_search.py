@@ -190,12 +190,9 @@ def each(
     asked = [_question(arm, some, file, settings, scene) for arm, some, file in zip(arms, targets, paths, strict=True)]
     asked = [one._replace(solve=solve) for one in asked]
     grids = [_axes(one, settings["area"], settings["step"]) for one in asked]
-    work_list: list[Chunk] = []
-    for i, (one, (axes, _)) in enumerate(zip(asked, grids, strict=True)):
-        at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        work_list += [Chunk(len(work_list) + k, i, part) for k, part in enumerate(_blocks(one, at))]
-    counts: dict[int, NDArray[np.int64]] = {}
+    work_list = _chunks(asked, [axes for axes, _ in grids])
     parts, done, total = _parts(asked, settings, out), 0, sum(len(chunk.at) for chunk in work_list)
+    counts: dict[int, NDArray[np.int64]] = {}
     with kept_chunks.holding(parts, len(work_list)):
         for number, columns in kept_chunks.tables(engine, work, asked, work_list, parts):
             counts[number] = np.asarray(columns["reached"])
@@ -203,19 +200,38 @@ def each(
             if progress is not None:
                 progress(done, total)
     found = []
-    for i, (one, (axes, inner)) in enumerate(zip(asked, grids, strict=True)):
-        mine = [counts[chunk.number] for chunk in work_list if chunk.which == i]
-        every = np.concatenate(mine).reshape(len(axes[0]), len(axes[1]), one.yaws)
-        margin, reached = _margins(every == len(one.targets), settings["step"])[inner], every[inner]
-        x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(one.yaws) * settings["yaw"]
-        room = _rooms(one, x, y, yaws)
-        best = _best(room, reached, margin)
-        where, none = positions_of(one.task, one.targets), np.zeros((0, one.arm.n))
-        place = Place(one.arm, x, y, yaws, one.z, reached, margin, len(one.targets), best, where, none)
-        file = paths[i]
-        place = place if file is None else _planned(one, place, file, room)
-        found.append(_with_postures(one, place))
+    for i, (one, grid, file) in enumerate(zip(asked, grids, paths, strict=True)):
+        mine = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.which == i])
+        found.append(_result(one, *grid, mine, settings, file))
     return found
+
+
+def _chunks(questions: Sequence[Question], grids: Sequence[tuple[Array, Array]]) -> list[Chunk]:
+    """All positions of all arms, some at a time."""
+    made: list[Chunk] = []
+    for i, (question, axes) in enumerate(zip(questions, grids, strict=True)):
+        at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        made += [Chunk(len(made) + k, i, part) for k, part in enumerate(_blocks(question, at))]
+    return made
+
+
+def _result(
+    question: Question,
+    axes: tuple[Array, Array],
+    inner: tuple[slice, slice],
+    counts: NDArray[np.int64],
+    settings: dict[str, Any],
+    file: PathFile | None,
+) -> Place:
+    """The result of one arm; counts: (places,) targets reached from each of the grid, `inner` of it in the area."""
+    every = counts.reshape(len(axes[0]), len(axes[1]), question.yaws)
+    margin, reached = _margins(every == len(question.targets), settings["step"])[inner], every[inner]
+    x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(question.yaws) * settings["yaw"]
+    room = _rooms(question, x, y, yaws)
+    best = _best(room, reached, margin)
+    where, none = positions_of(question.task, question.targets), np.zeros((0, question.arm.n))
+    place = Place(question.arm, x, y, yaws, question.z, reached, margin, len(question.targets), best, where, none)
+    return _with_postures(question, place if file is None else _planned(question, place, file, room))
 
 
 def _with_postures(question: Question, place: Place) -> Place:

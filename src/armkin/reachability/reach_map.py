@@ -15,6 +15,7 @@ from armkin import __version__
 from armkin.columns import npz
 from armkin.columns.finished_chunks import Parts
 from armkin.columns.formats import format_of
+from armkin.columns.parquet import require
 from armkin.columns.table import Table
 from armkin.engines.ordered_chunks import Engine
 from armkin.errors import UsageError
@@ -199,8 +200,6 @@ class _Run:
             end = ending(out, "a map is", (".npz", ".parquet", ".csv"))
             check(out)
             if end == ".parquet":
-                from armkin.columns.parquet import require
-
                 require()
             self.parts = Parts(out, _asked(question))
 

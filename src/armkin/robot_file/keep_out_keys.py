@@ -4,7 +4,7 @@ An entry has one of the keys of `SHAPES`; the word ``self`` is an entry, too. Di
 `armkin.keep_out`'s.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
@@ -148,10 +148,14 @@ def _box(box: Box) -> Iterator[tuple[Path, str]]:
     elif corners and (box.min is None or box.max is None):
         yield (), f"has no {'min' if box.min is None else 'max'}; a box has both corners"
     elif box.min is not None and box.max is not None:
-        for axis, low, high in zip("xyz", box.min, box.max, strict=True):
-            if low >= high:
-                if low == high:
-                    yield (), f"has no thickness: its {axis} goes from {low:g} to {high:g}"
-                    continue
-                inside_out = f"is inside out: its {axis} goes from {low:g} to {high:g}"
-                yield (), f"{inside_out}; write {high:g} into min and {low:g} into max"
+        yield from (((), text) for text in _thickness(box.min, box.max))
+
+
+def _thickness(low_corner: Sequence[float], high_corner: Sequence[float]) -> Iterator[str]:
+    """What is wrong along each axis with a box of these corners."""
+    for axis, low, high in zip("xyz", low_corner, high_corner, strict=True):
+        if low == high:
+            yield f"has no thickness: its {axis} goes from {low:g} to {high:g}"
+        elif low > high:
+            inside_out = f"is inside out: its {axis} goes from {low:g} to {high:g}"
+            yield f"{inside_out}; write {high:g} into min and {low:g} into max"

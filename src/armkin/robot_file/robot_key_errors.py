@@ -119,9 +119,7 @@ _SYNONYMS: dict[str, str] = {
 
 def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
     """pydantic's error list (``ValidationError.errors()``) as paths and texts."""
-    # a misspelt key is also a missing one: say it once
-    unknown = [error["loc"] for error in errors if error["type"] == "extra_forbidden"]
-    suggested = {(*loc[:-1], key) for loc in unknown if (key := _suggestion(loc)) is not None}
+    suggested = _suggested(errors)
     wrong_lengths: set[Path] = set()
     for error in errors:
         path: Path = tuple(part for part in error["loc"] if part != "[key]")
@@ -137,6 +135,12 @@ def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
                 yield path[:-1], f"is too short; write {_example(path[:-1])}"
         elif error["type"] != "missing" or path not in suggested:
             yield path, _text(error)
+
+
+def _suggested(errors: list[Any]) -> set[Path]:
+    """Keys that are meant by misspelt ones, and missing for that alone: it is said once."""
+    unknown = [error["loc"] for error in errors if error["type"] == "extra_forbidden"]
+    return {(*loc[:-1], key) for loc in unknown if (key := _suggestion(loc)) is not None}
 
 
 def _text(error: Any) -> str:

@@ -17,6 +17,7 @@ from armkin.teach.tabs import Action, Fields, Tab, Tabs
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.teach.board_actions import BoardActions
+    from armkin.teach.pose_answers import Question
     from armkin.teach.quick_ik import QuickIk
 
 
@@ -36,7 +37,9 @@ class Actions:
         self._solving = threading.Lock()  # one question at a time: two cores are not many
         self._shown: dict[str, Any] = {}
         self._quick: QuickIk | None = None
-        self.program_actions = ProgramActions(arm, self.stands, lambda state: self.tabs.tell("program", state))
+        self.program_actions = ProgramActions(
+            arm, self.standing_pulses, lambda state: self.tabs.publish("program", state)
+        )
         # by name; whoever holds the key may stop the arm
         self.for_everyone: dict[str, Callable[[], dict[str, Any]]] = {
             "open": self._open,
@@ -49,7 +52,7 @@ class Actions:
             from armkin.teach.board_actions import BoardActions
             from armkin.teach.board_thread import BoardThread
 
-            thread = BoardThread(arm, port, baud, lambda state: self.tabs.tell("board", state))
+            thread = BoardThread(arm, port, baud, lambda state: self.tabs.publish("board", state))
             self.board = BoardActions(thread, self.program_actions.program.plan)
             self.for_control |= self.board.actions()
 
@@ -86,7 +89,7 @@ class Actions:
         return {}
 
     def _take(self, tab: Tab) -> dict[str, Any]:
-        self.tabs.take(tab)
+        self.tabs.take_control(tab)
         if self.board is not None:
             self.board.end_follow()
         return {}
@@ -119,8 +122,27 @@ class Actions:
         `goal`: a person drags or types it: an arm that follows goes there. Any other new pose ends following: a drag
         from there would take the arm along to what nobody dragged.
         """
-        from armkin.teach.pose_answers import Question, look  # the solver: imported while the browser loads the page
+        from armkin.teach.pose_answers import look  # the solver: imported while the browser loads the page
         from armkin.teach.quick_ik import QuickIk
+
+        question = self._question(fields)
+        with self._solving:
+            self._quick = self._quick or QuickIk()
+            answer = look(self.arm, question, self._quick)
+        before, self._shown = self._shown, answer
+        self.tabs.publish("look", answer, except_tab=tab)
+        if self.board is None:
+            return answer
+        if request_checks.flag(fields, "goal"):
+            if not answer["outside"]:
+                self.board.follow_pose(tab, units.joints_in(self.arm, answer["q"]))
+        elif not before or answer["q"] != before["q"]:
+            self.board.end_follow()
+        return answer
+
+    def _question(self, fields: Fields) -> Question:
+        """What a page asks. Raises UsageError for what is no question."""
+        from armkin.teach.pose_answers import Question
 
         arm = self.arm
         q = units.joints_in(arm, request_checks.numbers(fields, "q", arm.n))
@@ -131,32 +153,19 @@ class Actions:
         if target is not None:
             count = len(target) if isinstance(target, list) and len(target) <= 6 else 6
             target = request_checks.numbers(fields, "target", count)
-        question = Question(
+        return Question(
             q,
             target,
             tuple(name for name in arm.joint_names if name in held),
             request_checks.text(fields, "branch") if fields.get("branch") is not None else "",
             request_checks.flag(fields, "best"),
             request_checks.flag(fields, "nearest"),
-            self.stands(),
+            self.standing_pulses(),
         )
-        with self._solving:
-            self._quick = self._quick or QuickIk()
-            answer = look(arm, question, self._quick)
-        before, self._shown = self._shown, answer
-        self.tabs.tell("look", answer, but=tab)
-        if self.board is None:
-            return answer
-        if request_checks.flag(fields, "goal"):
-            if not answer["outside"]:
-                self.board.shown(tab, units.joints_in(arm, answer["q"]))
-        elif not before or answer["q"] != before["q"]:
-            self.board.end_follow()
-        return answer
 
-    def stands(self) -> tuple[int, ...] | None:
+    def standing_pulses(self) -> tuple[int, ...] | None:
         """Pulses where the arm stands; None if nothing is known of it."""
-        return None if self.board is None else self.board.thread.stands()
+        return None if self.board is None else self.board.thread.standing_pulses()
 
     def _abandoned(self) -> None:
         if self.board is not None:

@@ -143,7 +143,7 @@ class BoardActions:
     def _jog_of(self, fields: Fields, percent: float) -> Job:
         """The job that jogs what is asked for."""
         if "axis" not in fields:
-            joint = request_checks.whole(fields, "joint", self.arm.n)
+            joint = request_checks.index(fields, "joint", self.arm.n)
             return lambda machine: self._jog(machine, joint, percent)
         from armkin.motion.jog_line import axes
 
@@ -186,7 +186,7 @@ class BoardActions:
     def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Let the arm follow what is dragged or typed in this page, slowly; off at every start."""
         on = request_checks.flag(fields, "on")
-        if on and self.thread.stands() is None:
+        if on and self.thread.standing_pulses() is None:
             raise LinkError("the arm's position is not known: it does not follow from there")
         self._goal = None
         self.thread.set_follower(tab.id if on else "")
@@ -197,7 +197,7 @@ class BoardActions:
         self._goal = None
         self.thread.set_follower("")
 
-    def shown(self, tab: Tab, q: Array) -> None:
+    def follow_pose(self, tab: Tab, q: Array) -> None:
         """A person has dragged or typed a pose within the limits: where the arm goes if it follows that page."""
         with self._lock:
             if self.thread.follower != tab.id:
@@ -254,7 +254,7 @@ class BoardActions:
         while not why and self._held_down():
             plan, why = jog_line(self.arm, machine.joints(), axis, frame, share)
             parts = path_run.parts(plan, machine.counts(), self.thread.board.lay)
-            with self.thread.held(lambda: not self._held_down()):
+            with self.thread.held_motion(lambda: not self._held_down()):
                 self._carry_out(plan, parts)
         if why and self._held_down():
             raise NoSolutionError(f"the jog ends: {why}")
@@ -280,12 +280,12 @@ class BoardActions:
             raise
 
     def _progress(self, done: float, total: float) -> None:
-        self.thread.done, self.thread.at = (round(done, 1), round(total, 1)), done
+        self.thread.progress, self.thread.progress_seconds = (round(done, 1), round(total, 1)), done
 
 
 def _press(fields: Fields) -> int:
     """Which press of a jog's button, counted by the page."""
-    return request_checks.whole(fields, "press", 2**31)
+    return request_checks.index(fields, "press", 2**31)
 
 
 def _prepare(machine: Backend) -> None:

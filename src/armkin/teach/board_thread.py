@@ -34,16 +34,16 @@ _TELL = 0.08  # [s] between two positions of an arm that moves: what a page can 
 
 
 class BoardThread:
-    """The thread that owns the port of an arm's board; `tell` gets its state whenever that changes."""
+    """The thread that owns the port of an arm's board; `publish` gets its state whenever that changes."""
 
-    def __init__(self, arm: Arm, port: str, baud: int | None, tell: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, arm: Arm, port: str, baud: int | None, publish: Callable[[dict[str, Any]], None]) -> None:
         """Raises UsageError if the robot file does not say what the board must know."""
-        self.arm, self.port, self.baud, self.tell = arm, port, baud, tell
+        self.arm, self.port, self.baud, self.publish = arm, port, baud, publish
         self.board = board_of(arm, rehearsal=port == SIM)
         self.link: Port | None = None
         self.machine: Backend | None = None
-        self.done = (0.0, 0.0)  # seconds of the job's motion, and of all of it
-        self.at = 0.0  # the same seconds, not rounded
+        self.progress = (0.0, 0.0)  # seconds of the job's motion, and of all of it
+        self.progress_seconds = 0.0  # the same seconds, not rounded
         self.parts: list[Trajectory] = []  # of that motion, one after another; empty where it has no plan
         self.follower = ""  # id of the page that the arm follows; empty: none
         self._lock = threading.Lock()
@@ -55,7 +55,7 @@ class BoardThread:
         self._doing = "connect"  # name of the job, "" if there is none
         self._error = ""
         self._ended_jobs = (0, "")  # how many, and the last one's name: a page may miss how a short one began
-        self._told: dict[str, Any] = {}
+        self._published: dict[str, Any] = {}
         self._told_at = 0.0
         self._telling = threading.Lock()
         self._thread = threading.Thread(target=self._run, name="board")
@@ -68,8 +68,8 @@ class BoardThread:
         with self._lock:
             if self._doing or self._stop.is_set():
                 raise RefusedError(409, f"the arm is busy ({self._doing or 'stop'}): wait for it, or STOP")
-            self._job, self._doing, self._error, self.done = (name, job), name, "", (0.0, 0.0)
-            self.parts, self.at = [], 0.0
+            self._job, self._doing, self._error, self.progress = (name, job), name, "", (0.0, 0.0)
+            self.parts, self.progress_seconds = [], 0.0
         self._wake.set()
 
     def stop(self) -> None:
@@ -81,9 +81,9 @@ class BoardThread:
         """The arm follows that page, or none; all pages are told."""
         with self._telling:
             before, self.follower = self.follower, tab
-            if tab != before and self._told:
-                self._told = {**self._told, "follows": bool(tab)}
-                self.tell(self._told)
+            if tab != before and self._published:
+                self._published = {**self._published, "follows": bool(tab)}
+                self.publish(self._published)
 
     def abandoned(self) -> None:
         """The page that held control is gone: what it has started ends."""
@@ -101,7 +101,7 @@ class BoardThread:
     @property
     def doing(self) -> str:
         """Name of the job that is carried out; empty if there is none and the pages know how the last one ended."""
-        return self._doing or str(self._told.get("doing", ""))
+        return self._doing or str(self._published.get("doing", ""))
 
     @property
     def stopping(self) -> bool:
@@ -110,9 +110,9 @@ class BoardThread:
 
     def state(self) -> dict[str, Any]:
         """JSON: what the pages are told."""
-        return self._told or self._state()
+        return self._published or self._state()
 
-    def stands(self) -> tuple[int, ...] | None:
+    def standing_pulses(self) -> tuple[int, ...] | None:
         """Pulses where the arm stands; None if that is not known."""
         found = self.state()["pulses"]
         return None if found is None else tuple(found)
@@ -163,7 +163,7 @@ class BoardThread:
         if self.machine is None:
             self.machine = self.board.connect(self.link, self._watch)
         else:
-            self.board.again()
+            self.board.begin_job()
             self.machine = self.board.machine
         if first and self.link.simulated:
             self.machine.prepare()  # a board in this process starts with the arm at home
@@ -177,7 +177,7 @@ class BoardThread:
         return self._stop.is_set() or self._let_go()
 
     @contextmanager
-    def held(self, let_go: Callable[[], bool]) -> Iterator[None]:
+    def held_motion(self, let_go: Callable[[], bool]) -> Iterator[None]:
         """A motion that a button holds: it ends on its path, as by STOP and as no error, when that is let go."""
         self._let_go = let_go
         try:
@@ -239,8 +239,8 @@ class BoardThread:
             "doing": self._doing,
             "follows": bool(self.follower),
             "ended": {"count": self._ended_jobs[0], "name": self._ended_jobs[1]},
-            "done_s": self.done[0],
-            "total_s": self.done[1],
+            "done_s": self.progress[0],
+            "total_s": self.progress[1],
             "position": "unknown" if machine is None else machine.position(),
             "pulses": None,
             "joints": None,
@@ -256,7 +256,7 @@ class BoardThread:
 
     def _commanded(self) -> list[float] | None:
         """Where the plan has the arm now [deg | mm]; None while no planned motion is under way."""
-        left = self.at
+        left = self.progress_seconds
         for part in self.parts if self._doing else ():
             if left <= part.duration or part is self.parts[-1]:
                 return [float(x) for x in units.joints_out(self.arm, part.q(min(left, part.duration)))]
@@ -266,6 +266,6 @@ class BoardThread:
     def _publish(self) -> None:
         with self._telling:
             state = self._state()
-            if state != self._told:
-                self._told, self._told_at = state, time.monotonic()
-                self.tell(state)
+            if state != self._published:
+                self._published, self._told_at = state, time.monotonic()
+                self.publish(state)

@@ -113,9 +113,9 @@ def _polygons(mesh: Any) -> Iterator[Array]:
         for group in mesh.findall(kind):
             inputs = group.findall("input")
             width = 1 + max(int(one.get("offset", 0)) for one in inputs)
-            [vertex] = [one for one in inputs if one.get("semantic") == "VERTEX"]
+            vertex = _input(inputs, "VERTEX")
             owner = vertices[vertex.get("source", "").removeprefix("#")]
-            [place] = [one for one in owner.findall("input") if one.get("semantic") == "POSITION"]
+            place = _input(owner.findall("input"), "POSITION")
             points = sources[place.get("source", "").removeprefix("#")][:, :3]
             lists = [np.array((one.text or "").split(), dtype=np.int64) for one in group.findall("p")]
             corners = [one.reshape(-1, width)[:, int(vertex.get("offset", 0))] for one in lists]
@@ -123,6 +123,12 @@ def _polygons(mesh: Any) -> Iterator[Array]:
                 if len(one) and (one.min() < 0 or one.max() >= len(points)):
                     raise ValueError("a triangle names a vertex that is not there")
                 yield points[one]
+
+
+def _input(inputs: list[Any], semantic: str) -> Any:
+    """The only one of inputs that means this."""
+    [found] = [one for one in inputs if one.get("semantic") == semantic]
+    return found
 
 
 def _sources(mesh: Any) -> Iterator[tuple[str, Array]]:

@@ -12,8 +12,8 @@ KEY, TAB = "X-Armkin-Key", "X-Armkin-Tab"
 class RefusedError(Exception):
     """A request that is answered with an HTTP status and a sentence, and does nothing."""
 
-    def __init__(self, status: int, why: str) -> None:
-        super().__init__(why)
+    def __init__(self, status: int, reason: str) -> None:
+        super().__init__(reason)
         self.status = status
 
 

@@ -40,7 +40,7 @@ class Question:
     branch: str = ""  # name of the branch to stay on
     best: bool = False  # look for the pulses whose tip is nearest
     nearest: bool = True  # look for the nearest pose within limits where no branch is
-    stands: tuple[int, ...] | None = None  # pulses where the arm stands; None: not known
+    standing_pulses: tuple[int, ...] | None = None  # pulses where the arm stands; None: not known
 
 
 def look(arm: Arm, question: Question, quick: QuickIk | None = None) -> dict[str, Any]:
@@ -57,22 +57,22 @@ def look(arm: Arm, question: Question, quick: QuickIk | None = None) -> dict[str
             "position_mm": T[:3, 3].tolist(),
             "rpy_deg": units.angles_out(rpy(T[:3, :3])).tolist(),
         },
-        "motors": motors(arm, q, question.stands, best=question.best),
+        "motors": motors(arm, q, question.standing_pulses, best=question.best),
     }
 
 
-def motors(arm: Arm, q: Array, stands: Sequence[int] | None, *, best: bool = False) -> dict[str, Any] | None:
+def motors(arm: Arm, q: Array, standing_pulses: Sequence[int] | None, *, best: bool = False) -> dict[str, Any] | None:
     """Pulses of a pose, the moves from where the arm stands (unknown: from home), what rounding costs at the tip."""
     try:
         found = best_pulses(arm, q).chosen if best else rounding(arm, q)
     except UsageError:
         return None  # no drives; the scene says why
-    start = pulses(arm, arm.home) if stands is None else np.asarray(stands)
+    start = pulses(arm, arm.home) if standing_pulses is None else np.asarray(standing_pulses)
     bad = [name for name, out in zip(motor_names(arm), outside_travel(arm, found.pulses), strict=True) if out]
     return {
         "pulses": found.pulses.tolist(),
         "moves": (found.pulses - start).tolist(),
-        "from": "home" if stands is None else "arm",
+        "from": "home" if standing_pulses is None else "arm",
         "error_mm": float(found.error),
         "best": best,
         "outside_travel": bad,
@@ -90,13 +90,13 @@ def _task(arm: Arm) -> tuple[Task | None, str]:
         return None, str(error)
 
 
-def _goal(arm: Arm, task: Task, question: Question, kept: list[int]) -> tuple[list[float], Array]:
+def _goal(arm: Arm, task: Task, question: Question, free_joints: list[int]) -> tuple[list[float], Array]:
     """The target in its labels' units and as `ik` takes it: the question's own, or that of its pose.
 
-    kept: the joints that are not held.
+    free_joints: the joints that are not held.
     """
     if question.target is None:
-        goal = targets_of(task, fk(arm, question.q)[None], question.q[None, kept])[0]
+        goal = targets_of(task, fk(arm, question.q)[None], question.q[None, free_joints])[0]
         [values] = targets_out(task.labels, goal[None])
         return values, goal
     values = list(question.target)
@@ -136,7 +136,7 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
         "closest": None,
     }
     if question.target is None:
-        answer["chosen"] = _same(branches, question.q)
+        answer["chosen"] = _branch_of_pose(branches, question.q)
     elif found.within_limits:
         stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
         answer["chosen"] = stay[0] if stay else 0  # a free one, if there is one
@@ -163,7 +163,7 @@ def _row(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
     }
 
 
-def _same(branches: Sequence[choose_branch.Branch], q: Array) -> int | None:
+def _branch_of_pose(branches: Sequence[choose_branch.Branch], q: Array) -> int | None:
     """The branch that a pose is on; None on a self-motion, where the pose is one of many."""
     for k, branch in enumerate(branches):
         apart = np.abs(branch.q - q)

@@ -24,10 +24,10 @@ class ProgramActions:
     """One program that all pages show; `tell` hears it whenever it changes."""
 
     def __init__(
-        self, arm: Arm, stands: Callable[[], tuple[int, ...] | None], tell: Callable[[dict[str, Any]], None]
+        self, arm: Arm, standing_pulses: Callable[[], tuple[int, ...] | None], publish: Callable[[dict[str, Any]], None]
     ) -> None:
         self.arm, self.program = arm, Program(arm)
-        self._stands, self._tell = stands, tell
+        self._standing_pulses, self._publish = standing_pulses, publish
         self._lock = threading.Lock()
         self._planning = threading.Lock()  # one plan at a time; edits do not wait for it
 
@@ -37,14 +37,14 @@ class ProgramActions:
 
     def start(self) -> Array | None:
         """Joint values where the arm stands; None if that is not known."""
-        counts = self._stands()
+        counts = self._standing_pulses()
         return None if counts is None else joints_of(self.arm, counts)
 
     def edit(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """One edit of the program."""
         with self._lock:
             self.program.edit(fields)
-            return self._told()
+            return self._answer()
 
     def load(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Take a path file's text as the program."""
@@ -52,7 +52,7 @@ class ProgramActions:
             self.program.load(
                 request_checks.text(fields, "text", request_checks.LARGEST), request_checks.text(fields, "name")
             )
-            return self._told()
+            return self._answer()
 
     def save(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """The text of a path file, for `armkin path` and `armkin send`."""
@@ -81,11 +81,11 @@ class ProgramActions:
         """Where a move ends."""
         with self._lock:
             program = self.program.copied()
-        index = request_checks.whole(fields, "index", max(len(program.moves), 1))
+        index = request_checks.index(fields, "index", max(len(program.moves), 1))
         q = program.end_of(index, self.start())
         return {"q": units.joints_out(self.arm, q).tolist()}
 
-    def _told(self) -> dict[str, Any]:
+    def _answer(self) -> dict[str, Any]:
         state = self.program.state()
-        self._tell(state)
+        self._publish(state)
         return state

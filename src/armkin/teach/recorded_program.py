@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from armkin import path_file
 from armkin.errors import UsageError
 from armkin.forward import fk
 from armkin.inverse.tasks.choose_task import task_for
@@ -14,6 +15,8 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.model import units
 from armkin.model.target_numbers import targets_out
 from armkin.motion.tool_path.path_numbers import check_numbers
+from armkin.path_file import PathFile
+from armkin.path_file.path_keys import KINDS
 from armkin.robot_file.robot_file_text import flow
 from armkin.teach import request_checks
 
@@ -39,29 +42,31 @@ class Program:
         self.moves: list[dict[str, Any]] = []  # each as in a path file
         self.names: list[str] = []  # of the moves, "" if none was given
         self.via: list[float] | None = None  # the point on the way of the arc that is being recorded
-        self._before: list[tuple[Any, ...]] = []
-        self._after: list[tuple[Any, ...]] = []
+        self._undo_states: list[tuple[Any, ...]] = []
+        self._redo_states: list[tuple[Any, ...]] = []
 
     def state(self) -> dict[str, Any]:
         """JSON: what the pages show."""
         return {
             "moves": [
-                {"kind": _kind(move), "name": name, "said": _said(move), "blend": move.get("blend")}
+                {"kind": _kind(move), "name": name, "said": _figures_text(move), "blend": move.get("blend")}
                 for move, name in zip(self.moves, self.names, strict=True)
             ],
             "blend": self.head.get("blend", 0),
             "speed": self.head.get("speed", 100),
             "tool_speed": self.head.get("tool_speed"),
             "via": self.via is not None,
-            "undo": len(self._before),
-            "redo": len(self._after),
+            "undo": len(self._undo_states),
+            "redo": len(self._redo_states),
         }
 
     def edit(self, fields: Mapping[str, Any]) -> None:
         """Carry out one edit: `do` names it. Raises UsageError and changes nothing if it makes no sense."""
         what = request_checks.text(fields, "do", 20)
         if what in ("undo", "redo"):
-            back, forth = (self._before, self._after) if what == "undo" else (self._after, self._before)
+            back, forth = (
+                (self._undo_states, self._redo_states) if what == "undo" else (self._redo_states, self._undo_states)
+            )
             if back:
                 forth.append(self._copy())
                 self._restore(back.pop())
@@ -86,8 +91,8 @@ class Program:
         except Exception:
             self._restore(before)
             raise
-        self._before = [*self._before[-_UNDO + 1 :], before]
-        self._after = []
+        self._undo_states = [*self._undo_states[-_UNDO + 1 :], before]
+        self._redo_states = []
 
     def document(self) -> dict[str, Any]:
         """The program as a path file has it."""
@@ -95,14 +100,10 @@ class Program:
 
     def file(self) -> PathFile:
         """The program as a path file's model. Raises PathFileError if it is none."""
-        from armkin import path_file
-
         return path_file.validated(self.document())
 
     def text(self) -> str:
         """The program as the text of a path file; names are comments."""
-        from armkin.path_file import PathFile
-
         lines = [f"robot: {self.arm.name}"]
         keys = [key for key in PathFile.model_fields if key in self.head]
         lines += [f"{key}: {flow(self.head[key])}" for key in keys]
@@ -115,8 +116,6 @@ class Program:
 
     def load(self, text: str, name: str) -> None:
         """Take the program of a path file's text. Raises PathFileError with the line, and changes nothing."""
-        from armkin import path_file
-
         file = path_file.parse(text, name)
         path_file.check_robot(file, self.arm.name, self.arm.path)
         check_numbers(self.arm, file)
@@ -125,8 +124,8 @@ class Program:
         moves = data.pop("moves")
         if len(moves) > MOST:
             raise UsageError(f"{name} has {len(moves)} moves; the page takes {MOST}")
-        self._before = [*self._before[-_UNDO + 1 :], self._copy()]
-        self._after = []
+        self._undo_states = [*self._undo_states[-_UNDO + 1 :], self._copy()]
+        self._redo_states = []
         self.head, self.moves, self.via = data, moves, None
         items = [line for line in text.splitlines() if line.lstrip().startswith("- ")]
         found = [_NAMED.match(line) for line in items]
@@ -164,7 +163,7 @@ class Program:
         at = (
             len(self.moves)
             if fields.get("index") is None
-            else request_checks.whole(fields, "index", len(self.moves)) + 1
+            else request_checks.index(fields, "index", len(self.moves)) + 1
         )
         self.moves.insert(at, self._move(kind, fields))
         self.names.insert(at, "")
@@ -206,7 +205,7 @@ class Program:
         self.names[self._index(fields)] = " ".join(kept.split())
 
     def _reorder(self, fields: Mapping[str, Any]) -> None:
-        at, to = self._index(fields), request_checks.whole(fields, "to", len(self.moves))
+        at, to = self._index(fields), request_checks.index(fields, "to", len(self.moves))
         self.moves.insert(to, self.moves.pop(at))
         self.names.insert(to, self.names.pop(at))
 
@@ -236,22 +235,20 @@ class Program:
     def _index(self, fields: Mapping[str, Any]) -> int:
         if not self.moves:
             raise UsageError("the program has no moves")
-        return request_checks.whole(fields, "index", len(self.moves))
+        return request_checks.index(fields, "index", len(self.moves))
 
     def _copy(self) -> tuple[Any, ...]:
         return copy.deepcopy((self.head, self.moves, self.names, self.via))
 
-    def _restore(self, before: tuple[Any, ...]) -> None:
-        self.head, self.moves, self.names, self.via = before
+    def _restore(self, state: tuple[Any, ...]) -> None:
+        self.head, self.moves, self.names, self.via = state
 
 
 def _kind(move: Mapping[str, Any]) -> str:
-    from armkin.path_file.path_keys import KINDS
-
     return next(kind for kind in KINDS if kind in move)
 
 
-def _said(move: Mapping[str, Any]) -> str:
+def _figures_text(move: Mapping[str, Any]) -> str:
     """A move's figures for people."""
     value = move[_kind(move)]
     if isinstance(value, dict) and "to" in value:

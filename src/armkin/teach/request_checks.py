@@ -64,11 +64,11 @@ def number(fields: Mapping[str, Any], name: str, low: float, high: float) -> flo
     return value
 
 
-def whole(fields: Mapping[str, Any], name: str, below: int) -> int:
-    """An index: 0 up to below."""
+def index(fields: Mapping[str, Any], name: str, count: int) -> int:
+    """An index: from 0, less than `count`."""
     value = fields.get(name)
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < below:
-        raise UsageError(f"{name}: expected a whole number from 0 to {below - 1}")
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < count:
+        raise UsageError(f"{name}: expected a whole number from 0 to {count - 1}")
     return value
 
 

@@ -166,7 +166,7 @@ class _Handler(BaseHTTPRequestHandler):
                     silent = 0.0
                 self.wfile.flush()
         finally:
-            self.server.actions.tabs.leave(tab)
+            self.server.actions.tabs.close_tab(tab)
 
     def _gone(self) -> bool:
         ready, _, _ = select.select([self.connection], [], [], 0)

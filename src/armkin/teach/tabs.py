@@ -25,7 +25,7 @@ class Tab:
         self._news: dict[str, Any] = {}
         self._ready = threading.Condition()
 
-    def tell(self, topic: str, data: Any) -> None:
+    def publish(self, topic: str, data: Any) -> None:
         """Have the page hear something; what it has not heard of the topic yet is replaced."""
         with self._ready:
             self._news[topic] = data
@@ -47,11 +47,11 @@ Action = Callable[[Tab, Fields], dict[str, Any]]  # what a page asks for -> what
 class Tabs:
     """All open pages; `left` is called when the page that holds control goes."""
 
-    def __init__(self, left: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, on_leave: Callable[[], None] = lambda: None) -> None:
         self._lock = threading.RLock()
         self._tabs: dict[str, Tab] = {}
         self._control = ""
-        self._left = left
+        self._on_leave = on_leave
 
     def open(self) -> Tab:
         """A new page. Raises RefusedError if there are too many."""
@@ -89,7 +89,7 @@ class Tabs:
                 self._control = tab.id
             self._announce()
 
-    def leave(self, tab: Tab) -> None:
+    def close_tab(self, tab: Tab) -> None:
         """A page is closed."""
         with self._lock:
             held = self._control == tab.id
@@ -98,9 +98,9 @@ class Tabs:
                 self._control = ""
             self._announce()
         if held:
-            self._left()
+            self._on_leave()
 
-    def take(self, tab: Tab) -> None:
+    def take_control(self, tab: Tab) -> None:
         """A page takes control, on purpose."""
         with self._lock:
             self._control = tab.id
@@ -112,14 +112,14 @@ class Tabs:
             if self._control != tab.id:
                 raise RefusedError(409, "another page holds control: take control first")
 
-    def tell(self, topic: str, data: Any, but: Tab | None = None) -> None:
-        """Have all pages hear something, `but` one."""
+    def publish(self, topic: str, data: Any, except_tab: Tab | None = None) -> None:
+        """Have all pages hear something, `except_tab` one."""
         with self._lock:
             for tab in self._tabs.values():
-                if tab is not but:
-                    tab.tell(topic, data)
+                if tab is not except_tab:
+                    tab.publish(topic, data)
 
     def _announce(self) -> None:
         for tab in self._tabs.values():
             state = "yours" if self._control == tab.id else "another" if self._control else "nobody"
-            tab.tell("control", {"holder": state, "pages": len([t for t in self._tabs.values() if t.listening])})
+            tab.publish("control", {"holder": state, "pages": len([t for t in self._tabs.values() if t.listening])})

@@ -54,7 +54,7 @@ class Servos(ServoArm):
         bits = self.bus.read(number, FAULT) if self.bus.alerts.get(number) else 0
         return [name for bit, name in FAULTS.items() if bits >> bit & 1]
 
-    def _told(self, number: int) -> dict[str, Any]:
+    def _servo_report(self, number: int) -> dict[str, Any]:
         state = self._states[number]
         return {
             "load_percent": _number(state[:2]) / 10,

@@ -84,7 +84,7 @@ class Backend(ABC):
 
     @property
     @abstractmethod
-    def why(self) -> str:
+    def loss_reason(self) -> str:
         """Why the position is lost, in words; empty while it is known."""
 
     @abstractmethod

@@ -7,7 +7,7 @@ has or lacks: it is asked for by its name (`can`, `need`), never by the kind.
     board = board_of(arm)                    # UsageError if the arm cannot be driven
     machine = board.connect(board.open(name), stop)
     machine.prepare(); machine.run([machine.plan(machine.counts(), q)])     # Backend
-    board.need("home"); board.home()                                        # capabilities: CAPABILITIES
+    board.require("home"); board.home()                                        # capabilities: CAPABILITIES
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend.motion_start import check_jog, jog_goal
 from armkin.board.backend.sent_positions import planned
-from armkin.board.ports import BAUD, SIM
+from armkin.board.ports import BAUD, SIM, SerialPort, list_ports
 from armkin.errors import LinkError, UsageError
 from armkin.motion.joint_moves import rate_lines, straight
 from armkin.motion.timing.trajectory import Trajectory
@@ -61,7 +61,7 @@ class LostSteps(NamedTuple):
 class Gripped(NamedTuple):
     """Where a gripper was sent, and where it came to rest, both in its drive's units."""
 
-    at: float
+    position: float
     target: float
     unit: str  # deg, mm, or S of a spindle's output
     counts: int | None = None  # where the board counts them
@@ -137,14 +137,10 @@ class Board(ABC):
 
     def likely(self) -> list[str]:
         """Names of the ports where such a board may be: Arduinos, and the chips of ESP32s and adapters."""
-        from armkin.board.ports import list_ports
-
         return [port.device for port in list_ports() if port.board or port.adapter]
 
     def open(self, name: str, baud: int | None = None, *, reset: bool = True) -> Port:
         """The port of that name; `sim`: a board of this kind in this process."""
-        from armkin.board.ports import SerialPort
-
         return self.simulated() if name == SIM else SerialPort(name, baud or self.baud, reset=reset)
 
     def answers(self, name: str, baud: int | None = None, stop: Never = lambda: False, *, reset: bool = True) -> bool:
@@ -164,7 +160,7 @@ class Board(ABC):
         self.machine = self.attach(port, stop)
         return self.machine
 
-    def again(self) -> None:
+    def begin_job(self) -> None:
         """Begin another job on the machine: what ended the one before is over."""
         self.machine.refresh()
 
@@ -210,14 +206,14 @@ class Board(ABC):
         check_jog(self.arm, self.machine.joints(), joint, rate)
         return rate
 
-    def jog(self, joint: int, rate: float, seconds: float, more: Callable[[], bool] | None = None) -> None:
+    def jog(self, joint: int, rate: float, seconds: float, goes_on: Callable[[], bool] | None = None) -> None:
         """Move one joint [rad/s | mm/s] for a time, from where it stands to its limit at most.
 
-        more: asked again and again; the motion ends when it says no. `ready_to_jog` comes first.
+        goes_on: asked again and again; the motion ends when it says no. `ready_to_jog` comes first.
         """
         arm, left = self.arm, seconds
-        while left > 0 and (more is None or more()):
-            piece = left if more is None else min(JOG_PIECE, left)
+        while left > 0 and (goes_on is None or goes_on()):
+            piece = left if goes_on is None else min(JOG_PIECE, left)
             counts = self.machine.counts()
             here = legal_with_same_pulses(arm, self.machine.joints())
             goal = jog_goal(arm, here, joint, rate * piece, refuse=left == seconds)
@@ -233,14 +229,14 @@ class Board(ABC):
         """Whether this kind has a capability of CAPABILITIES."""
         return getattr(type(self), capability) is not getattr(Board, capability)
 
-    def need(self, capability: str) -> None:
+    def require(self, capability: str) -> None:
         """Raise UsageError, saying why, if this kind lacks a capability."""
         if not self.can(capability):
             raise UsageError(self.lacks.get(capability) or f"{self.called} does not {CAPABILITIES[capability]}")
 
     def check_home(self, joints: Sequence[str] = (), *, rest_at_home: bool = False) -> None:
         """Raise UsageError, before a port is opened, for what does not home, or not this arm, or not so."""
-        self.need("home")
+        self.require("home")
         if extra := [*joints, *["rest at home"] * rest_at_home]:
             raise UsageError(f"boards of kind {self.kind} home all joints at once: leave {' '.join(extra)} out")
 
@@ -255,7 +251,7 @@ class Board(ABC):
 
         rest_at_home: joints without a switch stand in their home pose, on the operator's word.
         """
-        self.need("home")
+        self.require("home")
         raise NotImplementedError
 
     def gripper(self) -> Gripper:
@@ -283,34 +279,34 @@ class Board(ABC):
     def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
         """Move the gripper, and return where it comes to rest; assume: where a lost one stands."""
         self.gripper()
-        self.need("grip")
+        self.require("grip")
         raise NotImplementedError
 
     def relax(self) -> None:
         """Switch the motors off: the arm can be moved by hand, and falls if nobody holds it."""
-        self.need("relax")
+        self.require("relax")
 
     def zero(self, gripper: float | None) -> tuple[list[int], tuple[int, int] | None]:
         """Counts of the arm's motors; and the gripper's count, and its `zero` if it stands at a value."""
-        self.need("zero")
+        self.require("zero")
         raise NotImplementedError
 
     def calibration(self, path: str, pose: Array | None) -> Any:
         """What another program's calibration file says of the arm; pose: (n,) in the middle of all ranges."""
-        self.need("calibration")
+        self.require("calibration")
 
     def settings(self) -> list[dict[str, Any]]:
         """Settings that are not as the robot file wants them, as JSON: setting, found, wanted, ..."""
-        self.need("settings")
+        self.require("settings")
         raise NotImplementedError
 
     def write_settings(self) -> None:
         """Write the settings that differ, and read them back; the position is lost with it."""
-        self.need("write_settings")
+        self.require("write_settings")
 
     def recall(self) -> Any:
         """The note of the motion that was held on this board: `start`, the counts where it began.
 
         Raises UsageError if there is none, LinkError if the arm has moved since.
         """
-        self.need("recall")
+        self.require("recall")

@@ -70,18 +70,18 @@ def _without_rates(arm: Arm, board: bool) -> list[Lack]:
     return found
 
 
-def _drive_lines(arm: Arm, still: list[str], board: bool) -> list[str]:
+def _drive_lines(arm: Arm, joints: list[str], board: bool) -> list[str]:
     """A stepper for each joint without a motor; board: with an axis of its own."""
     axes = list(_axes(arm)) if board else []
     taken = {motor.axis for motor in arm.motors}
     free = iter([axis for axis in axes if axis not in taken])
     groups: dict[str, list[str]] = {}
-    for name in still:
+    for name in joints:
         lead = ", lead: 8" if arm.prismatic[arm.joint_names.index(name)] else ""
         axis = next(free, None)
         at = "" if axis is None else f"axis: {axis}, "
         groups.setdefault(f"drive: {{{at}full_steps: 200, microsteps: 16{lead}}}", []).append(name)
-    return [f"{drive}   # for example; {_to(names)}" for drive, names in groups.items()]
+    return [f"{drive}   # for example; {_for_joints(names)}" for drive, names in groups.items()]
 
 
 def _axes(arm: Arm) -> tuple[str, ...]:
@@ -162,5 +162,5 @@ def _have(arm: Arm, names: list[str], what: str) -> str:
     return f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {what}"
 
 
-def _to(names: list[str]) -> str:
+def _for_joints(names: list[str]) -> str:
     return f"to joint{'s' * (len(names) > 1)} {', '.join(names)}"

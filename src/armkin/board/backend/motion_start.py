@@ -61,26 +61,26 @@ def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
         return
     for stretch in trajectory.stretches:
         times = [stretch.duration] if isinstance(stretch, Straight) else np.linspace(0.0, stretch.duration, _SAMPLES)
-        reached = stretch.at(np.asarray(times, dtype=float))
+        reached = stretch.evaluate(np.asarray(times, dtype=float))
         farther = beyond(arm, reached).max(axis=0) > out + SLACK
         if farther.any():
             raise _farther(arm, int(farther.argmax()), trajectory.start)
 
 
-def jog_goal(arm: Arm, here: Array, joint: int, change: float, *, refuse: bool) -> Array:
+def jog_goal(arm: Arm, standing: Array, joint: int, change: float, *, refuse: bool) -> Array:
     """Where a joint may go from here, (n,), by a change: to its limit, and to two steps before what it would hit.
 
     refuse: raise NoSolutionError if something is hit at once.
     """
-    goal, end = here.copy(), (arm.upper if change > 0 else arm.lower)[joint]
-    goal[joint] = np.clip(here[joint] + change, *sorted((here[joint], end)))
-    free, why = free_way(arm, here, goal)
+    goal, end = standing.copy(), (arm.upper if change > 0 else arm.lower)[joint]
+    goal[joint] = np.clip(standing[joint] + change, *sorted((standing[joint], end)))
+    free, why = free_way(arm, standing, goal)
     if why is None:
         return goal
-    step = float(resolution(arm)[joint] / abs(goal[joint] - here[joint]))
+    step = float(resolution(arm)[joint] / abs(goal[joint] - standing[joint]))
     if free <= 2 * step and refuse:
         raise why
-    return np.asarray(here + max(free - 2 * step, 0.0) * (goal - here))
+    return np.asarray(standing + max(free - 2 * step, 0.0) * (goal - standing))
 
 
 def check_jog(arm: Arm, q: Array, joint: int, rate: float) -> None:

@@ -48,29 +48,29 @@ class Record:
     def __init__(self, port: Port, arm: Arm) -> None:
         self._path = None if port.simulated else record_path(port.name)
         self._arm = arm
-        self.left = None if self._path is None else _read(self._path)
+        self.note = None if self._path is None else _read(self._path)
 
-    def stands(self, marks: Marks, counts: Sequence[int], offset: Sequence[int]) -> None:
+    def write_position(self, marks: Marks, counts: Sequence[int], offset: Sequence[int]) -> None:
         """The arm stands there, by armkin's own doing or somebody's word."""
         kept = {name: value if isinstance(value, str) else list(value) for name, value in marks.items()}
-        self._put(Left(_digest(self._arm), kept, list(map(int, offset)), list(map(int, counts))))
+        self._write(Left(_digest(self._arm), kept, list(map(int, offset)), list(map(int, counts))))
 
-    def moves(self, job: Job, piece: float) -> None:
+    def write_motion(self, job: Job, piece: float) -> None:
         """A motion begins, of which curves are sent in pieces of so many seconds."""
-        assert self.left is not None
-        left = self.left
-        self._put(Left(left.arm, left.marks, left.offset, job.start.tolist(), way(job, piece)))
+        assert self.note is not None
+        left = self.note
+        self._write(Left(left.arm, left.marks, left.offset, job.start.tolist(), path_corners(job, piece)))
 
     def forget(self) -> None:
         """Nobody knows where the arm stands."""
-        self.left = None
+        self.note = None
         if self._path is not None:
             remove_note(self._path)
 
     def differs(self, marks: Marks) -> str | None:
         """What the board keeps that armkin did not leave there, in words; None: nothing."""
         why = "the board was reset, or another program has set it"
-        left = self.left
+        left = self.note
         if left is None:
             return "nobody has told armkin on this computer where it stands"
         if left.arm != _digest(self._arm) or len(left.offset) != len(self._arm.motor_gain):
@@ -78,39 +78,39 @@ class Record:
         for name in sorted({*marks, *left.marks}):
             found, was = _plain(marks.get(name)), _plain(left.marks.get(name))
             if found != was:
-                return f"{name} is {_said(found)}, and armkin left {_said(was)}: {why}"
+                return f"{name} is {_value_text(found)}, and armkin left {_value_text(was)}: {why}"
         return None
 
-    def moved(self, counts: Sequence[int]) -> str | None:
+    def moved_text(self, counts: Sequence[int]) -> str | None:
         """How the arm stands elsewhere than armkin left it, in words; None: it does not."""
-        left = self.left
+        left = self.note
         assert left is not None
         at = np.asarray(counts, dtype=np.int64)
-        if at.tolist() == left.counts or (left.plan is not None and on_way(left.plan, at)):
+        if at.tolist() == left.counts or (left.plan is not None and is_on_path(left.plan, at)):
             return None
         where = (
             f"at {left.counts}" if left.plan is None else f"on a motion from {left.counts} to {left.plan[-1].tolist()}"
         )
         return f"it stands at {at.tolist()} steps, and armkin left it {where}: another program has moved it"
 
-    def _put(self, left: Left) -> None:
-        self.left = left
+    def _write(self, note: Left) -> None:
+        self.note = note
         if self._path is not None:
-            plan = None if left.plan is None else _packed(left.plan)
-            told = {"arm": left.arm, "marks": left.marks, "offset": left.offset, "counts": left.counts, "plan": plan}
+            plan = None if note.plan is None else _packed(note.plan)
+            told = {"arm": note.arm, "marks": note.marks, "offset": note.offset, "counts": note.counts, "plan": plan}
             write_note(self._path, told)
 
 
-def way(job: Job, piece: float) -> NDArray[np.int64]:
+def path_corners(job: Job, piece: float) -> NDArray[np.int64]:
     """Corners (points, motors) [counts] of the way of a job whose curves are sent in pieces of so many seconds."""
     arm, points = job.trajectory.arm, [np.asarray(job.start, dtype=np.int64)[None]]
     for stretch in job.trajectory.stretches:
         count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / piece)), 1)
-        points.append(pulses(arm, stretch.at(np.linspace(0.0, stretch.duration, count + 1)[1:])))
+        points.append(pulses(arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:])))
     return np.concatenate(points)
 
 
-def on_way(points: NDArray[np.int64], at: NDArray[np.int64]) -> bool:
+def is_on_path(points: NDArray[np.int64], counts: NDArray[np.int64]) -> bool:
     """Whether every motor is within one step of some point of the lines between corners (points, motors).
 
     >>> corners = np.array([[0, 0], [10, 5]])
@@ -118,8 +118,8 @@ def on_way(points: NDArray[np.int64], at: NDArray[np.int64]) -> bool:
     (True, False)
     """
     if len(points) == 1:
-        return bool(np.abs(at - points[0]).max(initial=0) <= _STEP)
-    line, off = np.diff(points, axis=0), at - points[:-1]
+        return bool(np.abs(counts - points[0]).max(initial=0) <= _STEP)
+    line, off = np.diff(points, axis=0), counts - points[:-1]
     with np.errstate(divide="ignore"):
         ends = np.stack([(off - _STEP) / line, (off + _STEP) / line])  # shares of the line at which a motor is near
     first, last = ends.min(axis=0).max(axis=1, initial=0.0), ends.max(axis=0).min(axis=1, initial=1.0)
@@ -135,7 +135,7 @@ def _plain(value: Sequence[float] | str | None) -> list[float] | str | None:
     return value if value is None or isinstance(value, str) else [x + 0.0 for x in value]
 
 
-def _said(value: list[float] | str | None) -> str:
+def _value_text(value: list[float] | str | None) -> str:
     if value is None:
         return "not told"
     return value if isinstance(value, str) else " ".join(f"{x:.10g}" for x in value)

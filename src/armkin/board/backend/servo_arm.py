@@ -89,7 +89,7 @@ class ServoArm(Backend):
         return "known"
 
     @property
-    def why(self) -> str:
+    def loss_reason(self) -> str:
         """Nothing: the position is never lost."""
         return ""
 
@@ -118,7 +118,7 @@ class ServoArm(Backend):
                 "name": name,
                 "id": number,
                 "torque": bool(self.bus.read(number, self.bus.TORQUE)),
-                **self._told(number),
+                **self._servo_report(number),
                 "errors": self._faults(number),
             }
             for number, name in zip(self.ids, motor_names(self.arm), strict=True)
@@ -177,7 +177,7 @@ class ServoArm(Backend):
                 continue
             self._check_limits(job)
             total += job.duration
-            self._follow(job.trajectory, partial(_tell, progress, done, total))
+            self._follow(job.trajectory, partial(_report_progress, progress, done, total))
             self._arrive(job.end)
             done = total
             progress(done, total)
@@ -193,7 +193,7 @@ class ServoArm(Backend):
         low, high = np.minimum(self._limits[:, 0], job.start), np.maximum(self._limits[:, 1], job.start)
         for stretch in job.trajectory.stretches:
             count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / PERIOD)), 1)
-            goals = pulses(self.arm, stretch.at(np.linspace(0.0, stretch.duration, count + 1)[1:]))
+            goals = pulses(self.arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:]))
             for row, k in np.argwhere((goals < low) | (goals > high))[:1]:
                 least, most = self._limits[k].tolist()
                 raise NoSolutionError(
@@ -201,7 +201,7 @@ class ServoArm(Backend):
                     f"limits {least} to {most} ({self.limits_at}): nothing was moved"
                 )
 
-    def _follow(self, trajectory: Trajectory, tell: Callable[[float], None]) -> None:
+    def _follow(self, trajectory: Trajectory, report: Callable[[float], None]) -> None:
         """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
         begin = last = self.port.now()
         watched, t, pace, stopping = begin, 0.0, 1.0, False
@@ -218,7 +218,7 @@ class ServoArm(Backend):
             t = min(trajectory.duration, t + passed * pace)
             ahead = min(trajectory.duration, t + PERIOD * pace)
             self._send(pulses(self.arm, trajectory.q(ahead)), np.abs(self.arm.motor_gain @ trajectory.qd(ahead)))
-            tell(t)
+            report(t)
             if now - watched > WATCH:
                 watched = now
                 self._watch(pulses(self.arm, trajectory.q(t)))
@@ -296,9 +296,9 @@ class ServoArm(Backend):
         """What a servo says is wrong with it, by its last answer."""
 
     @abstractmethod
-    def _told(self, number: int) -> dict[str, Any]:
+    def _servo_report(self, number: int) -> dict[str, Any]:
         """What a servo says of itself, by its last state: load_percent, voltage, temperature."""
 
 
-def _tell(progress: Progress, done: float, total: float, t: float) -> None:
+def _report_progress(progress: Progress, done: float, total: float, t: float) -> None:
     progress(done + t, total)

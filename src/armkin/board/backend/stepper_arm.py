@@ -51,7 +51,7 @@ def steppers(arm: Arm, called: str, letters: Iterable[str]) -> Iterator[tuple[in
 class StepperArm(Backend):
     """An arm of steppers behind an open port."""
 
-    put: ClassVar[str] = "put it in its home pose and say so"  # what cures a lost position
+    cure: ClassVar[str] = "put it in its home pose and say so"  # what cures a lost position
     piece: ClassVar[float]  # [s] of a curve that one line is sent for
     homes: ClassVar[bool] = False  # it can search switches
     _stop: Callable[[], bool]
@@ -59,7 +59,7 @@ class StepperArm(Backend):
 
     def position(self) -> Position:
         """Known while all that the board keeps is what armkin left there."""
-        return "lost" if self.why else "known"
+        return "lost" if self.loss_reason else "known"
 
     def refresh(self) -> None:
         """Read again where the arm stands."""
@@ -67,25 +67,25 @@ class StepperArm(Backend):
 
     def standing(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
-        if self.why:
-            return f"the arm's position is lost ({self.why}): {self.put}"
+        if self.loss_reason:
+            return f"the arm's position is lost ({self.loss_reason}): {self.cure}"
         return f"the arm stands at {self._where()}, its position is known: the next command starts there"
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
-        return {"settings": [str(one) for one in self.wrong()], "lost_because": self.why or None}
+        return {"settings": [str(one) for one in self.wrong()], "lost_because": self.loss_reason or None}
 
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
         self._ready()
-        if not self.why:
+        if not self.loss_reason:
             if assume is not None:
                 joints = joints_out(self.arm, self.joints()).tolist()
                 raise PositionKnownError(f"the position is known ({self._where()})", joints=joints)
             return False
         if assume is None and not self.port.simulated:
             raise PositionLostError(
-                f"the arm's position is lost: {self.why}",
+                f"the arm's position is lost: {self.loss_reason}",
                 robot_file=self.arm.path,
                 port=self.port.name,
                 homing=self.homes and all(self.arm.homing),
@@ -105,7 +105,7 @@ class StepperArm(Backend):
                 self.port.read(0.01)
                 seen = False
                 continue
-            self._begin(job, seen=seen)
+            self._begin(job, position_read=seen)
             total += job.duration
 
             def tell(t: float, done: float = done, total: float = total) -> None:
@@ -118,22 +118,24 @@ class StepperArm(Backend):
             if not whole:
                 self.hold()
                 raise StoppedError
-            if self.why or self.counts() != tuple(job.end.tolist()):
-                cause = "" if self.why else ": a line was damaged on its way, or another program has moved the arm"
+            if self.loss_reason or self.counts() != tuple(job.end.tolist()):
+                cause = (
+                    "" if self.loss_reason else ": a line was damaged on its way, or another program has moved the arm"
+                )
                 where = f"the arm stands at {list(self.counts())} steps, the plan ends at {job.end.tolist()}"
                 raise LinkError(f"{where}{cause}\n{self.standing()}")
             done, seen = total, True
             progress(done, total)
 
-    def _begin(self, job: Job, *, seen: bool) -> None:
+    def _begin(self, job: Job, *, position_read: bool) -> None:
         """Make sure that the arm stands where a job starts, and record the motion."""
-        if not seen:
+        if not position_read:
             self._read()
-        if self.why:
+        if self.loss_reason:
             raise LinkError(self.standing())
         if self.counts() != tuple(job.start.tolist()):
             raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing()}")
-        self._record.moves(job, self.piece)
+        self._record.write_motion(job, self.piece)
 
     def _where(self) -> str:
         """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90``."""
@@ -159,8 +161,8 @@ class StepperArm(Backend):
         """Read where the arm stands. Raises LinkError if settings or state forbid a motion."""
 
     @abstractmethod
-    def _carry_out(self, job: Job, tell: Callable[[float], None]) -> bool:
-        """Carry out a job, to rest, and read where the arm stands; False: a stop was asked for; tell: seconds done."""
+    def _carry_out(self, job: Job, report: Callable[[float], None]) -> bool:
+        """Carry out a job, to rest, and read where it stands; False: a stop was asked for. report: of seconds done."""
 
     @abstractmethod
     def _explain(self, error: LinkError) -> LinkError:

@@ -96,7 +96,7 @@ class Bus:
                 break
         return found
 
-    def _take(self, answer: Reply, servos: Sequence[int], size: int, found: dict[int, bytes]) -> None:
+    def _take(self, answer: Reply, servos: Sequence[int], size: int, data: dict[int, bytes]) -> None:
         if answer.id in servos and len(answer.data) == size:
             self.errors[answer.id] = answer.errors
-            found[answer.id] = answer.data
+            data[answer.id] = answer.data

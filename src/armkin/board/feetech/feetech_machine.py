@@ -42,7 +42,7 @@ class ServoMachine(ServoArm):
         """What a servo says is wrong with it, by its last answer."""
         return registers.errors(self.bus.errors.get(number, 0))
 
-    def _told(self, number: int) -> dict[str, Any]:
+    def _servo_report(self, number: int) -> dict[str, Any]:
         """What a servo says of itself, by its last state."""
         state = self._states[number]
         return {

@@ -119,7 +119,7 @@ def calibrated(arm: Arm, path: str, pose: Array | None) -> Calibrated:
     for drive, gain in zip(arm.motors, arm.motor_gain, strict=True):
         j = int(np.flatnonzero(gain)[0])
         name = arm.joint_names[j]
-        motor = _of(there, drive.id, name, path, drive.counts)
+        motor = _calibrated_motor(there, drive.id, name, path, drive.counts)
         if pose is None:
             _check_middle(arm, j)
         per = drive.pulses_per_unit() * (-1 if motor.drive_mode else 1)  # [counts/deg]
@@ -135,14 +135,16 @@ def calibrated(arm: Arm, path: str, pose: Array | None) -> Calibrated:
     return Calibrated(tuple(motors), tuple(zero), tuple(limits), jaw, ends, edits)
 
 
-def _of(there: Mapping[int, Motor], number: int | None, name: str, path: str, counts: int | None) -> Motor:
-    if number is None or number not in there:
-        has = ", ".join(f"{motor.name} {key}" for key, motor in sorted(there.items()))
+def _calibrated_motor(
+    motors: Mapping[int, Motor], number: int | None, name: str, path: str, counts: int | None
+) -> Motor:
+    if number is None or number not in motors:
+        has = ", ".join(f"{motor.name} {key}" for key, motor in sorted(motors.items()))
         raise UsageError(f"{path}: joint {name} is servo {number}, which the file has not: it has {has}")
-    motor = there[number]
+    motor = motors[number]
     if counts != registers.COUNTS:
         raise UsageError(f"{path}: joint {name} has {counts} counts a turn; LeRobot's files are for {registers.COUNTS}")
-    if motor.name != name and name in (other.name for other in there.values()):
+    if motor.name != name and name in (other.name for other in motors.values()):
         raise UsageError(f"{path}: joint {name} is servo {number}, which is {motor.name} in the file")
     return motor
 
@@ -161,13 +163,13 @@ def _check_middle(arm: Arm, joint: int) -> None:
 
 
 def _gripper(
-    arm: Arm, there: Mapping[int, Motor], path: str, edits: Edits
+    arm: Arm, motors: Mapping[int, Motor], path: str, edits: Edits
 ) -> tuple[Motor | None, tuple[float, float] | None]:
     """The gripper's motor and its ends, open and closed [deg]: LeRobot closes it at 0 %, range_min of drive_mode 0."""
     drive = arm.gripper
     if drive is None or drive.kind != "bus":
         return None, None
-    motor = _of(there, drive.id, "gripper", path, drive.counts)
+    motor = _calibrated_motor(motors, drive.id, "gripper", path, drive.counts)
     half = (motor.range_max - motor.middle) / drive.pulses_per_unit()
     values: Sequence[tuple[str, float | int | str]] = (
         ("zero", _plain(motor.middle)),

@@ -44,7 +44,7 @@ class _UnderWay:
         while len(self._moves) > 1 and self._moves[1][0] < taken:
             self._moves.popleft()
 
-    def left(
+    def remaining_plan(
         self, session: Session, axes: Sequence[int], lay: Lay, *, first: bool
     ) -> tuple[Sequence[Cut], float] | None:
         """What is left for an arm whose queue ran dry, and the seconds done; None unless in a move's beginning.
@@ -63,7 +63,7 @@ class _UnderWay:
         stood = session.deaf + session.port.now() - began
         if found is None or found[1].seconds > _BEGINNING or stood > _STOOD:
             return None
-        return found[0], seconds + found[1].done
+        return found[0], seconds + found[1].elapsed
 
 
 def carry_out(
@@ -81,10 +81,10 @@ def carry_out(
     while True:
         session.attend()
         try:
-            return stream(session, run.frames(todo, least), run.tell), run.end
+            return stream(session, run.frames(todo, least), run.report_progress), run.end
         except DeviceError as error:
             dry = error.error == Error.DRY
-            left = run.under_way.left(session, axes, lay, first=least < LEAD_MOST) if dry else None
+            left = run.under_way.remaining_plan(session, axes, lay, first=least < LEAD_MOST) if dry else None
             if left is None:
                 raise
         session.reopen()
@@ -124,19 +124,19 @@ class _Run:
                     yield batch
             self.end = plan.end
 
-    def tell(self, left: float) -> None:
-        """Report progress; left: seconds of motion that the board has before it."""
-        self._done = max(self._done, min(self._begun - left, self._total))  # an estimate: never backwards
+    def report_progress(self, seconds_left: float) -> None:
+        """Report progress; seconds_left: seconds of motion that the board has before it."""
+        self._done = max(self._done, min(self._begun - seconds_left, self._total))  # an estimate: never backwards
         self._progress(self._done, self._total)
 
 
-def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: int, at: int, clock: int) -> Status:
-    """Carry out the move of one axis that `lay` makes from the counts `at`; None: it stands at its end.
+def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: int, count: int, clock: int) -> Status:
+    """Carry out the move of one axis that `lay` makes from `count`; None: it stands at its end.
 
     If its queue runs dry in its beginning, what is left follows once, as of `carry_out`.
     """
     least = 0.0
-    while (move := lay(at)) is not None:
+    while (move := lay(count)) is not None:
         session.attend()
         try:
             return stream(session, batches(session, move, (axis,), clock, least), lambda left: None)
@@ -144,8 +144,8 @@ def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: in
             if error.error != Error.DRY or least:
                 raise
             began, status = session.port.now(), _at_rest(session)
-            stood, at = session.deaf + session.port.now() - began, status.counts[axis]
-            if not status.known >> axis & 1 or stood > _STOOD or _seconds_to(move, at, clock) > _BEGINNING:
+            stood, count = session.deaf + session.port.now() - began, status.counts[axis]
+            if not status.known >> axis & 1 or stood > _STOOD or _seconds_to(move, count, clock) > _BEGINNING:
                 raise
         session.reopen()
         least = LEAD_MOST
@@ -166,7 +166,7 @@ def _seconds_to(move: Move, count: int, clock: int) -> float:
 
 def _at_rest(session: Session) -> Status:
     """The status of an arm whose queue ran dry, and what it tells of the line."""
-    status = session.rest()
+    status = session.wait_for_rest()
     if status.bad and not session.line.damaged:  # the board alone knows of it yet
         session.line.resent += 1
     if session.line.damaged and not session.line.noisy:  # one frame that is lost, and sent again, holds nothing

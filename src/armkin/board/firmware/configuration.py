@@ -54,22 +54,14 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
     _refuse_incomplete(arm, board=not rehearsal)
-    made_up = rehearsal and bool(missing_keys.without_board(arm))
-    motors = arm.motors
-    if made_up:
-        board = _rehearsal_board(arm)
-        names = [*(motor.name for motor in motors), "gripper"]
-    else:
-        assert arm.board is not None
-        board = BOARDS[arm.board.kind]
-        names = [*(str(motor.axis) for motor in motors), str(arm.gripper.axis) if arm.gripper is not None else ""]
+    board, names = _board(arm, rehearsal=rehearsal)
     axes = tuple(board.axes.index(name) for name in names[:-1])
     grip = as_axis(board.axes.index(names[-1]), arm.gripper) if arm.gripper is not None else None
     images = [AxisImage() for _ in board.axes]
     low, high = _limits(arm)
     home = pulses(arm, arm.home)
     rate, accel = np.abs(arm.motor_gain) @ arm.max_speed, motor_accel(arm)
-    for k, (motor, axis) in enumerate(zip(motors, axes, strict=True)):
+    for k, (motor, axis) in enumerate(zip(arm.motors, axes, strict=True)):
         if motor.kind == "servo":
             _check_servo(f"motor {motor.name}", low[k], high[k])
         stepper = motor.kind == "stepper"
@@ -99,6 +91,15 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
         meaning=_meaning(arm, grip),
     )
     return Configuration(board, image, axes, grip)
+
+
+def _board(arm: Arm, *, rehearsal: bool) -> tuple[Board, list[str]]:
+    """The board, and the names of the axes of all motors and of the gripper; made up for a rehearsal without one."""
+    if rehearsal and missing_keys.without_board(arm):
+        return _rehearsal_board(arm), [*(motor.name for motor in arm.motors), "gripper"]
+    assert arm.board is not None
+    gripper = str(arm.gripper.axis) if arm.gripper is not None else ""
+    return BOARDS[arm.board.kind], [*(str(motor.axis) for motor in arm.motors), gripper]
 
 
 def _refuse_incomplete(arm: Arm, *, board: bool) -> None:
@@ -166,14 +167,14 @@ def _rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: l
     return tuple(rows)
 
 
-def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int, far: Array) -> RowImage:
+def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int, widest: Array) -> RowImage:
     """Scaled to 16-bit weights, the bounds widened by what rounding weights and counts may do."""
-    most = float(np.abs(per_count) @ far)
+    most = float(np.abs(per_count) @ widest)
     scale = min(32767 / float(np.abs(per_count).max()), (2**30 - 2**20) / most)
     weight = np.rint(per_count * scale)
     # The exact sum and the rounded one differ by the weights' rounding times the counts, and the counts
     # themselves are rounded by up to half, and up to a quarter away where a segment ends.
-    slack = float(np.abs(weight - per_count * scale) @ far + 0.8 * np.abs(weight).sum())
+    slack = float(np.abs(weight - per_count * scale) @ widest + 0.8 * np.abs(weight).sum())
     offset = float(weight @ arm.motor_bias)
     bounds = []
     for limit, sign in ((arm.lower[j], -1), (arm.upper[j], 1)):
@@ -211,10 +212,10 @@ def _bytes(weights: Array) -> list[int]:
     return [int(w) for w in np.rint(whole)]
 
 
-def _check_servo(what: str, low: int, high: int) -> None:
+def _check_servo(name: str, low: int, high: int) -> None:
     least, most = _SERVO_RANGE
     if low < least or high > most:
-        raise UsageError(f"{what}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}")
+        raise UsageError(f"{name}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}")
 
 
 def _rate(board: Board, rate: float) -> int:

@@ -55,7 +55,7 @@ class Machine(Backend):
                 board=board,
                 expected=expected,
             )
-        self.status = self.session.rest()  # a former session's motion ends first
+        self.status = self.session.wait_for_rest()  # a former session's motion ends first
         self._simulated = port.simulated
 
     # Where it stands
@@ -75,7 +75,7 @@ class Machine(Backend):
         return "retained" if self.status.flags & Flag.RETAINED else "known"
 
     @property
-    def why(self) -> str:
+    def loss_reason(self) -> str:
         """Why the position is lost, in words; empty while it is known."""
         if self.position() != "lost":
             return ""

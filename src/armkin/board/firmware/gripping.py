@@ -38,14 +38,14 @@ def count_of(gripper: Grip, value: str | float) -> int:
     return count
 
 
-def known(machine: Machine, gripper: Grip) -> bool:
+def gripper_known(machine: Machine, gripper: Grip) -> bool:
     """Whether the board knows where the gripper stands."""
     return machine.configured and bool(machine.status.known >> gripper.axis & 1)
 
 
 def prepare(machine: Machine, gripper: Grip, start: int | None) -> None:
     """Have the gripper's axis configured, known and on; start: counts where a lost one is taken to stand."""
-    is_known = known(machine, gripper)
+    is_known = gripper_known(machine, gripper)
     if is_known and start is not None:
         raise GripperKnownError("the gripper's position is known, and only a lost one may be assumed")
     if not is_known and start is None and not machine.session.port.simulated:
@@ -74,7 +74,7 @@ def grip(machine: Machine, gripper: Grip, target: int) -> int:
     if machine.status.counts[gripper.axis] != target:
         machine.run_axis(lay, gripper.axis, board.clock)
         machine.in_time()
-        if not known(machine, gripper):
+        if not gripper_known(machine, gripper):
             raise GripperLostError("the board has lost the gripper's position on the way")
         if machine.status.counts[gripper.axis] != target:
             raise LinkError(

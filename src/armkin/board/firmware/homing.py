@@ -70,20 +70,24 @@ def searches(
         joint_index(arm, name)
     wanted = [j for j, name in enumerate(arm.joint_names) if not names or name in names]
     wanted = [j for group in _groups(arm, wanted) for j in group]
-    bare = [arm.joint_names[j] for j in wanted if arm.homing[j] is None]
-    if rest_at_home and len(bare) < len(wanted):
-        wanted = [j for j in wanted if arm.homing[j] is not None]
-    elif bare:
+    orders = _orders(arm, wanted, rest_at_home=rest_at_home)
+    in_order = sorted(orders, key=lambda j: (orders[j] is None, orders[j] or 0, j))
+    return [_search(arm, configuration, j) for j in in_order]
+
+
+def _orders(arm: Arm, wanted: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
+    """Of the joints that have a homing: joint -> its order. Raises NoHomingError for others that are not left out."""
+    orders = {j: homing.order for j in wanted if (homing := arm.homing[j]) is not None}
+    bare = [arm.joint_names[j] for j in wanted if j not in orders]
+    if bare and not (rest_at_home and orders):
         raise NoHomingError(
             f"{arm.path} has no homing for {', '.join(bare)}",
             advice="without limit switches put the arm in its home pose, then Machine.prepare(assume=arm.home)",
             joints=bare,
             file=arm.path,
-            some=len(bare) < len(wanted),
+            some=bool(orders),
         )
-    orders = {j: homing.order for j, homing in enumerate(arm.homing) if homing is not None}
-    wanted.sort(key=lambda j: (orders[j] is None, orders[j] or 0, j))
-    return [_search(arm, configuration, j) for j in wanted]
+    return orders
 
 
 def home(
@@ -111,10 +115,10 @@ def home(
     for group in sorted(_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
         for search in (s for s in todo if s.joint in group):
             announce(arm.joint_names[search.joint])
-            status, edge = _found(machine, search)
+            status, edge = _searched(machine, search)
             found.append(_lost(machine, search, edge, known=arm.joint_names[search.joint] not in lost_before))
             beyond = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
-            q[search.joint] = _at(arm, search.joint) + per_count[search.joint] @ beyond
+            q[search.joint] = _switch_value(arm, search.joint) + per_count[search.joint] @ beyond
         motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))
         machine.vouch(dict(zip([axes[k] for k in motors], pulses(arm, q)[motors].tolist(), strict=True)))
     if rest_at_home:
@@ -131,11 +135,11 @@ def _lost(machine: Machine, search: Search, edge: Status, *, known: bool) -> Los
     counts = [edge.counts[axis] for axis in machine.configuration.axes]
     gain = arm.motor_gain[:, j]
     leader = gain[np.abs(gain).argmax()]
-    steps = round(float((joints(arm, counts)[j] - _at(arm, j)) * leader))
+    steps = round(float((joints(arm, counts)[j] - _switch_value(arm, j)) * leader))
     return LostSteps(arm.joint_names[j], steps, steps / float(leader))
 
 
-def _found(machine: Machine, search: Search) -> tuple[Status, Status]:
+def _searched(machine: Machine, search: Search) -> tuple[Status, Status]:
     """Carry out one search; status at rest, and at the switch's edge (page 1)."""
     session = machine.session
     try:
@@ -175,7 +179,7 @@ def switches(arm: Arm, configuration: Configuration) -> Callable[[int, Sequence[
         if j is None or homing is None:
             return True
         value = joints(arm, start + np.array([net[axis] for axis in axes]))[j]
-        pressed = (value - _at(arm, j)) * homing.direction >= 0
+        pressed = (value - _switch_value(arm, j)) * homing.direction >= 0
         return bool(pressed) == (homing.normally == "closed")  # a pressed switch opens, or closes to ground
 
     return level
@@ -197,7 +201,7 @@ def _groups(arm: Arm, wanted: Sequence[int]) -> list[list[int]]:
     return groups
 
 
-def _at(arm: Arm, joint: int) -> float:
+def _switch_value(arm: Arm, joint: int) -> float:
     """Joint value at the switch's edge [rad | mm]."""
     homing = arm.homing[joint]
     assert homing is not None

@@ -83,21 +83,21 @@ def free_seconds(machine: Machine, joint: int, rates: dict[int, int]) -> float:
     return seconds
 
 
-def jog(machine: Machine, rate: dict[int, int], seconds: float, more: Callable[[], bool] = lambda: True) -> None:
+def jog(machine: Machine, rate: dict[int, int], seconds: float, goes_on: Callable[[], bool] = lambda: True) -> None:
     """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.
 
-    more: asked every 10 ms; the motion ends when it says no.
+    goes_on: asked every 10 ms; the motion ends when it says no.
     """
     vector = [rate.get(axis, 0) for axis in range(len(machine.configuration.board.axes))]
     port, session = machine.port, machine.session
     begin = port.now()
     try:
-        while (left := seconds - (port.now() - begin)) > 0 and more():
+        while (left := seconds - (port.now() - begin)) > 0 and goes_on():
             session.call(lambda tag: protocol.jog(tag, vector))
             if session.state != State.JOGGING:
                 break  # at a limit
             pause = port.now() + min(0.08, left)
-            while port.now() < pause and more():
+            while port.now() < pause and goes_on():
                 session.pump(max(0.001, min(0.01, pause - port.now())))
         session.call(lambda tag: protocol.jog(tag, [0] * len(vector)))
         for _ in session.arrivals():

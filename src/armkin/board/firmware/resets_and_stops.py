@@ -59,7 +59,7 @@ def explain(machine: Machine, error: DeviceError) -> LinkError:
             "armkin and its firmware disagree: please report it with the robot file"
         )
     try:
-        machine.status = machine.session.rest()
+        machine.status = machine.session.wait_for_rest()
         if machine.status.error == Error.NO_SESSION:
             machine.info = machine.session.reopen()
             machine.status = machine.session.status()

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware.segments.remaining_plan import Place, onwards, places_on
+from armkin.board.firmware.segments.remaining_plan import Place, places_on, remaining_trajectory
 from armkin.board.firmware.segments.trajectory_to_counts import Cut
 from armkin.board.ports import note_path, read_note, remove_note, write_note
 from armkin.errors import HeldError, LinkError, NothingHeldError
@@ -99,9 +99,9 @@ def under_way(
 
     note: of the motion that is resumed; None: all of it.
     """
-    place = None if note is None else find(machine, note, cuts)
-    left = cuts if place is None else rest(machine, cuts, place)
-    started = None if note is None or place is None else (note, place.done)
+    place = None if note is None else find_place(machine, note, cuts)
+    left = cuts if place is None else remaining_parts(machine, cuts, place)
+    started = None if note is None or place is None else (note, place.elapsed)
     with Trip(machine, cuts, started) as trip:
         yield left, 0 if place is None else place.part, trip.progress
 
@@ -125,7 +125,7 @@ def recall(machine: Machine) -> Note:
     return note
 
 
-def find(machine: Machine, note: Note, parts: Sequence[Cut]) -> Place:
+def find_place(machine: Machine, note: Note, parts: Sequence[Cut]) -> Place:
     """Where the arm stands on the plan that was made anew.
 
     Raises NothingHeldError if it is another plan, LinkError if the arm does not stand on it.
@@ -138,13 +138,13 @@ def find(machine: Machine, note: Note, parts: Sequence[Cut]) -> Place:
             f"the arm does not stand on the motion that was held: {machine.describe()}",
             advice="plan a new motion: it starts where the arm stands",
         )
-    nearest = min(abs(place.done - note.seconds) for place in found)
-    return next(place for place in found if abs(place.done - note.seconds) <= nearest + _SURE)
+    nearest = min(abs(place.elapsed - note.seconds) for place in found)
+    return next(place for place in found if abs(place.elapsed - note.seconds) <= nearest + _SURE)
 
 
-def rest(machine: Machine, parts: Sequence[Cut], place: Place) -> list[Cut]:
+def remaining_parts(machine: Machine, parts: Sequence[Cut], place: Place) -> list[Cut]:
     """What is left of the parts from a place on: the first one from where the arm stands, the others as they are."""
-    left = onwards(parts[place.part], place, machine.joints())
+    left = remaining_trajectory(parts[place.part], place, machine.joints())
     counts = np.array(machine.counts(), dtype=np.int64)
     return [machine.lay(left, counts), *parts[place.part + 1 :]]
 

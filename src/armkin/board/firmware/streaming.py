@@ -39,8 +39,8 @@ _BETWEEN = 2.2  # times that between ticks
 _ACK = 16  # [bytes] of an answer
 
 
-def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[float], None]) -> Status:
-    """Send frames until there are no more and the arm stands; left: told the seconds of motion to come."""
+def stream(session: Session, frames: Iterator[Batch | None], report_left: Callable[[float], None]) -> Status:
+    """Send frames until there are no more and the arm stands; report_left: told the seconds of motion to come."""
     more, at_rest = True, False  # whether what was submitted ends at rest
     held: Batch | object | None = None  # the beginning of the next move
     while more or session.pending[0]:
@@ -57,9 +57,9 @@ def stream(session: Session, frames: Iterator[Batch | None], left: Callable[[flo
             session.submit(batch.payload, len(batch.segments), batch.seconds)
             at_rest = batch.at_rest
         session.pump()
-        left(session.under_way + session.queued / 1000)
+        report_left(session.under_way + session.queued / 1000)
     for seconds in session.arrivals():
-        left(seconds)
+        report_left(seconds)
     return _standing(session)
 
 
@@ -119,10 +119,10 @@ def lead(session: Session, frames: Sequence[tuple[float, int, int]], least: floa
     """
     busy = next((seconds for load, seconds in _LEAD_BUSY if _load(session) > load), 0.0)
     bad = LEAD_BAD if session.line.damaged else 0.0
-    return max(least, busy, bad, min(_LEAD + _behind(session, frames, unheard), LEAD_MOST))
+    return max(least, busy, bad, min(_LEAD + _lateness(session, frames, unheard), LEAD_MOST))
 
 
-def _there(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> list[float]:
+def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> list[float]:
     """When the board has queued each of these frames, in seconds from the first one's first byte.
 
     Two frames are on their way at a time; between ticks, behind the `unheard` seconds, the board is slower.
@@ -140,13 +140,13 @@ def _there(session: Session, frames: Sequence[tuple[float, int, int]], unheard: 
     return there
 
 
-def _behind(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> float:
+def _lateness(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> float:
     """Seconds by which a frame would come too late, at most, if the motion began with the first.
 
     The board's queue holds the time to a stop at any moment (section 7), which from rest is at most the time since then
     in which the arm would have speeded up evenly; a slow arm's need only not be empty.
     """
-    there, ahead = _there(session, frames, unheard), unheard * (1 / UNHEARD - 1)
+    there, ahead = _queued_times(session, frames, unheard), unheard * (1 / UNHEARD - 1)
     behind = done = 0.0  # done: [s] of motion in all before a frame
     for k, (seconds, _, _) in enumerate(frames):
         if k:
@@ -156,7 +156,7 @@ def _behind(session: Session, frames: Sequence[tuple[float, int, int]], unheard:
     return behind
 
 
-def _left(session: Session) -> float:
+def _seconds_queued(session: Session) -> float:
     """Seconds of motion that the board has, or will have: a guess, by what it said last."""
     queued = 0.0 if session.state == State.IDLE else session.queued / 1000 - (session.port.now() - session.heard)
     return session.under_way + max(0.0, queued)
@@ -173,9 +173,9 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
     at = [int(move.start[k]) for k in moving]
     room = min(session.info.frame - 4, session.info.receive - QUESTION - 6)
     places = [count * protocol.STEP + protocol.HALF for count in at]
-    source = (s.of(moving) for s in move.segments)
+    source = (s.for_axes(moving) for s in move.segments)
     todo: list[Segment] = list(islice(source, _SEEN))
-    sizes = _paused(session, todo, room, clock, least) if todo else []
+    sizes = _insert_pause(session, todo, room, clock, least) if todo else []
     begins = not sizes
     while todo := todo + list(islice(source, max(0, _BATCH[1] + 1 - len(todo)))):
         fits = _BATCH[1] if begins else max(_BATCH[0], session.pending[1])  # more would wait for room
@@ -191,12 +191,12 @@ def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least
         at = end
 
 
-def _paused(session: Session, todo: list[Segment], room: int, clock: int, least: float) -> list[int]:
+def _insert_pause(session: Session, todo: list[Segment], room: int, clock: int, least: float) -> list[int]:
     """Put the pause before a motion into its segments; how many of them its first frames have, none for no pause."""
     pause, sizes = _start(session, todo, room, clock, least)
     # Behind a rest, for which it may wait until less is left there: the queue is filled while that lasts.
     waits = _soonest(seconds_of(todo[: _fit(todo, _BATCH[1], room)], clock))
-    if not session.line.damaged and min(_left(session), waits) >= pause:
+    if not session.line.damaged and min(_seconds_queued(session), waits) >= pause:
         return []
     if longer := later(todo[0], pause, clock):
         todo[0] = longer
@@ -242,7 +242,7 @@ def _start(session: Session, todo: Sequence[Segment], room: int, clock: int, lea
     for sizes in [(_BATCH[0] - 1,)] if session.line.noisy else _STARTING:
         frames = _first_frames(todo, sizes, room, clock, paused=not unheard)
         pause = lead(session, frames, least, unheard)
-        ways.append((_there(session, frames, unheard)[0] + pause, pause, list(sizes)))
+        ways.append((_queued_times(session, frames, unheard)[0] + pause, pause, list(sizes)))
     return min(ways)[1:]
 
 

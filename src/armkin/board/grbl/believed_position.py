@@ -35,10 +35,10 @@ class Place:
     def __init__(self, session: Session, arm: Arm, axes: Sequence[Axis]) -> None:
         self._session, self._arm, self._axes = session, arm, axes
         self.record = Record(session.port, arm)
-        self.why = "it was not read"  # the position is lost; empty: it is known
+        self.loss_reason = "it was not read"  # the position is lost; empty: it is known
         self.offset: NDArray[np.int64] = np.zeros(len(axes), dtype=np.int64)  # machine steps less counts
         self._steps = self.offset
-        self._kept: Kept = {}
+        self._offsets_left: Kept = {}
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors; they mean nothing while the position is lost."""
@@ -50,22 +50,22 @@ class Place:
         status = self._session.sure_status()
         self._session.demand_rest(status)
         if status.position is None:
-            self.why = "GRBL reports no machine position: armkin setup writes $10, which asks for it"
+            self.loss_reason = "GRBL reports no machine position: armkin setup writes $10, which asks for it"
             return
         if max(axis.index for axis in self._axes) >= len(status.position):
             letter = self._axes[-1].letter
             raise LinkError(f"GRBL has {len(status.position)} axes; {self._arm.name} needs {letter}, too")
         motion = self._ask()
-        why, left = self.record.differs(self._kept), self.record.left
+        why, left = self.record.differs(self._offsets_left), self.record.note
         if status.state == "Alarm":
             why = "GRBL is in an alarm"
         elif why is None and left is not None:
             self.offset = np.asarray(left.offset, dtype=np.int64)
             counts = self.counts()
-            why = self.record.moved(counts) or unbelievable(self._arm, counts)
+            why = self.record.moved_text(counts) or unbelievable(self._arm, counts)
             if why is None and left.plan is not None and list(counts) != left.counts and motion != "G1":
                 why = "GRBL was reset in a motion, or another program has spoken to it there"
-        self.why = why or ""
+        self.loss_reason = why or ""
 
     def vouch(self, counts: NDArray[np.int64]) -> None:
         """Take somebody's word that the motors stand at these counts: set the mark, and record what GRBL keeps."""
@@ -73,42 +73,45 @@ class Place:
         steps = self._machine(self._session.sure_status())
         mark = MARK + random.randrange(MARK)
         self._ask()
-        values = zip(steps, self._axes, np.asarray(self._kept["G54"], dtype=float), strict=True)
+        values = zip(steps, self._axes, np.asarray(self._offsets_left["G54"], dtype=float), strict=True)
         words = [f"{axis.letter}{n / axis.steps - g54 - mark:.5f}" for n, axis, g54 in values]
         self._session.ask(f"G92{''.join(words)}")
         self._ask()
-        if any(abs(float(value) - mark) > 0.01 for value in self._kept["G92"]) or self._kept["system"] != "G54":
+        if (
+            any(abs(float(value) - mark) > 0.01 for value in self._offsets_left["G92"])
+            or self._offsets_left["system"] != "G54"
+        ):
             raise LinkError("GRBL did not take the mark that tells its resets: was a line damaged on its way?")
-        self.offset, self.why = steps - counts, unbelievable(self._arm, counts.tolist()) or ""
-        self.record.stands(self._kept, counts.tolist(), self.offset.tolist())
+        self.offset, self.loss_reason = steps - counts, unbelievable(self._arm, counts.tolist()) or ""
+        self.record.write_position(self._offsets_left, counts.tolist(), self.offset.tolist())
 
     def arrived(self) -> None:
         """Record that the arm rests where it was read."""
-        self.record.stands(self._kept, self.counts(), self.offset.tolist())
+        self.record.write_position(self._offsets_left, self.counts(), self.offset.tolist())
 
-    def after_reset(self, counts: Sequence[int], why: str) -> None:
+    def after_reset(self, counts: Sequence[int], reason: str) -> None:
         """A reset at a standstill has cleared the mark: set it anew, if all that outlives a reset is as it was left.
 
-        why: the position was lost already.
+        reason: the position was lost already.
         """
-        if not why:
+        if not reason:
             self._ask()
-            left = self.record.left
-            if left is None or any(left.marks.get(name) != self._kept[name] for name in _LASTING):
-                why = "another program has set an offset while the arm moved"
-        if why:
-            self.forget(why)
+            left = self.record.note
+            if left is None or any(left.marks.get(name) != self._offsets_left[name] for name in _LASTING):
+                reason = "another program has set an offset while the arm moved"
+        if reason:
+            self.forget(reason)
         else:
             self.vouch(np.asarray(counts, dtype=np.int64))
 
-    def forget(self, why: str) -> None:
+    def forget(self, reason: str) -> None:
         """Nobody knows where the arm stands."""
-        self.why = why
+        self.loss_reason = reason
         self.record.forget()
 
     def _ask(self) -> str:
         """Read what GRBL keeps that moves targets, of the arm's axes; returns the motion mode in force."""
-        offsets, words = self._session.kept()
+        offsets, words = self._session.stable_offsets()
         ours = [axis.index for axis in self._axes]
         found: Kept = {
             name: list(values) if name == "TLO" else [values[k] for k in ours if k < len(values)]
@@ -116,7 +119,7 @@ class Place:
         }
         systems = (word for word in words if word.partition(".")[0] in _LASTING)
         scaled = (word for word in words if word.startswith("G51"))
-        self._kept = {**found, "system": next(systems, "none"), "scale": next(scaled, "G50")}
+        self._offsets_left = {**found, "system": next(systems, "none"), "scale": next(scaled, "G50")}
         return words[0]
 
     def _machine(self, report: Report) -> NDArray[np.int64]:

@@ -33,7 +33,7 @@ _FRESH = 5.0  # [s] after which the settings are read again: jogging prepares th
 class GrblMachine(StepperArm):
     """An arm on the GRBL board behind an open port."""
 
-    put = "home it, or put it in its home pose and say so"
+    cure = "home it, or put it in its home pose and say so"
     piece = trajectory_to_gcode.PIECE
     homes = True
     differences = (
@@ -49,16 +49,16 @@ class GrblMachine(StepperArm):
         self.session.open()
         self._place = Place(self.session, arm, self.axes)
         self._record = self._place.record
-        self.settings, self.told = self.session.settings(), port.now()  # when they were read
+        self.settings, self.settings_time = self.session.settings(), port.now()  # when they were read
         self._spindle = Spindle(self.session)
         self._read()
 
     # Where it stands
 
     @property
-    def why(self) -> str:
+    def loss_reason(self) -> str:
         """Why the position is lost, in words; empty while it is known."""
-        return self._place.why
+        return self._place.loss_reason
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
@@ -117,12 +117,12 @@ class GrblMachine(StepperArm):
         """A trajectory that starts at counts (motors,)."""
         return trajectory_to_gcode.job(trajectory, start)
 
-    def _carry_out(self, job: Job, tell: Callable[[float], None]) -> bool:
+    def _carry_out(self, job: Job, report: Callable[[float], None]) -> bool:
         """Send a job's lines and watch the arm on its way; the position at its end is recorded."""
         began, watch = self.port.now(), Watch(job, self.axes, self._place.offset)
 
         def tick() -> bool:
-            tell(self.port.now() - began)
+            report(self.port.now() - began)
             watch.heed(self.session.fresh(), self.port.now() - began)
             return self._stop()
 
@@ -134,15 +134,15 @@ class GrblMachine(StepperArm):
         if self.session.status().state in ("Run", "Jog"):
             raise LinkError("the arm moves on after its plan: another program drives it")
         self._read()
-        if not self.why and self.counts() == tuple(job.end.tolist()):
+        if not self.loss_reason and self.counts() == tuple(job.end.tolist()):
             self._place.arrived()
         return True
 
-    def _begin(self, job: Job, *, seen: bool) -> None:
+    def _begin(self, job: Job, *, position_read: bool) -> None:
         """Make sure that the arm stands where a job starts, at its own feed; record the motion."""
-        if not seen:
+        if not position_read:
             self.session.realtime(replies.PLAIN_FEED)
-        super()._begin(job, seen=seen)
+        super()._begin(job, position_read=position_read)
         if self.session.feed != 100:
             raise LinkError(f"GRBL overrides feeds by {self.session.feed} %, and does not take that back")
 
@@ -159,7 +159,7 @@ class GrblMachine(StepperArm):
         alarm = self.session.sure_status().state == "Alarm"
         counts = self.counts()
         self._reset()
-        self._place.after_reset(counts, "GRBL is in an alarm" if alarm else self.why)
+        self._place.after_reset(counts, "GRBL is in an alarm" if alarm else self.loss_reason)
 
     def grip(self, gripper: Gripper, value: float) -> float:
         """Set the M3 output that the gripper hangs on, and return the S word: GRBL measures nothing."""
@@ -170,7 +170,7 @@ class GrblMachine(StepperArm):
 
     def _reset(self) -> None:
         self.session.reset()
-        self._spindle.again()
+        self._spindle.regrip()
 
     def _explain(self, error: LinkError) -> LinkError:
         if not isinstance(error, GrblError) or error.error:  # what is queued must not go on by itself
@@ -183,12 +183,12 @@ class GrblMachine(StepperArm):
             self._place.forget(str(error))
         return LinkError(f"{error}\n{self.standing()}")
 
-    def home(self, at: Sequence[float]) -> None:
-        """Run GRBL's homing cycle; at: counts where each motor's switch closes.
+    def home(self, counts: Sequence[float]) -> None:
+        """Run GRBL's homing cycle; counts: counts where each motor's switch closes.
 
         Raises LinkError, before anything moves, if GRBL's settings have it look at the other end.
         """
-        wrong = [one for one in self.wrong() if one.number in settings.HOMING and one.found is not None]
+        wrong = [one for one in self.wrong() if one.number in settings.HOMING and one.actual is not None]
         if wrong:
             raise LinkError(f"GRBL would not home as {self.arm.name} needs: {wrong[0]}; armkin setup writes it")
         self._place.forget("its homing was interrupted")
@@ -198,7 +198,7 @@ class GrblMachine(StepperArm):
             raise self._explain(error) from None
         pull = self.settings.get(27, 0.0)
         away = [pull * axis.steps * (1 if axis.upward else -1) for axis in self.axes]
-        self.vouch(np.rint(np.asarray(at) - away).tolist())
+        self.vouch(np.rint(np.asarray(counts) - away).tolist())
 
     def _read(self) -> None:
         self._place.read()
@@ -210,8 +210,8 @@ def _serious(machine: GrblMachine) -> list[settings.Difference]:
     $$ has no checksum: two readings must find them.
     """
     session, now = machine.session, machine.port.now()
-    for _ in range(2 if session.was_reset or now > machine.told + _FRESH else 0):
-        machine.settings, machine.told = session.settings(), now
+    for _ in range(2 if session.was_reset or now > machine.settings_time + _FRESH else 0):
+        machine.settings, machine.settings_time = session.settings(), now
         if not any(difference.serious for difference in machine.wrong()):
             break
     return [difference for difference in machine.wrong() if difference.serious]

@@ -156,7 +156,7 @@ class Session:
         """A status report that three in a row agree on: none has a checksum. In motion they cannot: the last one."""
         return _agreed(self.status, self.port.name, lambda report: report.state in ("Run", "Jog", "Home"))
 
-    def kept(self) -> tuple[dict[str, tuple[float, ...]], tuple[str, ...]]:
+    def stable_offsets(self) -> tuple[dict[str, tuple[float, ...]], tuple[str, ...]]:
         """Offsets by name (G54 to G59, G92, TLO) and the words of ``$G``: each as three readings in a row agree on."""
         seen: dict[str, tuple[Any, int]] = {}  # what was read last, and how often in a row
         for _ in range(_READINGS):
@@ -232,9 +232,9 @@ class Session:
         self._sent.append((len(data), line))
         self.port.write(data)
 
-    def _wait(self, done: Callable[[], bool], seconds: float) -> bool:
+    def _wait(self, finished: Callable[[], bool], seconds: float) -> bool:
         end = self.port.now() + seconds
-        while not done():
+        while not finished():
             if self.port.now() >= end:
                 return False
             self._pump(0.01)
@@ -270,13 +270,13 @@ class Session:
             self._other.append(line)
             del self._other[:-400]
 
-    def _take_report(self, found: replies.Report) -> None:
-        if self.state != found.state:
-            LOG.info("GRBL: %s", found.state)
-            self.state = found.state
-        self.report = self._unseen = found
-        self.feed = self.feed if found.feed is None else found.feed
-        self._heard += found.state in ("Run", "Jog", "Home")  # else it only repeats itself
+    def _take_report(self, report: replies.Report) -> None:
+        if self.state != report.state:
+            LOG.info("GRBL: %s", report.state)
+            self.state = report.state
+        self.report = self._unseen = report
+        self.feed = self.feed if report.feed is None else report.feed
+        self._heard += report.state in ("Run", "Jog", "Home")  # else it only repeats itself
 
 
 def _agreed(read: Callable[[], T], port: str, enough: Callable[[T], bool]) -> T:

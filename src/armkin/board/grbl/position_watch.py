@@ -35,28 +35,29 @@ class Watch:
     def __init__(self, job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> None:
         self._axes, self._offset = axes, offset
         self._times, self._points = _path(job)
-        self._at = 0  # of the points, which the arm has passed
+        self._points_passed = 0  # of the points, which the arm has passed
         self._doubts = 0
-        self._done, self._since = 0.0, 0.0  # seconds of the plan that were done, and since the start when that was seen
+        self._plan_time = 0.0  # [s] of the plan that were done
+        self._progress_time = 0.0  # [s] since the start when that was seen
         self._pause = 0.0  # [s] that the arm may stand there by the plan
 
     def heed(self, report: Report | None, elapsed: float) -> None:
         """Raise LinkError if a report, where there is one, tells of a damaged line, or of another program's."""
         if report is not None and report.feed is not None and report.feed > 100:
             raise LinkError(f"another program has set feeds to {report.feed} %")
-        wrong = None if report is None else self.see(report, elapsed)
+        wrong = None if report is None else self.fault(report, elapsed)
         if wrong:
             raise LinkError(
                 f"the arm is not where its plan is: {wrong}; a line was damaged on its way, or another program has "
                 "sent one"
             )
 
-    def see(self, report: Report, elapsed: float) -> str | None:
+    def fault(self, report: Report, elapsed: float) -> str | None:
         """What is wrong with a report that came so many seconds after the start; None while nothing is."""
         if report.position is None or report.state not in ("Run", "Idle"):
             return None
         steps = np.array([report.position[axis.index] * axis.steps for axis in self._axes])
-        found = self._find(steps - self._offset)
+        found = self._plan_times(steps - self._offset)
         wrong = "it has left its path" if found is None else None
         if found is not None and found[0] > elapsed + AHEAD:
             wrong = "it is faster than planned"
@@ -66,27 +67,27 @@ class Watch:
         return None if wrong or found is None or report.state == "Idle" else self._creeps(*found, elapsed)
 
     def _creeps(self, first: float, last: float, elapsed: float) -> str | None:
-        if last >= min(self._done + CREEP[0], float(self._times[-1])):
-            self._done, self._since, self._pause = last, elapsed, 0.0
+        if last >= min(self._plan_time + CREEP[0], float(self._times[-1])):
+            self._plan_time, self._progress_time, self._pause = last, elapsed, 0.0
         self._pause = max(self._pause, last - first)
-        return "it hardly moves on" if elapsed - self._since > CREEP[1] + self._pause else None
+        return "it hardly moves on" if elapsed - self._progress_time > CREEP[1] + self._pause else None
 
-    def _find(self, at: Array) -> tuple[float, float] | None:
+    def _plan_times(self, counts: Array) -> tuple[float, float] | None:
         """Seconds of the plan when the motors stand at these counts, first and last; None: beside the path."""
-        begin = max(self._at - 1, 0)
+        begin = max(self._points_passed - 1, 0)
         points = self._points[begin : begin + _WINDOW + 1]
         if len(points) == 1:
-            return (0.0, 0.0) if np.abs(at - points[0]).max() <= BESIDE else None
+            return (0.0, 0.0) if np.abs(counts - points[0]).max() <= BESIDE else None
         way = np.diff(points, axis=0)
-        share = ((at - points[:-1]) * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-12)
+        share = ((counts - points[:-1]) * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-12)
         share = np.clip(share, 0.0, 1.0)
-        near = np.abs(at - points[:-1] - share[:, None] * way).max(axis=1) <= BESIDE
+        near = np.abs(counts - points[:-1] - share[:, None] * way).max(axis=1) <= BESIDE
         if not near.any():
             return None
         first = int(near.argmax())
         last = first + int(np.argmin(np.append(near[first:], False))) - 1  # of those that follow without a gap
         times = self._times[begin:]
-        self._at = begin + first
+        self._points_passed = begin + first
         ends = [float(times[k] + share[k] * (times[k + 1] - times[k])) for k in (first, last)]
         return ends[0], ends[1]
 
@@ -97,7 +98,7 @@ def _path(job: Job) -> tuple[Array, Array]:
     times, points = [np.zeros(1)], [np.asarray(job.start, dtype=float)[None]]
     for stretch, began in zip(job.trajectory.stretches, job.trajectory.begins, strict=False):
         t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE)), 1) + 1)[1:]
-        at = stretch.at(t)
+        at = stretch.evaluate(t)
         times.append(began + t)
         points.append(places(arm, at) if isinstance(stretch, Straight) else pulses(arm, at).astype(float))
     return np.concatenate(times), np.concatenate(points)

@@ -37,22 +37,22 @@ class Difference:
     """A setting that is not as the robot file wants it."""
 
     number: int
-    what: str
-    found: float | None
-    wanted: float
+    meaning: str
+    actual: float | None
+    expected: float
     serious: bool  # motion would be wrong or too fast; otherwise only slower than planned
 
     def __str__(self) -> str:
         """For people, and as the line that mends it."""
-        found = "is not there" if self.found is None else f"is {self.found:g}"
-        return f"${self.number} ({self.what}) {found}: the robot file wants ${self.number}={self.wanted:g}"
+        found = "is not there" if self.actual is None else f"is {self.actual:g}"
+        return f"${self.number} ({self.meaning}) {found}: the robot file wants ${self.number}={self.expected:g}"
 
     def line(self) -> str:
         """The line that mends it; grblHAL takes no 255.000 where it wants a whole number."""
-        return f"${self.number}={self.wanted:.0f}" if self.number in _WHOLE else f"${self.number}={self.wanted:.3f}"
+        return f"${self.number}={self.expected:.0f}" if self.number in _WHOLE else f"${self.number}={self.expected:.3f}"
 
 
-def wanted(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, tuple[str, float]]:
+def expected_settings(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, tuple[str, float]]:
     """GRBL's settings for an arm: number -> what it is, value; hal: of grblHAL."""
     found: dict[int, tuple[str, float]] = {
         1: ("keep the motors on at rest", 255),
@@ -76,14 +76,14 @@ def wanted(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, tuple[str, f
     return found
 
 
-def differences(axes: Sequence[Axis], found: Mapping[int, float], *, hal: bool = False) -> list[Difference]:
+def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool = False) -> list[Difference]:
     """What is not as the robot file wants it; hal: of grblHAL.
 
     A greatest speed or acceleration below the robot file's is not serious: GRBL is slower than planned, no more.
     """
     result = []
-    for number, (what, value) in wanted(axes, hal=hal or G92_VOLATILE in found).items():
-        there, bits = found.get(number), _bits(number, axes)
+    for number, (what, value) in expected_settings(axes, hal=hal or G92_VOLATILE in actual).items():
+        there, bits = actual.get(number), _bits(number, axes)
         if there is not None and bits is not None:
             value = int(there) & ~bits | int(value) & bits  # the other bits are not ours
         if there is not None and _same(number, there, value):
@@ -100,10 +100,10 @@ def _bits(number: int, axes: Sequence[Axis]) -> int | None:
     return {10: 3, 22: 1}.get(number)
 
 
-def _same(number: int, found: float, value: float) -> bool:
+def _same(number: int, actual: float, value: float) -> bool:
     if number == 10:
-        return int(found) & 1 == 1  # machine position; the buffer is good to know, no more
-    return math.isclose(found, value, rel_tol=0, abs_tol=0.0006)
+        return int(actual) & 1 == 1  # machine position; the buffer is good to know, no more
+    return math.isclose(actual, value, rel_tol=0, abs_tol=0.0006)
 
 
 def _floor(value: float) -> float:

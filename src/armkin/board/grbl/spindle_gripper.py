@@ -42,7 +42,7 @@ class Spindle:
         self._session.ask(f"G4P{seconds:.3f}", patience=seconds + 5.0)
         return value
 
-    def again(self) -> None:
+    def regrip(self) -> None:
         """After a reset, which switches M3 off: grip what was gripped, unless GRBL is in an alarm."""
         report = self._session.report
         if self.value is not None and report is not None and report.state != "Alarm":

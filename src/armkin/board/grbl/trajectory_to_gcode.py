@@ -34,7 +34,7 @@ def lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> Iterator
     for stretch in job.trajectory.stretches:
         before = idle = 0.0
         for t in _times(stretch):
-            goal = np.asarray(pulses(arm, stretch.at(np.array([t]))[0]), dtype=np.int64)
+            goal = np.asarray(pulses(arm, stretch.evaluate(np.array([t]))[0]), dtype=np.int64)
             way = float(np.linalg.norm((goal - at) / steps))
             if way > 0.0:
                 speed = way * stretch.law.peak if isinstance(stretch, Straight) else way / (t - before)

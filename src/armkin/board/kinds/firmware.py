@@ -111,7 +111,7 @@ class FirmwareBoard(Board):
 
     # Connected
 
-    def again(self) -> None:
+    def begin_job(self) -> None:
         """Begin a new session: what ended the last one is over."""
         self.connect(self.machine.port, self.stop)
 
@@ -151,11 +151,11 @@ class FirmwareBoard(Board):
         jogging.rates(self.machine, joint, self._shown(joint, allowed))
         return allowed
 
-    def jog(self, joint: int, rate: float, seconds: float, more: Callable[[], bool] | None = None) -> None:
+    def jog(self, joint: int, rate: float, seconds: float, goes_on: Callable[[], bool] | None = None) -> None:
         """Move one joint [rad/s | mm/s] for a time; the board stops it at its limits, if it knows where it stands."""
         rates = jogging.rates(self.machine, joint, self._shown(joint, rate))
         free = jogging.free_seconds(self.machine, joint, rates)
-        jogging.jog(self.machine, rates, min(seconds, free), more or (lambda: True))
+        jogging.jog(self.machine, rates, min(seconds, free), goes_on or (lambda: True))
 
     def _shown(self, joint: int, rate: float) -> float:
         return rate if self.arm.prismatic[joint] else rate / units.DEGREE
@@ -199,7 +199,7 @@ class FirmwareBoard(Board):
 
     def grip_known(self) -> bool:
         """Whether the board knows where the gripper stands; a simulated one begins open."""
-        return self.machine.port.simulated or gripping.known(self.machine, self._grip())
+        return self.machine.port.simulated or gripping.gripper_known(self.machine, self._grip())
 
     def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
         """Move the gripper; assume: where a lost one stands, a servo jumps there first."""

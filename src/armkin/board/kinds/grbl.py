@@ -12,7 +12,7 @@ from armkin.board.backend.board import Board, Gripped
 from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.grbl_session import Session
 from armkin.board.grbl.motor_axes import axes_of
-from armkin.board.grbl.settings import wanted
+from armkin.board.grbl.settings import expected_settings
 from armkin.board.grbl.trajectory_to_gcode import job
 from armkin.board_catalogue import ForeignBoard
 from armkin.errors import UsageError
@@ -48,7 +48,7 @@ class GrblBoard(Board):
         from armkin.board.sim.sim_grbl import Grbl
 
         axes = axes_of(self.arm)
-        settings = {number: value for number, (_, value) in wanted(axes).items()}
+        settings = {number: value for number, (_, value) in expected_settings(axes).items()}
         count = max(axis.index for axis in axes) + 1
         return Grbl(axes=count, settings=settings, ends=dict.fromkeys(range(count), 0))
 
@@ -91,7 +91,7 @@ class GrblBoard(Board):
     def settings(self) -> list[dict[str, Any]]:
         """Settings that are not as the robot file wants them."""
         return [
-            {"setting": d.number, "what": d.what, "found": d.found, "wanted": d.wanted, "serious": d.serious}
+            {"setting": d.number, "what": d.meaning, "found": d.actual, "wanted": d.expected, "serious": d.serious}
             for d in self.machine.wrong()
         ]
 

@@ -58,13 +58,13 @@ class Difference:
     """An option of printer.cfg that is not as the robot file wants it."""
 
     setting: str
-    found: str | None
-    wanted: str
+    actual: str | None
+    expected: str
 
     def __str__(self) -> str:
         """For people."""
-        found = "is not there" if self.found is None else f"is {self.found}"
-        return f"{self.setting} {found}: the robot file wants {self.wanted}"
+        found = "is not there" if self.actual is None else f"is {self.actual}"
+        return f"{self.setting} {found}: the robot file wants {self.expected}"
 
 
 def axes_of(arm: Arm) -> list[Axis]:
@@ -119,24 +119,24 @@ def settings_of(axes: Sequence[Axis]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def differences(axes: Sequence[Axis], found: Mapping[str, Any]) -> list[Difference]:
+def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[Difference]:
     """What does not fit in `configfile.settings`: section -> option -> value, as Klipper has read its file.
 
     Pins are not compared: no program can know them. Ratios of `gear_ratio` count.
     """
-    printer = found.get("printer")
+    printer = actual.get("printer")
     printer = printer if isinstance(printer, Mapping) else {}
     wrong = []
     kinematics = printer.get("kinematics")
     if kinematics != "none":
-        wrong.append(Difference("[printer] kinematics", _said(kinematics), "none"))
+        wrong.append(Difference("[printer] kinematics", _value_text(kinematics), "none"))
     for option, least in (("max_velocity", RATE), ("max_accel", MAX_ACCEL)):
         value = printer.get(option)
         if not isinstance(value, int | float) or value < least:
-            wrong.append(Difference(f"[printer] {option}", _said(value), f"at least {least:g}"))
+            wrong.append(Difference(f"[printer] {option}", _value_text(value), f"at least {least:g}"))
     for axis in axes:
         name = f"[manual_stepper {axis.section}]"
-        section = found.get(name[1:-1])
+        section = actual.get(name[1:-1])
         if not isinstance(section, Mapping):
             wrong.append(Difference(name, None, f"one for motor {axis.name}"))
             continue
@@ -157,5 +157,5 @@ def _steps(section: Mapping[str, Any]) -> float | None:
         return None
 
 
-def _said(value: object) -> str | None:
+def _value_text(value: object) -> str | None:
     return None if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -57,7 +57,7 @@ class KlipperMachine(StepperArm):
         told = self.api.ask("info")
         self.version, self.state = str(told.get("software_version", "")), str(told.get("state", ""))
         self._message = str(told.get("state_message", "")).partition("\n")[0]
-        self._why, self._counts = "it was not read", np.zeros(len(self.axes), dtype=np.int64)
+        self._loss_reason, self._counts = "it was not read", np.zeros(len(self.axes), dtype=np.int64)
         self._record, self._marks = Record(port, arm), dict[str, str]()
         self.settings: dict[str, Any] = {}
         self._read()
@@ -65,9 +65,9 @@ class KlipperMachine(StepperArm):
     # Where it stands
 
     @property
-    def why(self) -> str:
+    def loss_reason(self) -> str:
         """Why the position is lost, in words; empty while it is known."""
-        return self._why
+        return self._loss_reason
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
@@ -104,7 +104,7 @@ class KlipperMachine(StepperArm):
             self.api.run(f"{begin} GCODE_AXIS=\n{place}\n{begin} GCODE_AXIS={axis.letter} {limits} {corner}")
         if self._ask() or self.counts() != tuple(counts):
             raise LinkError("Klipper did not take the arm's position: is it older than November 2025? Update it")
-        self._record.stands(self._marks, counts, [0] * len(counts))
+        self._record.write_position(self._marks, counts, [0] * len(counts))
         self._read()
 
     # Moving
@@ -113,22 +113,22 @@ class KlipperMachine(StepperArm):
         """A trajectory that starts at counts (motors,)."""
         return job(trajectory, start)
 
-    def _carry_out(self, job: Job, tell: Callable[[float], None]) -> bool:
+    def _carry_out(self, job: Job, report: Callable[[float], None]) -> bool:
         """Send a job's lines in their time, to the end of all that Klipper holds."""
-        whole = self._follow(job, tell)
+        whole = self._follow(job, report)
         self._settle()
-        if not self.why:
-            self._record.stands(self._marks, self.counts(), [0] * len(self.axes))
+        if not self.loss_reason:
+            self._record.write_position(self._marks, self.counts(), [0] * len(self.axes))
         return whole and not self._stop()
 
     def hold(self) -> None:
         """Wait until what was sent is done: Klipper takes nothing of it back."""
         self._settle()
 
-    def _follow(self, one: Job, tell: Callable[[float], None]) -> bool:
+    def _follow(self, job: Job, report: Callable[[float], None]) -> bool:
         """Send a job's lines a little ahead of their time; False if a stop was asked for and the arm brakes."""
-        ramp = braking(one.trajectory)
-        lines = trajectory_to_g1_lines.Lines(one, self.axes)
+        ramp = braking(job.trajectory)
+        lines = trajectory_to_g1_lines.Lines(job, self.axes)
         source = iter(lines)
         self.api.run(trajectory_to_g1_lines.HEAD)
         began, stopping = self.port.now(), False
@@ -140,7 +140,7 @@ class KlipperMachine(StepperArm):
                     stopping = True
                     lines.brake(ramp)
                 self.api.pump(0.01)
-                tell(min(self.port.now() - began, one.duration))
+                report(min(self.port.now() - began, job.duration))
                 if self.port.now() - began > lines.sent + _REST:
                     raise LinkError(f"Klipper on {self.port.name} has left {self.api.waiting()} requests unanswered")
         return not stopping
@@ -166,7 +166,7 @@ class KlipperMachine(StepperArm):
     def _read(self) -> None:
         """Read where the arm stands: known while that is where armkin left it."""
         why = self._ask() or self._record.differs(self._marks)
-        self._why = why or self._record.moved(self.counts()) or unbelievable(self.arm, self.counts()) or ""
+        self._loss_reason = why or self._record.moved_text(self.counts()) or unbelievable(self.arm, self.counts()) or ""
 
     def _ask(self) -> str:
         """Read Klipper's state, its configuration and its places; returns why these mean nothing, in words."""

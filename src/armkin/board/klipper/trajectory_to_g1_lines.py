@@ -55,19 +55,19 @@ class Lines:
                 if self._slower is not None:
                     break
                 t = now
-                yield self._line(t, self._rest(t) if t == self._job.duration else values)
+                yield self._line(t, self._rest_position(t) if t == self._job.duration else values)
         pace = 1.0
         while self._slower is not None and t < self._job.duration and pace > 0.0:
             pace = max(0.0, pace - self._slower)
             t = min(self._job.duration, t + PIECE * pace)
             rests = t == self._job.duration or pace == 0.0
-            yield self._line(self.sent + PIECE, self._rest(t) if rests else self._units(np.array([t]))[0])
+            yield self._line(self.sent + PIECE, self._rest_position(t) if rests else self._units(np.array([t]))[0])
 
     def _units(self, t: Array) -> list[list[float]]:
         """Where the axes are at times (T,) of the plan: T rows of axes, in Klipper's units."""
         return self._scaled(places(self._job.trajectory.arm, self._job.trajectory.q(t)))
 
-    def _rest(self, t: float) -> list[float]:
+    def _rest_position(self, t: float) -> list[float]:
         """Where the axes come to rest at a time of the plan: on whole steps."""
         return self._scaled(pulses(self._job.trajectory.arm, self._job.trajectory.q([t])))[0]
 

@@ -9,14 +9,14 @@ from contextlib import suppress
 from typing import Any
 
 
-def write_note(path: str, told: Mapping[str, Any]) -> None:
+def write_note(path: str, data: Mapping[str, Any]) -> None:
     """Replace a note as a whole; a full disk costs the note, not the motion."""
     new = f"{path}.{os.getpid()}"
     with suppress(OSError):
         remove_note(new)
         handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with os.fdopen(handle, "w", encoding="ascii") as file:
-            json.dump(told, file)
+            json.dump(data, file)
         os.replace(new, path)  # a link of that name is replaced, not followed
 
 

@@ -36,7 +36,7 @@ class SocketPort:
             self._socket.connect(name)
         except OSError as error:
             self.close()
-            raise LinkError(_why(name, error)) from None
+            raise LinkError(_open_error(name, error)) from None
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
@@ -68,7 +68,7 @@ class SocketPort:
         self._lock.release()
 
 
-def _why(name: str, error: OSError) -> str:
+def _open_error(name: str, error: OSError) -> str:
     if isinstance(error, FileNotFoundError):
         return f"there is no socket {name}: klippy.py is started with -a {name}"
     if isinstance(error, ConnectionRefusedError):

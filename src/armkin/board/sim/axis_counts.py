@@ -8,11 +8,11 @@ from armkin.board.firmware.wire.protocol import Image, RowImage
 from armkin.board.sim.host_settings import Setup
 
 
-def within(lower: int, upper: int, before: int, after: int) -> bool:
+def limit_rule_holds(lower: int, upper: int, old_count: int, new_count: int) -> bool:
     """The limit rule: inside, or not farther outside than before."""
-    if after < lower:
-        return after >= before
-    return after <= upper or after <= before
+    if new_count < lower:
+        return new_count >= old_count
+    return new_count <= upper or new_count <= old_count
 
 
 def row_value(row: RowImage, counts: list[int]) -> int:

@@ -50,7 +50,7 @@ class Commands:
         if self._motors.state not in states:
             raise RefusedError(Error.BUSY)
 
-    def _known(self, axis: int) -> bool:
+    def _axis_known(self, axis: int) -> bool:
         return bool(self._motors.axes.known >> axis & 1)
 
     def _configure(self, payload: bytes) -> None:
@@ -94,7 +94,7 @@ class Commands:
             axis = self._setup.image.axes[i]
             if self._setup.servo(i) and not axis.lower <= count <= axis.upper:
                 raise RefusedError(Error.VALUE, i)
-            if self._known(i):
+            if self._axis_known(i):
                 raise RefusedError(Error.KNOWN, i)
         self._motors.place(counts)
         self._setup.retained = False
@@ -113,7 +113,7 @@ class Commands:
         if idle:
             self._batches.begin()
         segments = self._batches.check(batch, self._motors.axes.known)
-        if idle and (switch := self._inputs.ahead(segments[0].rates)) is not None:
+        if idle and (switch := self._inputs.switch_ahead(segments[0].rates)) is not None:
             raise RefusedError(Error.LIMIT_SWITCH, switch)
         self._motors.append(segments, batch.at_rest, batch.brake)
 
@@ -121,7 +121,7 @@ class Commands:
         """Raise unless an axis is used, known and has its drivers or pulses on."""
         if not self._setup.used(axis):
             raise RefusedError(Error.VALUE, axis)
-        if not self._known(axis):
+        if not self._axis_known(axis):
             raise RefusedError(Error.LOST, axis)
         if not self._setup.powered(axis):
             raise RefusedError(Error.DISABLED, axis)
@@ -129,12 +129,12 @@ class Commands:
     def _rates(self, rate: Sequence[int], *, jogging: bool) -> None:
         """Raise unless axes may move at these rates without a plan."""
         moving = [i for i, r in enumerate(rate) if r]
-        slow = jogging and not all(self._known(i) for i in moving)
+        slow = jogging and not all(self._axis_known(i) for i in moving)
         for i in moving:
             servo = self._setup.servo(i)
             if not self._setup.used(i) or (servo and not jogging):
                 raise RefusedError(Error.VALUE, i)
-            if servo and not self._known(i):
+            if servo and not self._axis_known(i):
                 raise RefusedError(Error.LOST, i)
             if not self._setup.powered(i):
                 raise RefusedError(Error.DISABLED, i)

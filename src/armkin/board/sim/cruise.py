@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armkin.board.sim.axis_counts import Axes, row_value, within
+from armkin.board.sim.axis_counts import Axes, limit_rule_holds, row_value
 
 _TICK = 0.001  # [s]
 
@@ -54,10 +54,10 @@ class Cruise:
         ahead = share * _TICK + share * share / (2 * self.slope) + share * _TICK
         there = [b + round(r * ahead + (r > 0) - (r < 0)) for b, r in zip(base, self.rate, strict=True)]
         for i, axis in enumerate(image.axes):
-            if self.rate[i] and known >> i & 1 and not within(axis.lower, axis.upper, base[i], there[i]):
+            if self.rate[i] and known >> i & 1 and not limit_rule_holds(axis.lower, axis.upper, base[i], there[i]):
                 return False
         for row in image.rows:
-            if all(known >> i & 1 for i, w in enumerate(row.weight) if w) and not within(
+            if all(known >> i & 1 for i, w in enumerate(row.weight) if w) and not limit_rule_holds(
                 row.lower, row.upper, row_value(row, base), row_value(row, there)
             ):
                 return False

@@ -29,7 +29,7 @@ class Inputs:
         """Whether the motors' supply is sensed and off."""
         return bool(self._setup.crc) and self._setup.image.power_sensed and not self.power_level
 
-    def ahead(self, rates: Sequence[float]) -> int | None:
+    def switch_ahead(self, rates: Sequence[float]) -> int | None:
         """The first switch that guards, is pressed, and that these rates lead on into."""
         if not self._setup.crc:
             return None

@@ -74,7 +74,7 @@ class Modes:
         parts = self.offsets[self.system], self.g92, self.tool
         return [sum(values) for values in zip(*parts, strict=True)]
 
-    def said(self, spindle: float | None) -> str:
+    def parser_state(self, spindle: float | None) -> str:
         """The answer to ``$G``."""
         words = [f"G{self.motion:g}", self.system, f"G{self.plane:g}", "G21" if self.unit == 1.0 else "G20"]
         words += ["G91" if self.relative else "G90", "G93" if self.inverse else "G94"]
@@ -137,8 +137,8 @@ class Modes:
         feed = values.get("F", 0.0 if (93.0 in asked or self.inverse) and 94.0 not in asked else self.feed)
         return 22 if motion == 1.0 and feed == 0.0 else 0
 
-    def obey(self, words: Words, here: Sequence[float]) -> list[float] | None:
-        """Take over a line's modes and offsets; where it moves to, in machine units, from `here`; None: nowhere."""
+    def obey(self, words: Words, position: Sequence[float]) -> list[float] | None:
+        """Take over a line's modes and offsets; where it moves to, in machine units, from `position`; None: nowhere."""
         for code in sorted(words.codes):
             self._mode(code)
         values, unit = words.values, self.unit
@@ -146,27 +146,27 @@ class Modes:
             self.feed = values.get("F", 0.0) * (1.0 if self.inverse else unit)
         given = {k: values[letter] * unit for k, letter in enumerate(LETTERS[: self.axes]) if letter in values}
         if words.codes & _OFFSETS:
-            self._offset(words, given, here)
+            self._offset(words, given, position)
         elif 28.0 in words.codes:
             return list(self.offsets["G28"])
         elif given and self.motion != 80.0:
-            return self._goal(given, here, absolute=53.0 in words.codes)
+            return self._goal(given, position, absolute=53.0 in words.codes)
         return None
 
-    def _goal(self, given: dict[int, float], here: Sequence[float], *, absolute: bool) -> list[float]:
+    def _goal(self, given: dict[int, float], position: Sequence[float], *, absolute: bool) -> list[float]:
         """Where the given axes go, in machine units; absolute: they are in these."""
-        zero = [0.0] * self.axes if absolute else here if self.relative else self.work()
-        return [given[k] + zero[k] if k in given else here[k] for k in range(self.axes)]
+        zero = [0.0] * self.axes if absolute else position if self.relative else self.work()
+        return [given[k] + zero[k] if k in given else position[k] for k in range(self.axes)]
 
-    def _offset(self, words: Words, given: dict[int, float], here: Sequence[float]) -> None:
+    def _offset(self, words: Words, given: dict[int, float], position: Sequence[float]) -> None:
         """G92, G92.1, G10 and G43.1."""
         if 92.1 in words.codes:
             self.g92 = [0.0] * self.axes
         elif 92.0 in words.codes:
             base = [a + b for a, b in zip(self.offsets[self.system], self.tool, strict=True)]
-            self.g92 = [here[k] - base[k] - given[k] if k in given else v for k, v in enumerate(self.g92)]
+            self.g92 = [position[k] - base[k] - given[k] if k in given else v for k, v in enumerate(self.g92)]
         elif 10.0 in words.codes:
-            self._write(words.values, given, here)
+            self._write(words.values, given, position)
         else:
             self.tool = [given.get(k, v) for k, v in enumerate(self.tool)]
 
@@ -186,12 +186,12 @@ class Modes:
         elif code == 49.0:
             self.tool = [0.0] * self.axes
 
-    def _write(self, values: dict[str, float], given: dict[int, float], here: Sequence[float]) -> None:
+    def _write(self, values: dict[str, float], given: dict[int, float], position: Sequence[float]) -> None:
         """G10: an offset that outlives resets and power."""
         number = int(values["P"])
         rows = self.offsets[self.system if number == 0 else SYSTEMS[number - 1]]
         for k, value in given.items():
-            rows[k] = value if values["L"] == 2.0 else here[k] - self.g92[k] - self.tool[k] - value
+            rows[k] = value if values["L"] == 2.0 else position[k] - self.g92[k] - self.tool[k] - value
 
 
 def _listed(values: Sequence[float]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armkin.board.firmware.wire.protocol import STEP, Error, Segment
-from armkin.board.sim.axis_counts import within
+from armkin.board.sim.axis_counts import limit_rule_holds
 from armkin.board.sim.coupled_limits import Rows
 from armkin.board.sim.frame_fields import Batch, RefusedError
 from armkin.board.sim.host_settings import Setup
@@ -55,7 +55,7 @@ class Batches:
             rates[axis] = rate
             plan[axis] += s.ticks * rate
             image, after = self._setup.image.axes[axis], plan[axis] >> 23
-            if axis in given and not within(image.lower, image.upper, before[axis], after):
+            if axis in given and not limit_rule_holds(image.lower, image.upper, before[axis], after):
                 raise RefusedError(Error.LIMIT, axis)
         self._rows.check([p >> 23 for p in plan], known)
         return replace(s, rates=tuple(rates))

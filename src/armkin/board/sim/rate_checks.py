@@ -52,15 +52,15 @@ class Velocity:
     def __init__(self, board: Board, image: Image) -> None:
         self.board, self.image = board, image
         self._bits = 23 if board.min_interval > 128 else 22  # velocities are in 2^-15 of 2^-bits steps a cycle
-        self._before, self._pace = Pace(), Pace()
-        self._at = [(0, 0, 0)] * len(image.axes)  # at both ends of the last segment, and its rate
+        self._last_pace, self._pace = Pace(), Pace()
+        self._last_ends = [(0, 0, 0)] * len(image.axes)  # at both ends of the last segment, and its rate
         self._excess = [(0, 0)] * len(image.axes)  # up, down; a quarter of a velocity
 
     def copy(self) -> Velocity:
         """The same, to go on from."""
         other = Velocity(self.board, self.image)
-        other._at, other._excess = list(self._at), list(self._excess)
-        other._before, other._pace = self._before, self._pace
+        other._last_ends, other._excess = list(self._last_ends), list(self._excess)
+        other._last_pace, other._pace = self._last_pace, self._pace
         return other
 
     def begin(self, s: Segment) -> None:
@@ -73,36 +73,38 @@ class Velocity:
             window = (1 << 32) // part
             windows = min(((cycles >> 16) * window >> 8) + ((cycles >> 8 & 255) * window >> 16), _ALL)
         pace = Pace((1 << self._bits) // s.interval, (1 << self._bits) // s.last_interval, time, windows)
-        self._before, self._pace = self._pace if self._pace.time else Pace(time=time), pace
+        self._last_pace, self._pace = self._pace if self._pace.time else Pace(time=time), pace
 
     def check(self, axis: int, rate: int) -> None:
         """Raise RefusedError if an axis of the segment is too fast or changes its velocity too much."""
         image, size, sign = self.image.axes[axis], abs(rate) >> 8, 1 if rate >= 0 else -1
         first, last = sign * size * self._pace.first, sign * size * self._pace.last
-        if max(abs(first), abs(last)) > min(int(image.max_rate * self._second), 2**31 - 1):
+        if max(abs(first), abs(last)) > min(int(image.max_rate * self._ticks_per_second), 2**31 - 1):
             raise RefusedError(Error.RATE, axis)
         self._accelerate(axis, first, last, rate)
-        self._at[axis] = first, last, rate
+        self._last_ends[axis] = first, last, rate
 
     def check_rest(self, axis: int) -> None:
         """Raise RefusedError if an axis is too fast to rest now."""
         behind = self.copy()
-        behind._before, behind._pace = self._pace, Pace(time=self._pace.time)
+        behind._last_pace, behind._pace = self._pace, Pace(time=self._pace.time)
         behind._accelerate(axis, 0, 0, 0)
 
     @property
-    def _second(self) -> float:
+    def _ticks_per_second(self) -> float:
         return float((1 << 15 + self._bits) / self.board.clock)
 
     def _budget(self, axis: int, time: int) -> int:
         """What 5/4 of max_accel makes in a time; _UNCHECKED: it is not checked."""
-        step = min(int(self.image.axes[axis].max_accel * 5 / 4 * 0.05 / 256 * self._second), _UNCHECKED - 1) + 1
+        step = (
+            min(int(self.image.axes[axis].max_accel * 5 / 4 * 0.05 / 256 * self._ticks_per_second), _UNCHECKED - 1) + 1
+        )
         low, high = step & _ALL, step >> 16
         return (low * time >> 8) + (high * time << 8) if step < _UNCHECKED else _UNCHECKED << 16
 
     def _accelerate(self, axis: int, first: int, last: int, rate: int) -> None:
         """See firmware/src/core/batch.c."""
-        (start, left, was), before, pace = self._at[axis], self._before, self._pace
+        (start, left, was), before, pace = self._last_ends[axis], self._last_pace, self._pace
         between = self._budget(axis, (before.time >> 1) + (pace.time >> 1))
         if between == _UNCHECKED << 16 or not (was or rate):
             self._excess[axis] = (0, 0)

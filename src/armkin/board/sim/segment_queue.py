@@ -49,7 +49,7 @@ class Queue:
         self._fraction = [HALF] * len(axes.base)  # how far the axes are beyond their base, 2^-23 step
         self._queue: deque[Queued] = deque()
         self._units = 0  # length of all of them, in units of 256 cycles: asked for every millisecond
-        self._at = 0.0  # cycles since the running segment's start
+        self._cycles_run = 0.0  # cycles since the running segment's start
 
     @property
     def free(self) -> int:
@@ -75,15 +75,15 @@ class Queue:
 
     def begin(self) -> None:
         """Run from the first segment's start."""
-        self._at = 0.0
+        self._cycles_run = 0.0
         if self._queue:
             self._queue[0].start()
 
-    def rest(self) -> None:
+    def clear(self) -> None:
         """Be empty, with the axes at rest on their counts."""
         self._queue.clear()
         self._units = 0
-        self._at = 0.0
+        self._cycles_run = 0.0
         self._fraction = [HALF] * len(self.axes.base)
         self.plan = [count * STEP + HALF for count in self.axes.base]
 
@@ -91,7 +91,7 @@ class Queue:
         """Steps of every axis in the running segment so far."""
         if not self._queue or not self._queue[0].times:
             return [0] * len(self.axes.base)
-        s, ticks = self._queue[0].segment, bisect_right(self._queue[0].times, self._at)
+        s, ticks = self._queue[0].segment, bisect_right(self._queue[0].times, self._cycles_run)
         return [(f + ticks * r) >> 23 for f, r in zip(self._fraction, s.rates, strict=True)]
 
     def velocity(self) -> list[float]:
@@ -100,17 +100,17 @@ class Queue:
 
     def run(self, seconds: float) -> Queued | None:
         """Let time pass; the last segment, if its end has been passed. Axes stopped too abruptly are lost."""
-        self._at += seconds * self.clock
-        while self._queue and self._at >= self._queue[0].times[-1]:
+        self._cycles_run += seconds * self.clock
+        while self._queue and self._cycles_run >= self._queue[0].times[-1]:
             speed = self.stop_time()
             done = self._queue.popleft()
             self._units -= done.segment.units()
             places = [f + done.segment.ticks * r for f, r in zip(self._fraction, done.segment.rates, strict=True)]
             self.axes.settle([p >> 23 for p in places])
             self._fraction = [HALF if done.end else p % STEP for p in places]
-            rest = self._at - done.times[-1]
+            rest = self._cycles_run - done.times[-1]
             self.begin()
-            self._at = rest
+            self._cycles_run = rest
             if not self._queue:
                 if not done.end and speed > _TOO_FAST:
                     self.axes.lose(done.segment.rates)
@@ -122,7 +122,7 @@ class Queue:
         if not self._queue or not self._queue[0].times:
             return 0.0
         now = self._queue[0]
-        tick = min(bisect_right(now.times, self._at), len(now.times) - 1)
+        tick = min(bisect_right(now.times, self._cycles_run), len(now.times) - 1)
         interval = now.times[tick] - (now.times[tick - 1] if tick else 0)
         rate = self.clock / (STEP * interval)
         limits = zip(now.segment.rates, self.axes.image.axes, strict=True)
@@ -132,5 +132,5 @@ class Queue:
         """Whether what is left is just enough for a stop that takes u seconds, and does not end at rest."""
         if not self._queue or self._queue[-1].end or (u < _SLOW and not holding):
             return False
-        rest = self._units * 256 - self._at
+        rest = self._units * 256 - self._cycles_run
         return rest / self.clock < u + u / 32 + 0.002

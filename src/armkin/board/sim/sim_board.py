@@ -108,7 +108,7 @@ class SimBoard:
         if self.inputs.power_cut():
             self._end(Error.POWER)
         if self.motors.state != State.HOMING:
-            switch = self.inputs.ahead(self.motors.velocity())
+            switch = self.inputs.switch_ahead(self.motors.velocity())
             if switch is not None:
                 self._end(Error.LIMIT_SWITCH, switch)
 

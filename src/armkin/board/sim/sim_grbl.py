@@ -254,7 +254,7 @@ class Grbl(SimulatedTime):
         if line == "H":
             return self._home()
         said = {
-            "G": [self.modes.said(self.spindle)],
+            "G": [self.modes.parser_state(self.spindle)],
             "$": [f"${n}={value:.3f}".rstrip("0").rstrip(".") for n, value in sorted(self.settings.items())],
             "I": _version(self.hal),
             "#": self.modes.parameters(),
@@ -304,16 +304,16 @@ class Grbl(SimulatedTime):
             self._plan(here, goal)
         return 0
 
-    def _jog(self, words: Words, here: list[int]) -> int:
+    def _jog(self, words: Words, position: list[int]) -> int:
         if "F" not in words.values:
             return 22
         modes = self.modes
         kept = modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse
-        goal = modes.obey(Words(words.codes | {1.0, 94.0}, None, words.values), _machine(self.settings, here))
+        goal = modes.obey(Words(words.codes | {1.0, 94.0}, None, words.values), _machine(self.settings, position))
         feed = modes.feed
         modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse = kept
         if goal is not None:
-            self._plan(here, goal, feed)
+            self._plan(position, goal, feed)
         return 0
 
     def _plan(self, start: Sequence[int], goal: Sequence[float], jog: float | None = None) -> None:

@@ -31,8 +31,8 @@ class Homing:
         self._cruise, self._level, self._fault = cruise, level, fault
         self.latch = [0] * len(cruise.axes.base)  # counts at the edge
         self.latched = False  # a search has finished
-        self._since = -1.0  # [s] when the switch took the level waited for; -1: it has not
-        self._at: list[int] = []  # counts at that time
+        self._switch_time = -1.0  # [s] when the switch took the level waited for; -1: it has not
+        self._switch_counts: list[int] = []  # counts at that time
         self._beyond = 0  # counts past the edge that the first approach came to rest at
 
     def run(self, search: Search) -> Iterator[None]:
@@ -59,7 +59,7 @@ class Homing:
         self, s: Search, vector: list[int], share: float, pressed: bool, limit: int, error: Error
     ) -> Generator[None, None, bool]:
         """Slide until the switch is steadily pressed, or released."""
-        self._since = -1.0
+        self._switch_time = -1.0
         return self._slide(vector, share, lambda: self._steady(s, pressed), limit, error)
 
     def _slide(
@@ -90,12 +90,12 @@ class Homing:
         """Whether the switch has had a level for long enough; latches the counts at which it took it."""
         now = self._cruise.now
         if self._pressed(s) != pressed:
-            self._since = -1.0
-        elif self._since < 0:
-            self._since, self._at = now, list(self._cruise.axes.base)
-        steady = self._since >= 0 and now - self._since >= _DEBOUNCE
+            self._switch_time = -1.0
+        elif self._switch_time < 0:
+            self._switch_time, self._switch_counts = now, list(self._cruise.axes.base)
+        steady = self._switch_time >= 0 and now - self._switch_time >= _DEBOUNCE
         if steady:
-            self.latch = self._at
+            self.latch = self._switch_counts
         return steady
 
     def _backed(self, s: Search) -> bool:

@@ -14,21 +14,21 @@ class Jogging:
 
     def __init__(self, cruise: Cruise) -> None:
         self._cruise = cruise
-        self._wanted: list[int] = []
+        self._target_rates: list[int] = []
         self._until = 0.0
 
-    def want(self, rate: list[int]) -> None:
+    def set_rates(self, rate: list[int]) -> None:
         """Move with this vector for another 250 ms."""
-        self._wanted, self._until = rate, self._cruise.now + _DEAD_MAN
+        self._target_rates, self._until = rate, self._cruise.now + _DEAD_MAN
 
     def run(self) -> Iterator[None]:
         """The motion, a step a millisecond."""
         cruise = self._cruise
         while True:
-            cruise.aim(self._wanted)
+            cruise.aim(self._target_rates)
             if not any(cruise.rate):
                 return
-            while not self._over() and self._wanted == cruise.rate:
+            while not self._over() and self._target_rates == cruise.rate:
                 if not cruise.clear():
                     self._until = 0.0
                     break

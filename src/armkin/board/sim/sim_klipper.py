@@ -230,13 +230,8 @@ class Klipper(SimulatedTime):
 
     def _move(self, words: dict[str, float]) -> None:
         self.feed = words.pop("F") * self.factor if "F" in words else self.feed
-        letters = {self.steppers[name].letter: name for name in self.axes}
-        if unknown := words.keys() - letters.keys() - {"X"}:
-            raise Refused(f"the stand-in has no axis {', '.join(sorted(unknown))}")
         start = {"X": self.x, **{name: self.steppers[name].place for name in self.axes}}
-        goals = {letters.get(letter, "X"): value for letter, value in words.items()}
-        base = start if self.relative else {"X": self.x_base}
-        end = start | {name: base.get(name, 0.0) + value for name, value in goals.items()}
+        end = self._end(start, words)
         way = {key: end[key] - start[key] for key in end}
         along = abs(way["X"]) or max(map(abs, way.values()))
         if along < 1e-9:
@@ -252,6 +247,15 @@ class Klipper(SimulatedTime):
         for name in self.axes:
             self.steppers[name].place = end[name]
             self.steppers[name].on = True
+
+    def _end(self, start: dict[str, float], words: dict[str, float]) -> dict[str, float]:
+        """The places behind a line, by axis."""
+        letters = {self.steppers[name].letter: name for name in self.axes}
+        if unknown := words.keys() - letters.keys() - {"X"}:
+            raise Refused(f"the stand-in has no axis {', '.join(sorted(unknown))}")
+        goals = {letters.get(letter, "X"): value for letter, value in words.items()}
+        base = start if self.relative else {"X": self.x_base}
+        return start | {name: base.get(name, 0.0) + value for name, value in goals.items()}
 
     def _run(self, seconds: float) -> None:
         while self._moves and seconds > 0.0:

@@ -61,7 +61,7 @@ class Motors:
     def rest_at(self, counts: list[int]) -> None:
         """Stand there."""
         self.axes.base = list(counts)
-        self._rest()
+        self._stop_at_rest()
 
     def velocity(self) -> list[float]:
         """Every axis's velocity just now, in any unit."""
@@ -69,7 +69,7 @@ class Motors:
 
     def jog(self, rate: list[int]) -> None:
         """Move with this vector for another 250 ms."""
-        self.jogging.want(rate)
+        self.jogging.set_rates(rate)
         if self.state == State.IDLE:
             self._begin(State.JOGGING, self.jogging.run())
 
@@ -92,14 +92,14 @@ class Motors:
     def cut(self) -> None:
         """Stop dead, as a reset does."""
         self.axes.settle(self.queue.made())
-        self._rest()
+        self._stop_at_rest()
 
     def advance(self, seconds: float) -> None:
         """Let at most a millisecond pass."""
         self.cruise.now += seconds
         if self._cruising is not None:
             if next(self._cruising, self) is self:
-                self._rest()
+                self._stop_at_rest()
         elif self.state == State.MOVING:
             self._run(seconds)
             if self.state == State.MOVING and self.queue.dry(self.queue.stop_time()):
@@ -121,14 +121,14 @@ class Motors:
         if not last.end and self.state == State.MOVING:
             self.state = State.HOLDING
             self._fault(Error.DRY)
-        self._rest()
+        self._stop_at_rest()
 
     def _begin(self, state: State, cruising: Iterator[None]) -> None:
         self.state, self._cruising = state, cruising
         self.cruise.stopped = False
 
-    def _rest(self) -> None:
-        self.queue.rest()
+    def _stop_at_rest(self) -> None:
+        self.queue.clear()
         self._cruising = None
         self._brake = 1.0
         self.state = State.IDLE

@@ -32,8 +32,8 @@ FASTEST = 3400  # [counts/s] that a servo makes
 class Servo:
     """One servo: its registers, and a shaft that follows the goal at the goal's speed."""
 
-    def __init__(self, number: int, at: float = COUNTS / 2) -> None:
-        self.number, self.at = number, at
+    def __init__(self, number: int, position: float = COUNTS / 2) -> None:
+        self.number, self.position = number, position
         self.speed = 0.0
         self.errors = 0
         self.memory = bytearray(80)
@@ -42,7 +42,7 @@ class Servo:
         self.set(MOST, COUNTS - 1)
         self.set(VOLTAGE, 74)
         self.set(TEMPERATURE, 31)
-        self.set(GOAL_POSITION, round(at))
+        self.set(GOAL_POSITION, round(position))
         self.advance(0.0)
 
     def get(self, register: Register) -> int:
@@ -55,19 +55,19 @@ class Servo:
 
     def advance(self, seconds: float) -> None:
         """Let time pass: with its torque on, the shaft moves towards the goal."""
-        moves = self.get(TORQUE) == 1 and self.at != self.get(GOAL_POSITION)
+        moves = self.get(TORQUE) == 1 and self.position != self.get(GOAL_POSITION)
         if seconds > 0 and not moves and not self.speed:
             return  # it stands, and its registers say so
-        before = self.at
+        before = self.position
         if moves and seconds > 0:
             fastest = (abs(self.get(GOAL_SPEED)) or FASTEST) * seconds
             goal, low, high = (self.get(register) for register in (GOAL_POSITION, LEAST, MOST))
             goal = min(max(goal, low), high) if low or high else goal  # it goes no farther than its own limits
-            self.at += max(-fastest, min(fastest, goal - self.at))
-        self.speed = (self.at - before) / seconds if seconds > 0 else 0.0
-        self.set(POSITION, round(self.at))
+            self.position += max(-fastest, min(fastest, goal - self.position))
+        self.speed = (self.position - before) / seconds if seconds > 0 else 0.0
+        self.set(POSITION, round(self.position))
         self.set(SPEED, round(self.speed))
-        self.set(MOVING, int(self.get(TORQUE) == 1 and self.at != self.get(GOAL_POSITION)))
+        self.set(MOVING, int(self.get(TORQUE) == 1 and self.position != self.get(GOAL_POSITION)))
         self.set(LOAD, 120 if self.speed else 30)
 
     def write(self, address: int, data: bytes) -> None:
@@ -116,7 +116,7 @@ class ServoBus(SimulatedTime):
         for servo in self.servos.values():
             servo.advance(seconds)
         if any(servo.speed for servo in self.servos.values()):
-            self.log.append((self._now, {number: servo.at for number, servo in self.servos.items()}))
+            self.log.append((self._now, {number: servo.position for number, servo in self.servos.items()}))
 
     def _obey(self, number: int, kind: int, data: bytes) -> None:
         if number == ALL:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, output, render
 from armkin.cli.csv_to_numbers import batch_rows
 from armkin.cli.options import Json, Out, Robot
@@ -56,8 +57,6 @@ def calibrate(
     much is corrected is decided by cross-validation, on rows that the fit has not seen. --out NEW.yaml writes the
     robot file.
     """
-    import numpy as np
-
     if suggest is None:
         output.check(out, "a robot file is", ".yaml", ".yml")
     else:
@@ -65,12 +64,7 @@ def calibrate(
     arm = arguments.load(robot)
     kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
     names = [*arm.joint_names, "x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
-    numbers: list[int] = []
-    rows: Array | None = None
-    if measured is not None:
-        chunks = list(batch_rows(measured, names, arm.name))
-        numbers = [number for chunk in chunks for number in chunk.numbers]
-        rows = np.concatenate([chunk.values for chunk in chunks])
+    numbers, rows = _measured_rows(measured, names, arm)
     if suggest is not None:
         _suggest(arm, suggest, rows, kinds, json, out)
         return
@@ -91,10 +85,18 @@ def calibrate(
         output.note("--out NEW.yaml writes the corrected robot file")
 
 
+def _measured_rows(source: str | None, names: list[str], arm: Arm) -> tuple[list[int], Array | None]:
+    """Numbers and values of a file's rows; None: there is no file."""
+    import numpy as np
+
+    if source is None:
+        return [], None
+    chunks = list(batch_rows(source, names, arm.name))
+    return [number for chunk in chunks for number in chunk.numbers], np.concatenate([chunk.values for chunk in chunks])
+
+
 def _fitted(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Calibration:
     """What rows (N, n + 3) or, with `poses`, (N, n + 6) [deg | mm] tell of the arm; kinds: left as they are."""
-    import armkin
-
     q, tips = units.joints_in(arm, rows[:, : arm.n]), rows[:, arm.n :]
     if poses:
         tips = targets_in(["x", "y", "z", "roll", "pitch", "yaw"], tips)

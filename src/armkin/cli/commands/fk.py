@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, output, render
 from armkin.cli.options import (
     Batch,
@@ -86,7 +87,6 @@ class Questions:
 
     def table(self, chunk: Chunk) -> tuple[Table, Any]:
         """The columns, and which rows are within limits."""
-        import armkin
         from armkin.columns import fk_columns
 
         T = armkin.compile(self.arm).fk(units.joints_in(self.arm, chunk.values)) if self.compiled else None
@@ -111,7 +111,6 @@ def _poses(
 
 
 def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Iterator[Fk]:
-    import armkin
     from armkin.model import rotation
 
     q = units.joints_in(arm, chunk.values)

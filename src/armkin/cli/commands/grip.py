@@ -44,12 +44,12 @@ def grip(
     start = None if assume is None else _value(board, assume, "--assume")
     with board_link.backend(board, port, baud, reset=not no_reset) as machine:
         done = board.grip(target, start)
-    if done.counts is not None and done.at != done.target:
+    if done.counts is not None and done.position != done.target:
         raise LinkError(
-            f"the gripper stands at {render.short(done.at)} instead of {render.short(done.target)} {done.unit}: "
+            f"the gripper stands at {render.short(done.position)} instead of {render.short(done.target)} {done.unit}: "
             "please report this as a bug"
         )
-    found: dict[str, Any] = {**render.head(arm), "port": machine.port.name, "gripper": done.at}
+    found: dict[str, Any] = {**render.head(arm), "port": machine.port.name, "gripper": done.position}
     if done.counts is None:
         found |= {"target": done.target, "measured": done.measured}
     else:
@@ -60,12 +60,12 @@ def grip(
 
 def _said(done: Gripped) -> str:
     """Where a gripper has come to rest, in words: ``29.97 deg (833 us)``."""
-    text = f"{render.short(done.at)} {done.unit}"
+    text = f"{render.short(done.position)} {done.unit}"
     if done.counts is not None:
         return f"{text} ({done.counts} {done.count_unit})"
     if not done.measured:
         return f"{text}, as sent: nothing measures it"
-    held = abs(done.at - done.target) >= 1.5
+    held = abs(done.position - done.target) >= 1.5
     return text + f" of {render.short(done.target)}: it holds something, or is blocked" * held
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, compiled_ik, ik_text, lock_and_sweep, output, piped_answers, render
 from armkin.cli.ik_answer import answer_of, nearest_to
 from armkin.cli.number_parsing import decimals
@@ -84,7 +85,6 @@ def ik(
     `armkin fk --json` wrote to standard input are the targets.
     """
     from armkin.inverse import choose_branch
-    from armkin.inverse.redundant.position_first import check as position_first_is_for
     from armkin.inverse.tasks.choose_task import task_for
 
     _check_together(batch, sweep, position_first=position_first, compiled=compiled, continuous=continuous)
@@ -103,10 +103,7 @@ def ik(
         every=all_branches or continuous,
         position_first=position_first,
     )
-    if position_first:
-        position_first_is_for(choose_branch.locked(request), what.name)
-    if compiled:
-        request = _compiled(request, what.name)
+    request = _request_with_solver(request, what.name, compiled=compiled)
     questions = Questions(request, what, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
         from armkin.cli.batch_answers import Batch as Run
@@ -118,13 +115,22 @@ def ik(
         Run(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
         return
     arguments.one_alone(workers, cluster, resume)
-    values = one_row(arguments.target(arm, what, target) if reached is None else reached[0]).values
-    words = None if reached is not None else [[decimals(word) for word in target or ()]]
-    _one(questions, values, words, out, json=json)
+    if reached is None:
+        values, words = arguments.target(arm, what, target), [[decimals(word) for word in target or ()]]
+    else:
+        values, words = reached[0], None
+    _one(questions, one_row(values).values, words, out, json=json)
 
 
-def _compiled(request: choose_branch.Request, task: str) -> choose_branch.Request:
-    """The same by machine code, which is built here if it is not there yet."""
+def _request_with_solver(request: choose_branch.Request, task: str, *, compiled: bool) -> choose_branch.Request:
+    """The same where position first fits the arm; compiled: by machine code, which is built if it is not there yet."""
+    from armkin.inverse import choose_branch
+    from armkin.inverse.redundant.position_first import check as position_first_is_for
+
+    if request.position_first:
+        position_first_is_for(choose_branch.locked(request), task)
+    if not compiled:
+        return request
     compiled_ik.prepare(request.arm, task)
     return replace(request, ik=compiled_ik.ik, fk=partial(compiled_ik.fk, task=task))
 
@@ -164,7 +170,6 @@ def _one(questions: Questions, values: Array, words: list[list[int]] | None, out
 
 def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float]]:
     """Targets [mm, deg] of the task that joint values [deg | mm] reach."""
-    import armkin
     from armkin.inverse.tasks.task import targets_of
 
     q = units.joints_in(arm, joints)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin import files
 from armkin.cli import output
 from armkin.cli.options import RobotOut
@@ -67,7 +68,6 @@ def _gain(raw: bytes, found: Imported, arm: Arm) -> str | None:
     """What --snap would buy: another solver class, and how far the tip would move for it."""
     import numpy as np
 
-    import armkin
     from armkin import robot_file
     from armkin.model.build import build
     from armkin.robot_file import urdf_reader

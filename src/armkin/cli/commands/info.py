@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import armkin
 from armkin.cli import arguments, output, render
 from armkin.cli.options import Json, Robot, Scene, TaskName, TextOut
 from armkin.errors import UsageError
@@ -99,7 +100,6 @@ def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
 
 def _task(arm: Arm, name: str | None) -> Solving:
     """The task and its solver, or why there is none."""
-    import armkin
     from armkin.inverse.redundant.families import described
     from armkin.inverse.solvers.redundant import redundancy
     from armkin.inverse.tasks.choose_task import task_for

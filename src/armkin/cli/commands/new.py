@@ -70,21 +70,13 @@ def new(
     from armkin.robot_file.new_file import text
 
     path = _path(name, out)
-    if dh and batch is not None:
-        raise UsageError("--dh and --batch: give one of the two")
-    table: list[dict[str, str]] | None = None
-    asks = False
-    if not dh and batch is None and sys.stdin is not None and sys.stdin.isatty():
-        convention, table = _asked(convention)
-        asks = floor is None
-    if not (dh or batch is not None or table) or convention is None:
-        raise _lacking(bool(dh or batch is not None), convention)
-    table = table or (_options(dh) if dh else _csv(batch or "-"))
+    asks = not dh and batch is None and sys.stdin is not None and sys.stdin.isatty()
+    convention, table = _asked(convention) if asks else _table_of_options(dh, batch, convention)
     if convention not in ("standard", "modified"):
         raise UsageError(f"--convention {convention}: must be standard or modified")
     rows = [_row(entries, i) for i, entries in enumerate(table, 1)]
     title = os.path.basename(name)
-    if asks:
+    if asks and floor is None:
         floor = _floor(lambda z: _check(text(title, convention, rows, source, z), path))
     made = text(title, convention, rows, source, floor)
     _check(made, path)  # what it refuses, limits for one, is told in its words, and nothing is written
@@ -101,6 +93,17 @@ def _check(made: str, path: str) -> None:
     from armkin.robot_file import parse
 
     checked(parse(made, path))
+
+
+def _table_of_options(
+    dh: list[str] | None, batch: str | None, convention: str | None
+) -> tuple[str, list[dict[str, str]]]:
+    """The convention and the table that the options give. Raises UsageError for what lacks."""
+    if dh and batch is not None:
+        raise UsageError("--dh and --batch: give one of the two")
+    if not (dh or batch is not None) or convention is None:
+        raise _lacking(bool(dh) or batch is not None, convention)
+    return convention, _options(dh) if dh else _csv(batch or "-")
 
 
 def _lacking(table: bool, convention: str | None) -> UsageError:
@@ -151,17 +154,26 @@ def _csv(source: str) -> list[dict[str, str]]:
         rows = [[cell.strip() for cell in row] for row in csv.reader(lines, skipinitialspace=True)]
     except csv.Error as error:
         raise UsageError(f"{source}: this is no CSV: {error}") from None
-    heading: Sequence[str] = _COLUMNS
-    if rows and {"alpha", "a", "d"} <= {cell.lower() for cell in rows[0]}:
-        heading = [cell.lower() for cell in rows.pop(0)]
-        if unknown := [cell for cell in heading if cell not in _COLUMNS]:
-            raise UsageError(f"{source}: there is no column {unknown[0]}; the columns are {', '.join(_COLUMNS)}")
+    heading = _heading(source, rows[0]) if rows else None
+    if heading is not None:
+        rows = rows[1:]
+    heading = heading or _COLUMNS
     if not rows:
         raise UsageError(f"{source}: no rows; give one of alpha,a,d,theta for each joint")
     for i, row in enumerate(rows, 1):
         if not 3 <= len(row) <= len(heading):
             raise UsageError(f"{source}: row {i} has {len(row)} cells; it takes {','.join(heading)}")
     return [dict(zip(heading, row, strict=False)) for row in rows]
+
+
+def _heading(source: str, cells: list[str]) -> Sequence[str] | None:
+    """The columns, if a table's first row names them."""
+    heading = [cell.lower() for cell in cells]
+    if not {"alpha", "a", "d"} <= set(heading):
+        return None
+    if unknown := [cell for cell in heading if cell not in _COLUMNS]:
+        raise UsageError(f"{source}: there is no column {unknown[0]}; the columns are {', '.join(_COLUMNS)}")
+    return heading
 
 
 def _ask(question: str, default: str, check: Callable[[str], object]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin import files
 from armkin.cli import arguments, board_link, drawing_path, keep_outs, lock_and_sweep, output, path_text, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
@@ -116,7 +117,6 @@ def path(
     """
     if start is not None and port is not None and not dry_run:
         raise UsageError("--start belongs to a plan: with --port the arm starts where it stands")
-    import armkin
 
     arm = keep_outs.moving(robot, scene, ignore_keep_out, tool)
     locked = lock_and_sweep.locked(arm, lock)
@@ -276,13 +276,12 @@ def _positive(text: str, option: str, least: float) -> float:
 
 def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, Any], *, json: bool) -> PathPlan:
     """The plan; of a path that is not carried, what is known of it is printed first."""
-    import armkin
-
     try:
         if locked:
             from armkin.motion.path_held import path_held
+            from armkin.motion.path_planner import PathRequest
 
-            plan = path_held(arm, moves, locked, **options)
+            plan = path_held(arm, moves, locked, PathRequest(**options))
         else:
             plan = armkin.path(arm, moves, **options)
     except NoSolutionError as error:
@@ -331,8 +330,6 @@ def _files(plan: PathPlan, out: str | None, plot: str | None) -> None:
 def _write(plan: PathPlan, name: str) -> None:
     """CSV: time, joints, their speeds, the tool, the way."""
     import numpy as np
-
-    import armkin
 
     arm = plan.arm
     heading = ["time_s", *arm.joint_names, *(f"{j}_speed" for j in arm.joint_names), "x_mm", "y_mm", "z_mm", "s_mm"]

@@ -15,6 +15,7 @@ from armkin.errors import NoSolutionError, UsageError
 if TYPE_CHECKING:
     from armkin.cli.answers import BestPlace, PlacedRobot, PlannedPlace
     from armkin.cli.answers import Place as Answer
+    from armkin.engines.ordered_chunks import Engine
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.reachability.place_path import Planned
@@ -58,20 +59,12 @@ def place(
     """
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")
+    from armkin.engines.ordered_chunks import Engine
+    from armkin.reachability.place_file import write
+
     arms = [arguments.load(word) for word in words[:-1]]
     settings = _settings(step, z, yaw, area)
-    from armkin.engines.ordered_chunks import Engine
-    from armkin.inverse.solve import ik
-    from armkin.reachability.place_file import write
-    from armkin.reachability.place_search import each
-
-    targets = [_targets(arm, words[-1]) for arm in arms] if not _is_path(words[-1]) else [words[-1]] * len(arms)
-    for arm in arms if compiled else ():
-        compiled_ik.prepare(arm)
-    with output.progress("positions") as tick:
-        found = each(
-            arms, targets, settings, scene, out, Engine(workers, cluster), tick, compiled_ik.ik if compiled else ik
-        )
+    found = _search(arms, words[-1], settings, scene, out, Engine(workers, cluster), compiled=compiled)
     if out is not None:
         write(found, out)
     if plot is not None:
@@ -86,6 +79,27 @@ def place(
             output.warn(f"the path is not planned from there: {one.unplanned}")
     if not any(one.reach_all for one in found):
         raise _no_place(found, "points of the path on one branch" if _is_path(words[-1]) else "targets")
+
+
+def _search(
+    arms: list[Arm],
+    source: str,
+    settings: dict[str, Any],
+    scene: str | None,
+    out: str | None,
+    engine: Engine,
+    *,
+    compiled: bool,
+) -> list[Place]:
+    """The places of arms for the targets of a file, or for a path."""
+    from armkin.inverse.solve import ik
+    from armkin.reachability.place_search import each
+
+    targets: list[Any] = [source if _is_path(source) else _targets(arm, source) for arm in arms]
+    for arm in arms if compiled else ():
+        compiled_ik.prepare(arm)
+    with output.progress("positions") as tick:
+        return each(arms, targets, settings, scene, out, engine, tick, compiled_ik.ik if compiled else ik)
 
 
 def _settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, output, piped_answers, render
 from armkin.cli.options import Batch, BatchOut, Cluster, Joints, JsonLines, Resume, RobotOrPipe, Scene, Workers
 from armkin.cli.render import fixed
@@ -90,7 +91,6 @@ class Questions:
 
 
 def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[Pulses]:
-    import armkin
     from armkin.motors import motor_names, outside_travel, pulse_units, resolution
 
     q = units.joints_in(arm, chunk.values)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import armkin
 from armkin.cli import arguments, output, render
 from armkin.cli.number_parsing import number, whole
 from armkin.cli.options import Cluster, Json, Picture, Robot, Scene, Workers
@@ -39,7 +40,6 @@ def reach(
     Cells are sectors of rings about joint 1's axis, so that one solve answers whole arcs of azimuths and rolls,
     exactly. Columns of --out: centre, share of orientations, branches, places that one branch alone reaches, measures.
     """
-    import armkin
     from armkin.reachability.cells import MOST, Grid
 
     arm = arguments.load(robot, scene)

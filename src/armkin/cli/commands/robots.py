@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import armkin
 from armkin.cli import output, render
 from armkin.cli.options import Json, TextOut
 
@@ -29,7 +30,6 @@ def robots(json: Json = False, out: TextOut = None) -> None:
 
 
 def _entry(name: str) -> ShippedRobot:
-    import armkin
     from armkin.board.backend.missing_keys import missing_by_command
 
     arm = armkin.load(name)

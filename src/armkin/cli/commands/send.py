@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, board_link, keep_outs, output, render
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.number_parsing import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
+from armkin.cli.send_goals import Wanted
 from armkin.cli.send_goals import goals as read_goals
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -122,7 +124,7 @@ def send(
         sent(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
         return
     radius = _blend(blend, batch)
-    arm, goals = read_goals(robot, q, target, branch, task, batch, lock, near, scene, tool)
+    arm, goals = read_goals(robot, q, Wanted(target, task, branch, lock, near), batch, scene, tool)
     output.check(trace, "a plan is", ".csv")
     arm = keep_outs.marked(arm, ignore_keep_out)
     arm = _accelerated(arm, accel)
@@ -198,7 +200,7 @@ def _move(
                 _write_trace(arm, plans, trace)
             began = machine.counts()
             _carry_out(planner, plans, held)
-        planned = planner.done.summary(began)
+        planned = planner.total_sent.summary(began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
     _tell(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
 
@@ -274,7 +276,6 @@ def _blend(text: str | None, batch: str | None) -> float:
 
 def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Planned]:
     """All plans at once, from counts; a stream is read to its end."""
-    import armkin
     from armkin.board.planner import Stream
 
     if isinstance(goals, Stream):

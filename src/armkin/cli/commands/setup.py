@@ -36,7 +36,7 @@ def setup(
             f"{arm.name}'s board has no settings to compare: setup is for board: {{kind: grbl}} and {{kind: klipper}}"
         )
     if write:
-        board.need("write_settings")
+        board.require("write_settings")
     answer: dict[str, Any] = {**render.head(arm), "port": port, "firmware": None, "differences": None}
     file = board.settings_file
     if file is None or port is not None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import armkin
 from armkin.cli import arguments, output, render
 from armkin.cli.number_parsing import is_number, whole
 from armkin.cli.options import Cluster, Compiled, Json, Picture, Robot, Scene, Tool, Workers
@@ -72,7 +73,6 @@ def workspace(
     Memory does not grow with the number of samples. step_error: how far the tip is off with every motor
     half a pulse off, in the worst combination.
     """
-    import armkin
     from armkin.reachability import cloud_file
     from armkin.reachability.sampling import MOST
 
@@ -122,8 +122,6 @@ def _measures(asked: list[str] | None, shade: str | None) -> tuple[list[str], in
 
 def _compiled(arm: Arm, q: Array) -> Array:
     """The tip by machine code, which each process builds or finds."""
-    import armkin
-
     return armkin.compile(arm).position(q)
 
 

@@ -87,17 +87,9 @@ def candidates(
     kinds = plans_of(elimination, passes)
     pencils, numbers_of = pencils_of(kinds)
     loop, passes = elimination.loop, len(kinds[0])
-    sizes = {
-        "PASSES": passes,
-        "PRODUCTS": max(pencil.products for pencil in pencils),
-        "WIDTH": max((4 if pencil.role.wide else 2) * (pencil.products + pencil.size) for pencil in pencils),
-        "MOST": max(16, *(-(-pencil.size // 4) * 4 for pencil in pencils)),  # rows are worked on by fours
-        "ROWS": max(15 - pencil.ends.rank for pencil in pencils),
-        "ANSWERS": passes * max(pencil.size for pencil in pencils),
-    }
     numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2, "BESIDE": BESIDE_SPECIAL, **_NAMED}
     numbers |= {"MAIN_TILT": TILT[0], "LATER_TILT": TILT[1], "REGULAR": REGULAR, "STEADY": STEADY}
-    lines = [f"#define ARM_{name} {value}" for name, value in sizes.items()]
+    lines = [f"#define ARM_{name} {value}" for name, value in _sizes(pencils, passes).items()]
     lines += [f"#define ARM_{name} {c_and_js_code.number(value)}" for name, value in numbers.items()]
     moves = np.concatenate(moves_of(passes))
     lines += [
@@ -126,6 +118,18 @@ def candidates(
         text = text.replace("ARM_JOINTS", str(arm.n - 1)).replace("arm_candidates", "arm_other_candidates")
         text += _with_held_joint(arm, held)
     return text
+
+
+def _sizes(pencils: list[Pencil], passes: int) -> dict[str, int]:
+    """How large arrays of the method are."""
+    return {
+        "PASSES": passes,
+        "PRODUCTS": max(pencil.products for pencil in pencils),
+        "WIDTH": max((4 if pencil.role.wide else 2) * (pencil.products + pencil.size) for pencil in pencils),
+        "MOST": max(16, *(-(-pencil.size // 4) * 4 for pencil in pencils)),  # rows are worked on by fours
+        "ROWS": max(15 - pencil.ends.rank for pencil in pencils),
+        "ANSWERS": passes * max(pencil.size for pencil in pencils),
+    }
 
 
 def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:

@@ -27,13 +27,9 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     prefer: joints that a target leaves free take their value from `near`; without, such a target is only in doubt, 3
     in place of 1.
     """
-    n, entries = arm.n, arm_formulas.goal_size(task)
-    declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(entries)]
-    if prefer:
-        for j in range(n):
-            near = f"near[{j} * ARM_LANES + i]"
-            ways = [("c", f"ARM_COS({near})"), ("s", f"ARM_SIN({near})")]
-            declared += [(f"p{j}", near)] if arm.prismatic[j] else [(f"{w}{j}", text) for w, text in ways]
+    n = arm.n
+    declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(arm_formulas.goal_size(task))]
+    declared += _preferred(arm) if prefer else []
     with recorded_for(SINGLE if single else DOUBLE):
         recorded = arm_formulas.candidates(arm, task, geometry, prefer)
     code = c_and_js_code.write(recorded, [name for name, _ in declared], _language(single))
@@ -41,10 +37,7 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     values, miss = outputs[:n], outputs[n]
     stores = [f"q[{b * n + j} * ARM_LANES + i] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
     stores += [f"miss[{b} * ARM_LANES + i] = {miss[b]};" for b in range(len(miss))]
-    edge, *free = (
-        " | ".join(dict.fromkeys(text for text in texts if not text.startswith("0.0")))
-        for texts in code.outputs[n + 1 :]
-    )
+    edge, *free = map(_any, code.outputs[n + 1 :])
     stores.append(f"doubt[i] = {edge or 0};" if not free or not free[0] else f"doubt[i] = ({edge}) | ({free[0]}) * 2;")
     head = (
         "static void arm_candidates(const arm_real *ARM_RESTRICT goal, const arm_real *ARM_RESTRICT near,\n"
@@ -52,6 +45,21 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     )
     text = _loop(head, declared, [*code.lines, *stores])
     return (text if "near[" in text else text.replace("int i;", "int i;\n    (void)near;", 1)), len(miss)
+
+
+def _preferred(arm: Arm) -> list[tuple[str, str]]:
+    """Names of what a joint that is free is set to, and what they are: a slide's `near`, of a turn cosine and sine."""
+    declared = []
+    for j in range(arm.n):
+        near = f"near[{j} * ARM_LANES + i]"
+        turns = [(f"c{j}", f"ARM_COS({near})"), (f"s{j}", f"ARM_SIN({near})")]
+        declared += [(f"p{j}", near)] if arm.prismatic[j] else turns
+    return declared
+
+
+def _any(texts: Sequence[str]) -> str:
+    """Whether one of these is true; those that never are are left out."""
+    return " | ".join(dict.fromkeys(text for text in texts if not text.startswith("0.0")))
 
 
 def forward_kinematics(arm: Arm, single: bool = False) -> str:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.c_and_js_code import number
 from armkin.forward import fk
+from armkin.inverse.numeric.newton import null_space
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.task import targets_of
@@ -85,8 +86,6 @@ def _postures(arm: Arm, task: Task, count: int) -> Array:
 
 def _weakest(arm: Arm, task: Task, q: Array, valid: Bool) -> Array:
     """Smallest singular value (N,) of any branch's Jacobian, branches (N, B, n); 0 without branches."""
-    from armkin.inverse.numeric.newton import null_space
-
     N, B, n = q.shape
     flat = np.nan_to_num(q).reshape(-1, n)
     target = targets_of(task, fk(arm, flat), flat)

@@ -44,7 +44,7 @@ def tables(arm: Arm) -> Tables:
         [(int(k), solid.index(int(form.owner[k]))) for k in held.moving],
         shapes,
         list(zip(held.ours.tolist(), held.theirs.tolist(), which.tolist(), strict=True)),
-        [held.of(k) for k in range(len(held.pairs))],
+        [held.pair_names(k) for k in range(len(held.pairs))],
     )
 
 

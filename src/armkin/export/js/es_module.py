@@ -225,24 +225,7 @@ def _by_joint(arm: Arm, *, calibrated: bool) -> str:
     text = _function(head, [f"return [{values}];"])
     lines = ["let inside = true;", "let turned = 0;", "let slid = 0;", "let value = 0;"]
     for j in range(n):
-        low, high, slides = float(arm.lower[j]), float(arm.upper[j]), bool(arm.prismatic[j])
-        tests = [f"value >= {low!r} - SLACK"] if np.isfinite(low) else []
-        tests += [f"value <= {high!r} + SLACK"] if np.isfinite(high) else []
-        # within less than a turn there is one copy, wherever `near` is
-        one = not slides and low > -np.pi + _ALONE and high < np.pi - _ALONE
-        usual = [f"Math.abs(value{'' if one else f' - near[{j}]'}) < Math.PI - SLACK", *([] if one else tests)]
-        copy = [f"q[{j}] = value = nearestCopy(value, near[{j}], {_text(low)}, {_text(high)}, {_text(slides)});"]
-        check = [f"if (!({' && '.join(tests)})) inside = false;"] if tests else []
-        lines += [f"value = q[{j}];"]
-        if not slides:
-            lines += [
-                f"if (!({' && '.join(usual)})) {{",
-                *(f"  {line}" for line in copy + (check if not one else [])),
-                "}",
-            ]
-        lines += check if slides or one else []
-        change = f"Math.abs(value - near[{j}]){f' / ARM.ratio[{j}]' if calibrated else ''}"
-        lines += [f"{'slid' if slides else 'turned'} += {change};"]
+        lines += _copy_of_joint(arm, j, calibrated=calibrated)
     lines += [
         "copyInside = inside;",
         "copyMotion[0] = turned * DEGREES + slid;",
@@ -255,6 +238,24 @@ def _by_joint(arm: Arm, *, calibrated: bool) -> str:
         "function legal(q, near)"
     )
     return text + "\n" + _function(head, lines)
+
+
+def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
+    """The lines that take joint j to its nearest legal copy, and count its motion."""
+    low, high, slides = float(arm.lower[j]), float(arm.upper[j]), bool(arm.prismatic[j])
+    tests = [f"value >= {low!r} - SLACK"] if np.isfinite(low) else []
+    tests += [f"value <= {high!r} + SLACK"] if np.isfinite(high) else []
+    check = [f"if (!({' && '.join(tests)})) inside = false;"] if tests else []
+    change = f"Math.abs(value - near[{j}]){f' / ARM.ratio[{j}]' if calibrated else ''}"
+    if slides:
+        return [f"value = q[{j}];", *check, f"slid += {change};"]
+    copy = f"  q[{j}] = value = nearestCopy(value, near[{j}], {_text(low)}, {_text(high)}, {_text(slides)});"
+    if low > -np.pi + _ALONE and high < np.pi - _ALONE:  # there is one copy, wherever `near` is
+        nearest = ["if (!(Math.abs(value) < Math.PI - SLACK)) {", copy, "}", *check]
+    else:
+        usual = " && ".join([f"Math.abs(value - near[{j}]) < Math.PI - SLACK", *tests])
+        nearest = [f"if (!({usual})) {{", copy, *(f"  {line}" for line in check), "}"]
+    return [f"value = q[{j}];", *nearest, f"turned += {change};"]
 
 
 def _keep_outs(arm: Arm, turned: Arm) -> list[str]:

@@ -32,7 +32,7 @@ class Box:
         functions, which is least at an end or where two of them meet.
         """
         lead = a.shape[1:]
-        start, way = (self._own(part.reshape(3, -1)) for part in (a, b - a))
+        start, way = (self._in_box_axes(part.reshape(3, -1)) for part in (a, b - a))
         start -= (self.axes.T @ self.centre)[:, None]
         out = np.sqrt(_outside(start, way, self.half))
         if (inside := np.flatnonzero(out == 0.0)).size:
@@ -41,13 +41,13 @@ class Box:
 
     def of_points(self, p: Array) -> Array:
         """Signed distance of points: (3, ...) -> (...)."""
-        flat = self._own(p.reshape(3, -1)) - (self.axes.T @ self.centre)[:, None]
+        flat = self._in_box_axes(p.reshape(3, -1)) - (self.axes.T @ self.centre)[:, None]
         beyond = np.abs(flat) - self.half[:, None]
         inside = np.minimum(beyond.max(axis=0), 0.0)
         np.maximum(beyond, 0.0, out=beyond)
         return np.asarray(np.sqrt(np.einsum("km,km->m", beyond, beyond)) + inside).reshape(p.shape[1:])
 
-    def _own(self, v: Array) -> Array:
+    def _in_box_axes(self, v: Array) -> Array:
         """Vectors (3, M) in its own axes."""
         turned: Array = v.copy() if np.array_equal(self.axes, np.eye(3)) else self.axes.T @ v
         return turned

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.keep_out.shapes.segment_distances import between
+from armkin.keep_out.shapes.segment_distances import segment_distance
 
 if TYPE_CHECKING:
     from armkin.robot_file.keep_out_keys import Entry
@@ -27,7 +27,7 @@ class Capsule:
     def distance(self, a: Array, b: Array) -> Array:
         """Distance of segments to its own, less its radius: a, b (3, ...) -> (...)."""
         ends = (end.reshape(3, *[1] * (a.ndim - 1)) for end in (self.begin, self.end))
-        return between(a, b, *ends) - self.radius
+        return segment_distance(a, b, *ends) - self.radius
 
     def of_points(self, p: Array) -> Array:
         """Distance of points to its segment, less its radius: (3, ...) -> (...)."""

@@ -7,7 +7,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 
 
-def between(a: Array, b: Array, c: Array, d: Array) -> Array:
+def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
     """Least distance of segments a-b and c-d: (3, ...) each, broadcast -> (...).
 
     Either both feet of the common normal are inside, or an end is nearest: the least of these five is exact,

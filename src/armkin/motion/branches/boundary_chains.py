@@ -29,46 +29,46 @@ _WAYS = 64  # chains in all, as every boundary may multiply them: what goes thro
 
 
 def through_boundaries(
-    arm: Arm, columns: Columns, all_: list[Chain], fixed: Array | None, tolerance: float
+    arm: Arm, columns: Columns, chains: list[Chain], fixed: Array | None, tolerance: float
 ) -> list[Chain]:
     """Chains, and those that more of them make where they meet; fixed: (n,) the posture at the start, or None."""
     s, end = columns.s, len(columns.s) - 1
-    found = all_ = _across(s, all_, tolerance)
+    found = chains = _one_of_each_pair(s, chains, tolerance)
     if not end:
         return found
     postures = columns.q[0][columns.valid[0]] if fixed is None else fixed[None]
-    found = _with(found, [one for c in all_ for one in _leaving(s, c, 0, postures, tolerance)])
-    for j in _inner(columns, all_):
+    found = _added_once(found, [one for c in chains for one in _leaving(s, c, 0, postures, tolerance)])
+    for j in _inner(columns, chains):
         postures = columns.q[j][columns.valid[j]]
         to = [one for c in found for one in _arriving(s, c, j, postures, tolerance)]
-        # Beyond it, what was joined at one before it is what its last part was: `all_` has that.
-        on = [one for c in all_ for one in _leaving(s, c, j, postures, tolerance)]
+        # Beyond it, what was joined at one before it is what its last part was: `chains` has that.
+        on = [one for c in chains for one in _leaving(s, c, j, postures, tolerance)]
         ways = (_joined(a, b) for a, b in product(to, on) if _meet(a, b))
         found += islice(ways, max(_WAYS - len(found), 0))
     postures = columns.q[end][columns.valid[end]]
-    return _with(found, [one for c in found for one in _arriving(s, c, end, postures, tolerance)])
+    return _added_once(found, [one for c in found for one in _arriving(s, c, end, postures, tolerance)])
 
 
-def _inner(columns: Columns, all_: list[Chain]) -> list[int]:
+def _inner(columns: Columns, chains: list[Chain]) -> list[int]:
     """Samples between start and end on a boundary beside which a chain ends; none where they are many."""
-    ends = np.unique([at for c in all_ for at in (c.first, c.last)])
+    ends = np.unique([at for c in chains for at in (c.first, c.last)])
     inner = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
     rows = [j for j in inner.tolist() if len(ends) and np.abs(columns.s[ends] - columns.s[j]).min() <= _NEAR]
     return rows if len(rows) <= _MOST else []
 
 
-def _with(found: list[Chain], more: list[Chain]) -> list[Chain]:
+def _added_once(chains: list[Chain], new_chains: list[Chain]) -> list[Chain]:
     """Chains, and more that are not among them."""
-    return found + [c for c in more if c not in found]
+    return chains + [c for c in new_chains if c not in chains]
 
 
-def _across(s: Array, all_: list[Chain], tolerance: float) -> list[Chain]:
+def _one_of_each_pair(s: Array, chains: list[Chain], tolerance: float) -> list[Chain]:
     """Chains, one of each two that are one way: where a wrist is straight exactly, its posture there is any.
 
     The first ends a few micrometres before it, the other one begins behind it, at nearly the same joint values.
     """
-    found = list(all_)
-    for a in all_:
+    found = list(chains)
+    for a in chains:
         behind = [b for b in found if a.last < b.first and s[b.first] - s[a.last] <= _NEAR and len(b.q) > 1]
         for b in behind[:_MOST] if len(a.q) > 1 else []:
             step = change(a.arm, a.q[-1], b.q[0])
@@ -101,11 +101,11 @@ def _leaving(s: Array, c: Chain, j: int, postures: Array, tolerance: float) -> l
     if c.first == j < c.last:
         return [c]
     N = len(s)
-    back = _arriving(-s[::-1], _backward(c, N), N - 1 - j, postures, tolerance)
-    return [_backward(one, N) for one in back]
+    back = _arriving(-s[::-1], _reversed_chain(c, N), N - 1 - j, postures, tolerance)
+    return [_reversed_chain(one, N) for one in back]
 
 
-def _backward(c: Chain, N: int) -> Chain:
+def _reversed_chain(c: Chain, N: int) -> Chain:
     """A chain as the way back has it, of N samples."""
     return Chain(c.arm, N - 1 - c.last, c.q[::-1], c.labels[::-1])
 

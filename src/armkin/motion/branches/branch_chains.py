@@ -179,16 +179,16 @@ class Run:
     last: int
 
 
-def fewest(all_: list[Chain], N: int, allowed: list[Chain] | None = None) -> list[Run]:
+def fewest(chains: list[Chain], N: int, allowed: list[Chain] | None = None) -> list[Run]:
     """Runs one after another, each carrying as far as any can; a gap where nothing carries.
 
     allowed: the chains that may begin (those at the start's branch). Of runs that carry equally far the one with
     the least motion: the sum over the samples of the greatest |dq| / max_speed.
     """
     runs: list[Run] = []
-    i, alive = 0, _alive(all_, N)
+    i, alive = 0, _alive(chains, N)
     while i < N:
-        choices = allowed if allowed is not None and not runs and i == 0 else all_
+        choices = allowed if allowed is not None and not runs and i == 0 else chains
         far = max((chain.carries(i) for chain in choices), default=i - 1)
         if far < i or (far == i and i < N - 1 and runs and runs[-1].last == i):
             i += 1 + int(alive[i + 1 :].argmax())
@@ -196,24 +196,24 @@ def fewest(all_: list[Chain], N: int, allowed: list[Chain] | None = None) -> lis
         runs.append(_least_motion(choices, i, far))
         if far >= N - 1:
             break
-        i = far if any(c.carries(far) > far for c in all_) else far + 1
+        i = far if any(c.carries(far) > far for c in chains) else far + 1
     return runs
 
 
-def _alive(all_: list[Chain], N: int) -> Bool:
+def _alive(chains: list[Chain], N: int) -> Bool:
     """Samples at which some run may begin, and the end: (N + 1,)."""
     alive = np.zeros(N + 1, bool)
     alive[N] = True
-    for chain in all_:
+    for chain in chains:
         i0, i1 = min(chain.first, N), min(chain.last + 1, N)
         alive[i0:i1] |= chain.reach[: i1 - i0] >= np.arange(i0, i1)
     return alive
 
 
-def _least_motion(choices: list[Chain], i: int, far: int) -> Run:
+def _least_motion(choices: list[Chain], i: int, last_sample: int) -> Run:
     """Of the chains that carry from sample i so far the one with the least motion, as a run."""
-    best = min((c for c in choices if c.carries(i) == far), key=lambda c: least_time(c, i, far))
-    return Run(best, i, far)
+    best = min((c for c in choices if c.carries(i) == last_sample), key=lambda c: least_time(c, i, last_sample))
+    return Run(best, i, last_sample)
 
 
 def least_time(chain: Chain, i: int, e: int) -> float:

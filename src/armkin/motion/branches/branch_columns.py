@@ -36,7 +36,7 @@ class Columns:
     q: Array  # (N, B, n), principal values; nan where there is no branch
     name: NDArray[np.int16]  # (N, B) index into names, -1: none
     status: NDArray[np.int8]  # (N,)
-    within: Bool  # (N, B) within limits, of some copy
+    within_limits: Bool  # (N, B) within limits, of some copy
     names: tuple[str, ...] = ()
     complete: bool = True
     partner: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 0), np.int16))  # (N - 1, B) column, or -1
@@ -48,7 +48,7 @@ class Columns:
 
     def rows(self, rows: Int) -> Columns:
         """Some samples, without their links."""
-        parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within[rows])
+        parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within_limits[rows])
         return Columns(*parts, self.names, self.complete)
 
     def wider(self, B: int) -> Columns:
@@ -58,26 +58,26 @@ class Columns:
             _widened(self.q, B),
             _widened(self.name, B, -1),
             self.status,
-            _widened(self.within, B, 0),
+            _widened(self.within_limits, B, 0),
             self.names,
             self.complete,
             _widened(self.partner, B, -1),
         )
 
-    def inserted(self, at: Int, new: Columns) -> Columns:
-        """These samples with others before the rows `at`; the links of both stay, as far as they have any."""
+    def inserted(self, rows: Int, new: Columns) -> Columns:
+        """These samples with others before the rows `rows`; the links of both stay, as far as they have any."""
         B = max(self.q.shape[1], new.q.shape[1])
         old, new = self.wider(B), new.wider(B)
         links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
         return Columns(
-            np.insert(old.s, at, new.s),
-            np.insert(old.q, at, new.q, axis=0),
-            np.insert(old.name, at, new.name, axis=0),
-            np.insert(old.status, at, new.status),
-            np.insert(old.within, at, new.within, axis=0),
+            np.insert(old.s, rows, new.s),
+            np.insert(old.q, rows, new.q, axis=0),
+            np.insert(old.name, rows, new.name, axis=0),
+            np.insert(old.status, rows, new.status),
+            np.insert(old.within_limits, rows, new.within_limits, axis=0),
             old.names,
             old.complete and new.complete,
-            np.insert(old.partner, at, links, axis=0),
+            np.insert(old.partner, rows, links, axis=0),
         )
 
 
@@ -114,13 +114,13 @@ class Samples:
         if nobody.any():
             empty, none = found.rows(np.flatnonzero(out)[[0] * int(nobody.sum())]), s[between[nobody]]
             parts.append(replace(empty, s=none))
-        whole = _together(parts)
+        whole = _concatenated(parts)
         return whole.rows(np.argsort(whole.s, kind="stable"))
 
     def solved(self, s: Array, examine: bool = True) -> Columns:
         """All branches at samples, not linked yet; of very many in parts, to bound the memory that takes."""
         parts = [self._part(s[k : k + _BLOCK], examine) for k in range(0, len(s), _BLOCK)]
-        return parts[0] if len(parts) == 1 else _together(parts)
+        return parts[0] if len(parts) == 1 else _concatenated(parts)
 
     def _part(self, s: Array, examine: bool) -> Columns:
         found = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
@@ -142,9 +142,9 @@ class Samples:
                 q[stay] = self._staying(q[stay], self.targets(s[stay]), found.free[stay], within[stay])
         return _in_columns(found, s, q, name, within)
 
-    def _staying(self, q: Array, target: Array, free: Bool, within: Bool) -> Array:
+    def _staying(self, q: Array, target: Array, free: Bool, within_limits: Bool) -> Array:
         """Singular postures (M, B, n) with their free joints (M, n) as near as they can be to where the arm stands."""
-        rows, b = np.nonzero(~np.isnan(q[:, :, 0]) & within)
+        rows, b = np.nonzero(~np.isnan(q[:, :, 0]) & within_limits)
         if not len(rows):
             return q
         arm, task = self.arm, task_for(self.arm, self.task)
@@ -159,7 +159,7 @@ class Samples:
         return q
 
 
-def _together(parts: list[Columns]) -> Columns:
+def _concatenated(parts: list[Columns]) -> Columns:
     """Samples of all the parts, one part after another."""
     B = max(part.q.shape[1] for part in parts)
     wide = [part.wider(B) for part in parts]
@@ -168,29 +168,29 @@ def _together(parts: list[Columns]) -> Columns:
         np.concatenate([part.q for part in wide]),
         np.concatenate([part.name for part in wide]),
         np.concatenate([part.status for part in wide]),
-        np.concatenate([part.within for part in wide]),
+        np.concatenate([part.within_limits for part in wide]),
         max((part.names for part in parts), key=len),
         all(part.complete for part in parts),
     )
 
 
-def _in_columns(found: Solutions, s: Array, q: Array, name: NDArray[np.int16], within: Bool) -> Columns:
+def _in_columns(solutions: Solutions, s: Array, q: Array, name: NDArray[np.int16], within_limits: Bool) -> Columns:
     """Rows of solutions with every named branch in the column of its number."""
     B = q.shape[1]
     wide = max(B, int(name.max(initial=-1)) + 1)
-    status, complete = found.status.astype(np.int8), bool(np.all(found.complete))
+    status, complete = solutions.status.astype(np.int8), bool(np.all(solutions.complete))
     moved = np.flatnonzero(((name >= 0) & (name != np.arange(B))).any(axis=1))
-    q, name, within = (_widened(x, wide, fill) for x, fill in ((q, np.nan), (name, -1), (within, 0)))
+    q, name, within_limits = (_widened(x, wide, fill) for x, fill in ((q, np.nan), (name, -1), (within_limits, 0)))
     if len(moved):
-        q, name, within = q.copy(), name.copy(), within.copy()
-        old_q, old_name, old_within = q[moved], name[moved], within[moved]
-        q[moved], name[moved], within[moved] = np.nan, -1, False
+        q, name, within_limits = q.copy(), name.copy(), within_limits.copy()
+        old_q, old_name, old_within = q[moved], name[moved], within_limits[moved]
+        q[moved], name[moved], within_limits[moved] = np.nan, -1, False
         row, column = np.nonzero((old_name >= 0) & ~np.isnan(old_q[:, :, 0]))
         place = old_name[row, column]
         q[moved[row], place] = old_q[row, column]
         name[moved[row], place] = place
-        within[moved[row], place] = old_within[row, column]
-    return Columns(s, q, name, status, within, found.names, complete)
+        within_limits[moved[row], place] = old_within[row, column]
+    return Columns(s, q, name, status, within_limits, solutions.names, complete)
 
 
 def _widened(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]

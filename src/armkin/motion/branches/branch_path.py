@@ -61,7 +61,7 @@ class Carried:
 
     route: Route
     columns: Columns
-    all: list[Chain]
+    chains: list[Chain]
     runs: list[Run]
 
     @property
@@ -88,7 +88,7 @@ def samples(route: Route, count: int | None = None) -> Array:
     """Where a route is solved first: evenly, and at the ends of its pieces."""
     number = count or int(max(np.clip(np.ceil(route.length / _STEP), *_SAMPLES), route.length / _FARTHEST))
     even = np.linspace(0.0, route.length, max(number, 2))
-    return np.asarray(_apart(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
+    return np.asarray(_well_separated(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
 
 
 def carry(
@@ -125,16 +125,16 @@ def carry(
     return Carried(route, columns, all_, complete or fewest(all_, end + 1, starts))
 
 
-def _starts(arm: Arm, all_: list[Chain], fixed: Array | None) -> list[Chain]:
+def _starts(arm: Arm, chains: list[Chain], fixed: Array | None) -> list[Chain]:
     """The chains that may begin a route; fixed: (n,) where the arm stands, if it has no choice."""
-    starts = [c for c in all_ if c.first == 0]
+    starts = [c for c in chains if c.first == 0]
     if fixed is None:
         return starts
     # where no branch goes on it stands by itself: a wrist has to turn first, at rest
-    return [c for c in starts if stands(c, fixed)] or [Chain(arm, 0, fixed[None], np.full(1, -1))]
+    return [c for c in starts if starts_at(c, fixed)] or [Chain(arm, 0, fixed[None], np.full(1, -1))]
 
 
-def stands(chain: Chain, q: Array) -> bool:
+def starts_at(chain: Chain, q: Array) -> bool:
     """Whether a chain begins in a posture (n,), whole turns apart."""
     return float(np.abs(change(chain.arm, chain.q[0], q)).max()) < 1e-4
 
@@ -179,7 +179,7 @@ def stretches(
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
     edges = [a for a, b in pairwise(edges) if b - a > 1e-9] + edges[-1:]
-    kept = None if grid < _GRID else pace.tolerance - route.aside
+    kept = None if grid < _GRID else pace.tolerance - route.largest_detour
     made: list[Curve | Smoothed] = []
     for part in _groups(edges, s):
         a, b, inner = part[0], part[-1], np.array(part[1:-1])
@@ -188,7 +188,7 @@ def stretches(
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
         way = Way(route, s[here], q[here], a, b, run.chain.windows, inner)
         path, off = fine_enough(arm, way, number, kept)
-        _check_kept(path, off + route.aside, pace)
+        _check_kept(path, off + route.largest_detour, pace)
         if made:  # the stop is the same to the last digit
             path.q[0] = made[-1].end
         made += _timed(arm, route, finer(path), pace)
@@ -254,14 +254,14 @@ def _narrow(arm: Arm, path: Knots, mean: float, tolerance: float) -> Array:
 
     The average over T, `mean`, shifts q by T^2/24 (q'' x + q' u); the second part is along the path.
     """
-    left, right = path.second()
+    left, right = path.second_derivatives()
     bend = np.concatenate([left[:1], (left[1:] + right[:-1]) / 2, right[-1:]])
     J = np.asarray(jacobian(arm, path.q)[:, :3])
     shift = np.linalg.norm((J @ bend[:, :, None])[..., 0], axis=1)
     return np.asarray(12 * tolerance / mean**2 / np.maximum(shift, 1e-12))
 
 
-def _apart(s: Array, least: float) -> Array:
+def _well_separated(s: Array, least: float) -> Array:
     """Sorted values without those that are closer than `least` to the one before; the last one stays."""
     keep = np.concatenate([[True], np.diff(s) > least])
     out = s[keep]

@@ -179,7 +179,7 @@ class _Linking:
         c.partner[rows] = np.where(good, column, np.int16(-1))
         straight = (good == (valid[left] | valid[right])).all(axis=1)
         self.torn[rows], self.both[rows] = False, False
-        flips = (c.within[left] != c.within[right]) & good
+        flips = (c.within_limits[left] != c.within_limits[right]) & good
         if self.wide:
             flips |= self._crosses(c.q, left, right, wrapped) & good
         self.crossing[rows] = flips.any(axis=1)
@@ -225,7 +225,7 @@ class _Linking:
             cost[a, :], cost[:, b] = np.inf, np.inf
         # What no copy has within the limits at either end carries nothing: nobody asks where it goes on.
         alone, other = left[c.partner[i, left] < 0], np.setdiff1d(right, c.partner[i])
-        self.torn[i] = c.within[i, alone].any() or c.within[i + 1, other].any()
+        self.torn[i] = c.within_limits[i, alone].any() or c.within_limits[i + 1, other].any()
         self.both[i] = self.torn[i] and len(alone) and len(other)
 
     def _crosses(self, q: Array, left: Int | slice, right: Int | slice, wrapped: Bool) -> Bool:

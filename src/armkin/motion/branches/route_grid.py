@@ -175,7 +175,7 @@ def _solved(arm: Arm, way: Way, where: Array, damping: float, known: Knots | Non
     if known is None or windows:
         guess = np.stack([np.interp(where[new], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
     else:  # they are nearer than chords of samples
-        guess, _ = known.at(where[new])
+        guess, _ = known.evaluate(where[new])
     values[new] = corrected(arm, route.task, guess, route.targets(where[new]), damping)
     for one in windows:
         if one.detour is not None:  # the route is detoured itself
@@ -216,7 +216,7 @@ def interval_deviations(arm: Arm, route: Route, path: Knots, before: tuple[Knots
 def _steps(arm: Arm, path: Knots) -> Array:
     """Bounds of how far the tip leaves its chord in every interval: the law of time needs them small (N - 1,) [mm]."""
     lever, h = levers(arm), path.h[:, None]
-    left, right = path.second()
+    left, right = path.second_derivatives()
     bend = h**2 / 8 * np.maximum(np.abs(left), np.abs(right))
     off = chord_bound(lever, np.diff(path.q, axis=0)) + bend @ np.where(arm.prismatic, 1.0, np.diag(lever))
     off[path.rests] = 0.0
@@ -233,7 +233,7 @@ def missed(arm: Arm, route: Route, path: Knots) -> Missed:
         at, given = s[i : i + _BLOCK], points[i : i + _BLOCK]
         distance = np.full(len(at), np.inf)  # the least of what is met: in a tight corner the search may leave it
         for _ in range(3):  # the nearest place is a little before or behind
-            q, slope = path.at(np.clip(at, path.s[0], path.s[-1]))
+            q, slope = path.evaluate(np.clip(at, path.s[0], path.s[-1]))
             off = given - position(arm, q)[:, : given.shape[1]]
             distance = np.minimum(distance, np.linalg.norm(off, axis=1))
             tangent = (np.asarray(jacobian(arm, q)[:, : given.shape[1]]) @ slope[:, :, None])[..., 0]
@@ -244,7 +244,7 @@ def missed(arm: Arm, route: Route, path: Knots) -> Missed:
             sure.add(k)
             k = int(distance.argmax())
             near = np.clip(s[i + k] + np.linspace(-_AROUND, _AROUND, 401), path.s[0], path.s[-1])
-            off = given[k] - position(arm, path.at(near)[0])[:, : given.shape[1]]
+            off = given[k] - position(arm, path.evaluate(near)[0])[:, : given.shape[1]]
             distance[k] = min(distance[k], float(np.linalg.norm(off, axis=1).min()))
         most = float(distance[k])
         if worst is None or most > worst[0] * (1 + _ALIKE):

@@ -59,25 +59,25 @@ def check(arm: Arm) -> None:
 
 
 def through_wrists(
-    arm: Arm, route: Route, columns: Columns, all_: list[Chain], turn: float, aside: float
+    arm: Arm, route: Route, columns: Columns, chains: list[Chain], turn: float, tip_offset: float
 ) -> list[Chain]:
     """Chains, and those that go on with the wrist flipped behind a singularity.
 
-    turn: [rad] by which the tool may be turned for it, aside: [mm] that the tip may go.
+    turn: [rad] by which the tool may be turned for it, tip_offset: [mm] that the tip may go.
     """
-    s, found, new = columns.s, list(all_), list(all_)
-    near = _NEAR * max(np.sin(turn), aside / LEAST_LEVER)
+    s, found, new = columns.s, list(chains), list(chains)
+    near = _NEAR * max(np.sin(turn), tip_offset / LEAST_LEVER)
     for _ in range(_MOST):
         made = []
         for c in new:
             for j in _straight(arm, c, near):
                 if c.windows and s[j] <= c.windows[-1].end:
                     continue
-                for other in all_:
-                    joined = _joined(arm, route, s, c, other, j, (turn, aside))
+                for other in chains:
+                    joined = _joined(arm, route, s, c, other, j, (turn, tip_offset))
                     made += [] if joined is None else [joined]
         found, new = found + made, made
-        if not made or len(found) > _MOST * len(all_):
+        if not made or len(found) > _MOST * len(chains):
             break
     return found
 
@@ -134,8 +134,8 @@ def _passed(
     if turn and (turning := [k for k in numbers if window(k).turned <= turn]):
         return turning[-1], window(turning[-1])
     for k in reversed(numbers) if aside else ():
-        around = _around(arm, route, window(k))
-        if around is None or around.aside > aside:  # of a narrower one as well
+        around = _window_with_offset(arm, route, window(k))
+        if around is None or around.tip_offset > aside:  # of a narrower one as well
             return None
         if _passes(arm, route, around):
             return k, around
@@ -163,7 +163,7 @@ def _joined(
     if best is None:
         return None
     (a, b), one = spans[best[0]], best[1]
-    inside = _within(arm, route, one, s[a + 1 : b])
+    inside = _joints_in_window(arm, route, one, s[a + 1 : b])
     offset = one.q[1] - other.q[b - other.first]
     q = np.concatenate([c.q[: a + 1 - c.first], inside, other.q[b - other.first :] + offset])
     left, right = c.labels[: j - c.first], other.labels[on - other.first :]
@@ -171,20 +171,21 @@ def _joined(
     return Chain(arm, c.first, q, labels, (*c.windows, one))
 
 
-def _within(arm: Arm, route: Route, one: Window, s: Array) -> Array:
+def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array:
     """Joint values at lengths s (N,) inside of a window: (N, n)."""
-    q = one.joints(arm, route, s)
-    if one.detour is None or not len(s):
+    q = window.joints(arm, route, s)
+    if window.detour is None or not len(s):
         return q
-    q = corrected(arm, route.task, q, detoured(route, (one,)).targets(s), steps=12)
+    q = corrected(arm, route.task, q, detoured(route, (window,)).targets(s), steps=12)
     known = np.abs(_bent(arm, q)) > _TOLD  # nearer to straight joints 4 and 6 go on as they do beside it
-    at, beside = np.concatenate([[one.begin], s[known], [one.end]]), np.concatenate([one.q[:1], q[known], one.q[1:]])
+    at = np.concatenate([[window.begin], s[known], [window.end]])
+    beside = np.concatenate([window.q[:1], q[known], window.q[1:]])
     for j in (3, 5):
         q[~known, j] = np.interp(s[~known], at, beside[:, j])
     return q
 
 
-def _around(arm: Arm, route: Route, window: Window) -> Window | None:
+def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None:
     """The window with the tip aside, as little as it can be, to where the wrist is straight; None: it is nowhere."""
     s = np.linspace(window.begin, window.end, _LOOKED)
     q = window.joints(arm, route, s)
@@ -210,7 +211,7 @@ def _around(arm: Arm, route: Route, window: Window) -> Window | None:
 def _passes(arm: Arm, route: Route, window: Window) -> bool:
     """Whether the joints follow a window's detour, all along."""
     s = np.linspace(window.begin, window.end, _LOOKED)
-    T, goal = fk(arm, _within(arm, route, window, s)), detoured(route, (window,)).targets(s)
+    T, goal = fk(arm, _joints_in_window(arm, route, window, s)), detoured(route, (window,)).targets(s)
     missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_rotation(T, goal)).max()
     return bool(missed < _EXACT)
 
@@ -221,15 +222,15 @@ def _rotation(T: Array, target: Array) -> Array:
     return np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1) / 2
 
 
-def _window(arm: Arm, route: Route, at: Array, before: Array, behind: Array) -> Window:
-    """From a posture to another one, (n,) each, at lengths `at` (2,)."""
-    q = np.stack([before, before + change(arm, before, behind)])
+def _window(arm: Arm, route: Route, lengths: Array, start: Array, end: Array) -> Window:
+    """From a posture to another one, (n,) each, at lengths `lengths` (2,)."""
+    q = np.stack([start, start + change(arm, start, end)])
     slopes = []
-    for s, one in zip(at.tolist(), q, strict=True):
+    for s, one in zip(lengths.tolist(), q, strict=True):
         both = np.clip([s - _STEP, s + _STEP], 0.0, route.length)
         exact = corrected(arm, route.task, np.stack([one, one]), route.targets(both), steps=12)
         slopes.append((exact[1] - exact[0]) / (both[1] - both[0]))
-    window = Window(float(at[0]), float(at[1]), q, np.array(slopes), np.inf)
+    window = Window(float(lengths[0]), float(lengths[1]), q, np.array(slopes), np.inf)
     s = np.linspace(window.begin, window.end, _LOOKED)
     T, target = fk(arm, window.joints(arm, route, s)), route.targets(s)
     if np.linalg.norm(T[:, :3, 3] - target[:, :3, 3], axis=1).max() > 1e-6:

@@ -36,7 +36,7 @@ class Window:
     detour: Detour | None = None
 
     @property
-    def aside(self) -> float:
+    def tip_offset(self) -> float:
         """How far the tip goes aside [mm]."""
         return 0.0 if self.detour is None else float(np.linalg.norm(self.detour.by))
 

@@ -279,8 +279,8 @@ class PathPlan:
                 t = np.linspace(0.0, stretch.duration, 200)
             for k in range(0, len(t) - 1, _BLOCK):  # neighbouring blocks share a time: a jerk is between two
                 part = t[k : k + _BLOCK + 1]
-                a = stretch.at(part, 2)
-                speed = np.maximum(speed, np.abs(stretch.at(part, 1)).max(axis=0))
+                a = stretch.evaluate(part, 2)
+                speed = np.maximum(speed, np.abs(stretch.evaluate(part, 1)).max(axis=0))
                 accel = np.maximum(accel, np.abs(a).max(axis=0))
                 if isinstance(stretch, Smoothed):
                     jerk = np.maximum(jerk, np.abs(np.diff(a, axis=0)).max(axis=0) / (t[1] - t[0]))

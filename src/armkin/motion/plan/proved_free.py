@@ -63,8 +63,8 @@ class _OfCurve:
     def _sums(self) -> Array:
         return self.inner._sums
 
-    def at(self, place: Array) -> Array:
-        return self.smoothed.at(self._time(place))
+    def joints_at(self, place: Array) -> Array:
+        return self.smoothed.evaluate(self._time(place))
 
     def variation(self, begin: Array, end: Array) -> Array:
         """The mean over a window goes no farther than the curve does within the windows that it sees.
@@ -105,12 +105,12 @@ def proved(trajectory: Trajectory, *, tight: bool = False) -> Found | None:
     escaping: tuple[int, ...] = ()
     for first, way in _ways(trajectory):
         lifted = _Lifted(arm, way)
-        proof = prove(held, lifted, tight=tight, allowed=allowed)
+        proof = prove(held, lifted, tight=tight, ignored_pairs=allowed)
         postures += proof.postures
         if allowed is None:
             escaping = proof.escaping
         allowed = proof.escaping
-        here = _found(trajectory, held, first, proof, escaping, postures, way)
+        here = _proof_on_trajectory(trajectory, held, first, proof, escaping, postures, way)
         if not proof.free:
             return here
         if found is None or here.mm < found.mm:
@@ -151,16 +151,16 @@ def checked(plan: PathPlan) -> PathPlan:
     raise error
 
 
-def refusal(trajectory: Trajectory, found: Found, place: str = "", **fields: object) -> NoSolutionError:
+def refusal(trajectory: Trajectory, hit: Found, place: str = "", **fields: object) -> NoSolutionError:
     """Why a motion is refused; place: where on a path."""
     arm = trajectory.arm
-    values = units.joints_out(arm, found.joints).tolist()
+    values = units.joints_out(arm, hit.joints).tolist()
     at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(arm.joint_names, values, strict=True))
-    stands = (found.body, found.other) in found.escaping
-    many = f" on the way to waypoint {found.stretch + 1}" if len(trajectory.stretches) > 1 and not place else ""
+    stands = (hit.body, hit.other) in hit.escaping
+    many = f" on the way to waypoint {hit.stretch + 1}" if len(trajectory.stretches) > 1 and not place else ""
     what = "would go deeper into" if stands else "would hit"
-    told = {"body": found.body, "with": found.other, "joints": values, **fields}
-    return NoSolutionError(f"{found.body} {what} {found.other}{place or many}, at {at}: nothing was moved", **told)
+    told = {"body": hit.body, "with": hit.other, "joints": values, **fields}
+    return NoSolutionError(f"{hit.body} {what} {hit.other}{place or many}, at {at}: nothing was moved", **told)
 
 
 def free_way(arm: Arm, q: Array, goal: Array) -> tuple[float, NoSolutionError | None]:
@@ -201,8 +201,8 @@ class _Lifted:
     def cells(self) -> int:
         return self.way.cells
 
-    def at(self, place: Array) -> Array:
-        return whole_arm(self.arm, self.way.at(place))[1]
+    def joints_at(self, place: Array) -> Array:
+        return whole_arm(self.arm, self.way.joints_at(place))[1]
 
     def variation(self, begin: Array, end: Array) -> Array:
         arm, found = self.arm, self.way.variation(begin, end)
@@ -225,7 +225,7 @@ def _ways(trajectory: Trajectory) -> list[tuple[int, Way]]:
     return found
 
 
-def _found(
+def _proof_on_trajectory(
     trajectory: Trajectory, held: Guard, first: int, proof: Proof, escaping: tuple[int, ...], postures: int, way: Way
 ) -> Found:
     """A proof in the terms of the trajectory."""
@@ -237,9 +237,9 @@ def _found(
                 break
             cell -= sizes[stretch - first]
             stretch += 1
-    body, other = ("", "") if proof.pair is None else held.of(proof.pair)
-    joints = way.at(np.array([proof.place]))[0]
-    pairs = tuple(held.of(k) for k in escaping)
+    body, other = ("", "") if proof.pair is None else held.pair_names(proof.pair)
+    joints = way.joints_at(np.array([proof.place]))[0]
+    pairs = tuple(held.pair_names(k) for k in escaping)
     return Found(proof.free, proof.mm, stretch, cell, joints, body, other, pairs, postures)
 
 
@@ -247,17 +247,17 @@ def _cells(stretch: Stretch) -> int:
     return len(stretch.path.h) if isinstance(stretch, Curve) else 1
 
 
-def seconds(trajectory: Trajectory, found: Found) -> float:
+def seconds(trajectory: Trajectory, hit: Found) -> float:
     """When, after the beginning, a trajectory is at the place that a proof has found [s]."""
-    stretch = trajectory.stretches[found.stretch]
-    begin = float(trajectory.begins[found.stretch])
+    stretch = trajectory.stretches[hit.stretch]
+    begin = float(trajectory.begins[hit.stretch])
     if isinstance(stretch, Smoothed):
-        return begin + min(found.cell / _OfCurve(stretch).cells, 1.0) * stretch.duration
+        return begin + min(hit.cell / _OfCurve(stretch).cells, 1.0) * stretch.duration
     if isinstance(stretch, Curve):
         times = stretch.times
-        i = min(int(found.cell), len(times) - 2)
-        return begin + float(times[i] + (found.cell - i) * (times[i + 1] - times[i]))
-    return begin + _of_share(stretch, found.cell)
+        i = min(int(hit.cell), len(times) - 2)
+        return begin + float(times[i] + (hit.cell - i) * (times[i + 1] - times[i]))
+    return begin + _of_share(stretch, hit.cell)
 
 
 def _of_share(stretch: Stretch, share: float) -> float:
@@ -269,6 +269,6 @@ def _of_share(stretch: Stretch, share: float) -> float:
         return 0.0
     for _ in range(50):
         middle = (low + high) / 2
-        gone = float((stretch.at(np.array([middle]))[0, j] - stretch.start[j]) / way[j])
+        gone = float((stretch.evaluate(np.array([middle]))[0, j] - stretch.start[j]) / way[j])
         low, high = (middle, high) if gone < share else (low, middle)
     return low

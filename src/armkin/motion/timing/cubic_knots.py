@@ -33,7 +33,7 @@ class Knots:
         """Intervals in which the path rests: (k,)."""
         return np.flatnonzero(self.s[1:] == self.s[:-1])
 
-    def at(self, s: Array) -> tuple[Array, Array]:
+    def evaluate(self, s: Array) -> tuple[Array, Array]:
         """q and q' at lengths s: (M,) -> (M, n) twice."""
         i = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
         h = self.h[i][:, None]
@@ -42,22 +42,22 @@ class Knots:
         c2, c3 = 3 * chord - 2 * d0 - d1, d0 + d1 - 2 * chord
         return self.q[i] + f * (d0 + f * (c2 + f * c3)), (d0 + f * (2 * c2 + 3 * f * c3)) / h
 
-    def second(self, some: slice | Int = slice(None)) -> tuple[Array, Array]:
+    def second_derivatives(self, intervals: slice | Int = slice(None)) -> tuple[Array, Array]:
         """q'' at the left and the right end of intervals, by default of all: (M, n) twice."""
-        _, left, right = self.slopes(some)
+        _, left, right = self.slopes(intervals)
         return left.T, right.T
 
-    def slopes(self, some: slice | Int = slice(None)) -> tuple[Array, Array, Array]:
+    def slopes(self, intervals: slice | Int = slice(None)) -> tuple[Array, Array, Array]:
         """q' at the left end of intervals, q'' there and at the right end: (n, M) thrice, long runs of numbers."""
-        (q0, q1), (d0, d1) = (self.ends(each, some) for each in (self.q, self.d))
-        h = self.h[some]
+        (q0, q1), (d0, d1) = (self.ends(each, intervals) for each in (self.q, self.d))
+        h = self.h[intervals]
         chord = (q1 - q0) / h
         return d0, (6 * chord - 4 * d0 - 2 * d1) / h, (-6 * chord + 2 * d0 + 4 * d1) / h
 
     @staticmethod
-    def ends(values: Array, some: slice | Int) -> tuple[Array, Array]:
+    def ends(values: Array, intervals: slice | Int) -> tuple[Array, Array]:
         """Of values at the points, (N, n), those at both ends of intervals: (n, M) twice."""
         columns = values.T
-        if isinstance(some, slice):
-            return columns[:, :-1][:, some], columns[:, 1:][:, some]
-        return columns.take(some, axis=1), columns.take(some + 1, axis=1)
+        if isinstance(intervals, slice):
+            return columns[:, :-1][:, intervals], columns[:, 1:][:, intervals]
+        return columns.take(intervals, axis=1), columns.take(intervals + 1, axis=1)

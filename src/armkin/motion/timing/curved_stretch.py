@@ -71,14 +71,14 @@ class Curve:
         i, along, _, _ = self.place(t)
         return np.asarray(self.path.s[i] + along)
 
-    def at(self, t: Array, order: int = 0) -> Array:
+    def evaluate(self, t: Array, derivative: int = 0) -> Array:
         """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
         i, along, v, u = self.place(np.asarray(t, dtype=float))
         w, c2, c3 = along[:, None], *(part.take(i, axis=0) for part in self._bends)
         d0 = self.path.d.take(i, axis=0)
-        if order == 0:
+        if derivative == 0:
             return np.asarray(self.path.q.take(i, axis=0) + w * (d0 + w * (c2 + w * c3)))
         first = d0 + w * (2 * c2 + 3 * w * c3)
-        if order == 1:
+        if derivative == 1:
             return np.asarray(first * v[:, None])
         return np.asarray((2 * c2 + 6 * w * c3) * (v**2)[:, None] + first * u[:, None])

@@ -39,7 +39,7 @@ def _hold_cap(arm: Arm, path: Knots, share: float) -> Array:
     """`hold_cap` of a part of the way."""
     gain = arm.motor_gain
     brakes = BRAKE * motor_accel(arm)
-    ends = path.second()
+    ends = path.second_derivatives()
     out = np.full(len(path.s), np.inf)
     rate = path.d @ gain.T
     m = (np.abs(rate) / brakes).argmax(axis=1)

@@ -64,7 +64,7 @@ class Smoothed:
         times = self.curve.times
         step = np.diff(times)
         t = times[:-1, None] + step[:, None] * _X
-        q = self.curve.at(t.ravel()).reshape(*t.shape, -1) - self.start
+        q = self.curve.evaluate(t.ravel()).reshape(*t.shape, -1) - self.start
         pieces = (q * _W[:, None]).sum(axis=1) * step[:, None]
         return np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)])
 
@@ -75,21 +75,21 @@ class Smoothed:
         i = np.clip(np.searchsorted(curve.times, inside, side="right") - 1, 0, len(curve.times) - 2)
         step = inside - curve.times[i]
         at = curve.times[i][:, None] + step[:, None] * _X
-        q = curve.at(at.ravel()).reshape(*at.shape, -1) - self.start
+        q = curve.evaluate(at.ravel()).reshape(*at.shape, -1) - self.start
         part = (q * _W[:, None]).sum(axis=1) * step[:, None]
         beyond = np.maximum(t - curve.duration, 0.0)[:, None] * (self.end - self.start)
         return np.asarray(self._sums[i] + part + beyond)
 
-    def at(self, t: Array, order: int = 0) -> Array:
+    def evaluate(self, t: Array, derivative: int = 0) -> Array:
         """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
         now = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         then = now - self.window
-        if order == 0:
+        if derivative == 0:
             return np.asarray(self.start + (self._integral(now) - self._integral(then)) / self.window)
-        change = self.curve.at(now, order - 1) - self.curve.at(then, order - 1)
-        if order == 2:  # speeds before and after the curve are 0, whatever the clipped ends say
+        change = self.curve.evaluate(now, derivative - 1) - self.curve.evaluate(then, derivative - 1)
+        if derivative == 2:  # speeds before and after the curve are 0, whatever the clipped ends say
             inside = [((t >= 0) & (t <= self.curve.duration))[:, None] for t in (now, then)]
-            change = self.curve.at(now, 1) * inside[0] - self.curve.at(then, 1) * inside[1]
+            change = self.curve.evaluate(now, 1) * inside[0] - self.curve.evaluate(then, 1) * inside[1]
         return np.asarray(change / self.window)
 
 

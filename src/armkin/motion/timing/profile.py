@@ -40,16 +40,16 @@ class Profile:
         """Greatest speed that is reached."""
         return float(self.states[:, 1].max(initial=0.0))
 
-    def at(self, t: ArrayLike, order: int = 0) -> Array:
+    def evaluate(self, t: ArrayLike, derivative: int = 0) -> Array:
         """Position (order 0), speed (1), acceleration (2) or jerk (3) at times t: (...,) -> (...,)."""
         when = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         if not len(self.jerk):
             return np.zeros_like(when)
         k = np.clip(np.searchsorted(self.times, when, side="right") - 1, 0, len(self.jerk) - 1)
         (x, v, a), j, h = self.states[k].T, self.jerk[k], when - self.times[k]
-        if order == 0:
+        if derivative == 0:
             return np.asarray(np.minimum(x + h * (v + h * (a / 2 + h * j / 6)), self.length)).T
-        return np.asarray((v + h * (a + h * j / 2), a + h * j, j)[order - 1]).T
+        return np.asarray((v + h * (a + h * j / 2), a + h * j, j)[derivative - 1]).T
 
 
 def trapezoid(length: float, speed: float, accel: float) -> Profile:

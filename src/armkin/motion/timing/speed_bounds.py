@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.motion.timing.cubic_knots import Knots
-from armkin.motion.timing.speed_scan import Int, Least, ahead, back, joined, least_of, scan
+from armkin.motion.timing.speed_scan import Int, Least, backward_step, concatenate, forward_step, least_of, scan
 
 TINY = 1e-300
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
@@ -72,15 +72,15 @@ class Bound:
         self.path, self.accel, self.weights = path, accel, rows
         self.count = path.q.shape[1] + (0 if rows is None else len(rows[0]))
 
-    def of(self, some: Some) -> Motion:
+    def motion_in(self, intervals: Some) -> Motion:
         """What is bounded along some of the intervals."""
-        first, left, right = self.path.slopes(some)
-        low = np.minimum(self.accel[:-1][some], self.accel[1:][some]).T  # between two limits the lower one counts
+        first, left, right = self.path.slopes(intervals)
+        low = np.minimum(self.accel[:-1][intervals], self.accel[1:][intervals]).T  # of two limits the lower one counts
         if self.weights is not None:
             weights, most = self.weights
             first, left, right = (np.concatenate([x, weights @ x]) for x in (first, left, right))
             low = np.concatenate([low, np.broadcast_to(most[:, None], (len(most), low.shape[1]))])
-        return Motion(first, left, right - left, self.path.h[some], low)
+        return Motion(first, left, right - left, self.path.h[intervals], low)
 
 
 class Fastest:
@@ -91,34 +91,36 @@ class Fastest:
         M = len(cap) - 1
         self.share = np.ones((bound.count, M), np.float32)  # of the accelerations
         parts = [self._functions(some) for some in in_parts(M)]
-        self.behind, self.ahead = joined([one for one, _ in reversed(parts)]), joined([one for _, one in parts])
-        self.beta = scan(cap[::-1], self.behind)[::-1]
-        self.x = scan(self.beta, self.ahead)
+        self.backward_bounds = concatenate([one for one, _ in reversed(parts)])
+        self.forward_bounds = concatenate([one for _, one in parts])
+        self.beta = scan(cap[::-1], self.backward_bounds)[::-1]
+        self.x = scan(self.beta, self.forward_bounds)
 
-    def again(self, some: Int) -> None:
+    def lower_speeds(self, intervals: Int) -> None:
         """Lower x: cap or share has sunk in some intervals (k,), ascending, or at their ends."""
         M = len(self.cap) - 1
-        for part in in_parts(len(some)):
-            at = some[part]
+        for part in in_parts(len(intervals)):
+            at = intervals[part]
             behind, forth = self._functions(at)
-            self.behind, self.ahead = self.behind.put(M - 1 - at[::-1], behind), self.ahead.put(at, forth)
-        self.beta = scan(np.minimum(self.beta, self.cap)[::-1], self.behind)[::-1]
-        self.x = scan(self.beta, self.ahead, self.x)
+            self.backward_bounds = self.backward_bounds.replace_intervals(M - 1 - at[::-1], behind)
+            self.forward_bounds = self.forward_bounds.replace_intervals(at, forth)
+        self.beta = scan(np.minimum(self.beta, self.cap)[::-1], self.backward_bounds)[::-1]
+        self.x = scan(self.beta, self.forward_bounds, self.x)
 
-    def _functions(self, some: Some) -> tuple[Least, Least]:
+    def _functions(self, intervals: Some) -> tuple[Least, Least]:
         """What the next x, and the one before it, are at most, in some of the intervals; the cap sinks to suit."""
-        motion = self.bound.of(some)
-        P, R, C = _rows(motion._replace(accel=motion.accel * self.share[:, some]))
+        motion = self.bound.motion_in(intervals)
+        P, R, C = _rows(motion._replace(accel=motion.accel * self.share[:, intervals]))
         slope, level, h = R / P, C / P, motion.h
         # x + 2 h u >= x / 2 must leave room below the upper bounds of u: no interval may force more, since where they
         # are long beside a bend the greatest x would lead to rest, and the law may stand there forever
         steep = slope - 0.25 / h
         room = np.where(steep > 0, level / steep, np.inf).min(axis=0)
-        left = _meeting(np.minimum(self.cap[:-1][some], room), slope, level)
-        self.cap[:-1][some] = left
-        forth, m = ahead(h, slope, level), len(h)
-        a, b = (np.concatenate(each, axis=1) for each in zip(back(*forth), forth, strict=True))
-        both = least_of(a, b, np.concatenate([self.cap[1:][some][::-1], left]))
+        left = _meeting(np.minimum(self.cap[:-1][intervals], room), slope, level)
+        self.cap[:-1][intervals] = left
+        forth, m = forward_step(h, slope, level), len(h)
+        a, b = (np.concatenate(each, axis=1) for each in zip(backward_step(*forth), forth, strict=True))
+        both = least_of(a, b, np.concatenate([self.cap[1:][intervals][::-1], left]))
         return both.part(0, m), both.part(m, 2 * m)
 
 

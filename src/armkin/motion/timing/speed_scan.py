@@ -27,33 +27,33 @@ class Least(NamedTuple):
     b0: Array
     a1: Array
     b1: Array
-    at: Int  # (E,) intervals of the others, ascending
+    interval: Int  # (E,) intervals of the others, ascending
     slope: Array  # (E,)
     level: Array
 
     def values(self, y: Array) -> Array:
         """What every interval says of y: (M,) -> (M,)."""
         out = np.minimum(self.a0 * y + self.b0, self.a1 * y + self.b1)
-        np.minimum.at(out, self.at, self.slope * y[self.at] + self.level)
+        np.minimum.at(out, self.interval, self.slope * y[self.interval] + self.level)
         return out
 
     def part(self, lo: int, hi: int) -> Least:
         """The same of intervals lo to hi."""
-        first, last = np.searchsorted(self.at, [lo, hi])
+        first, last = np.searchsorted(self.interval, [lo, hi])
         a0, b0, a1, b1 = (each[lo:hi] for each in (self.a0, self.b0, self.a1, self.b1))
-        return Least(a0, b0, a1, b1, self.at[first:last] - lo, self.slope[first:last], self.level[first:last])
+        return Least(a0, b0, a1, b1, self.interval[first:last] - lo, self.slope[first:last], self.level[first:last])
 
-    def put(self, some: Int, new: Least) -> Least:
+    def replace_intervals(self, intervals: Int, new: Least) -> Least:
         """The same with other functions in some intervals (k,), ascending."""
         for mine, one in zip(self[:4], new[:4], strict=True):
-            mine[some] = one
+            mine[intervals] = one
         fresh = np.zeros(len(self.a0), bool)
-        fresh[some] = True
-        kept = ~fresh[self.at]
-        at = np.concatenate([self.at[kept], some[new.at]])
+        fresh[intervals] = True
+        kept = ~fresh[self.interval]
+        at = np.concatenate([self.interval[kept], intervals[new.interval]])
         order = np.argsort(at, kind="stable")
         slope, level = (np.concatenate([a[kept], b])[order] for a, b in zip(self[5:], new[5:], strict=True))
-        return self._replace(at=at[order], slope=slope, level=level)
+        return self._replace(interval=at[order], slope=slope, level=level)
 
 
 def least_of(a: Array, b: Array, top: Array) -> Least:
@@ -68,37 +68,39 @@ def least_of(a: Array, b: Array, top: Array) -> Least:
     return Least(a0, b0, a1, b1, two[k], a[j, k], b[j, k])
 
 
-def joined(parts: list[Least]) -> Least:
+def concatenate(parts: list[Least]) -> Least:
     """The same of intervals one part after another."""
     if len(parts) == 1:
         return parts[0]
     begin = np.cumsum([0, *(len(part.a0) for part in parts)])
-    at = np.concatenate([part.at + k for part, k in zip(parts, begin, strict=False)])
+    at = np.concatenate([part.interval + k for part, k in zip(parts, begin, strict=False)])
     a0, b0, a1, b1, _, slope, level = (np.concatenate(each) for each in zip(*parts, strict=True))
     return Least(a0, b0, a1, b1, at, slope, level)
 
 
-def ahead(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:
+def forward_step(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:
     """`keep` and `gain` of every row: from x[i] one comes to keep x[i] + gain at most, and the least of all counts."""
     return 1.0 - 2 * h * slope, 2 * h * level
 
 
-def back(keep: Array, gain: Array) -> tuple[Array, Array]:
+def backward_step(keep: Array, gain: Array) -> tuple[Array, Array]:
     """The same from the end of the path: x[i+1] is reached from e x[i+1] + f at most; the last interval is first."""
     e = np.where(keep > 0, 1.0 / keep, 0.0)
     return e[:, ::-1], np.where(keep > 0, gain * e, np.inf)[:, ::-1]
 
 
-def scan(top: Array, least: Least, known: Array | None = None) -> Array:
+def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
     """y[0] = top[0], y[i+1] = min(top[i+1], least_i(y[i])), not below 0.
 
-    known: such a y of another top and least, which differ in some intervals. Where y is what comes there from the y
+    previous: such a y of another top and least, which differ in some intervals. Where y is what comes there from the y
     before it, nothing has to be done: in most intervals. Runs that begin where it is not are followed side by side,
     as long as there are many.
     """
-    out = (top if known is None else known).copy()
+    out = (top if previous is None else previous).copy()
     out[0] = top[0]
-    first = np.append(0, np.cumsum(np.bincount(least.at, minlength=len(top) - 1)))  # of each interval's other functions
+    first = np.append(
+        0, np.cumsum(np.bincount(least.interval, minlength=len(top) - 1))
+    )  # of each interval's other functions
     for _ in range(_TIMES):
         found = least.values(out[:-1])
         k = (np.minimum(top[1:], np.where(found > 0.0, found, 0.0)) != out[1:]).nonzero()[0]
@@ -146,10 +148,10 @@ def _side_by_side(y: Array, least: Least, first: Int, heads: Int, top: Array) ->
         y[k[some]] = now[some]
 
 
-def _lists(least: Least, some: slice) -> dict[int, list[tuple[float, float]]]:
+def _lists(least: Least, intervals: slice) -> dict[int, list[tuple[float, float]]]:
     """Some of the other functions, by the intervals that have them."""
     more: dict[int, list[tuple[float, float]]] = {}
-    for at, slope, level in zip(*(each[some].tolist() for each in least[4:]), strict=True):
+    for at, slope, level in zip(*(each[intervals].tolist() for each in least[4:]), strict=True):
         more.setdefault(at, []).append((slope, level))
     return more
 

@@ -154,7 +154,7 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
                 return law.x
             if round_ < _ROUNDS - 1:
                 bad, x = np.flatnonzero(worst > _LITTLE), law.x
-                law.again(_beside(bad, len(worst)))
+                law.lower_speeds(_with_neighbours(bad, len(worst)))
                 gone = law.x != x
                 moved = np.flatnonzero(gone[1:] | gone[:-1] | (worst > _LITTLE))
         begins = np.concatenate([[0], path.rests + 1])  # each part between two rests slows down for itself
@@ -162,24 +162,24 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
         return np.asarray(law.x / np.append(np.repeat(slower, np.diff(np.append(begins, len(worst)))), slower[-1]))
 
 
-def _lowered(law: Fastest, limits: Bound, speed: Array, some: Int, *, share: bool) -> Array:
+def _lowered(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, share: bool) -> Array:
     """Greatest shares of the limits in some intervals (k,); where one is above 1, the law is given less there."""
-    motion, x0, x1 = limits.of(some), law.x[some], law.x[some + 1]
+    motion, x0, x1 = limits.motion_in(intervals), law.x[intervals], law.x[intervals + 1]
     over = motion.excess(x0, x1)
-    rush = motion.rush(x0, x1, np.minimum(speed[some], speed[some + 1]).T)
+    rush = motion.rush(x0, x1, np.minimum(speed[intervals], speed[intervals + 1]).T)
     worst = np.maximum(over.max(axis=0), rush)
     if share:
-        law.share[:, some] /= np.where(over > _LITTLE, over, 1.0)
+        law.share[:, intervals] /= np.where(over > _LITTLE, over, 1.0)
     less = rush if share else worst
     low = np.flatnonzero(less > _LITTLE)
-    for at, x in ((some[low], x0[low]), (some[low] + 1, x1[low])):
+    for at, x in ((intervals[low], x0[low]), (intervals[low] + 1, x1[low])):
         np.fmin.at(law.cap, at, x / less[low])
     return np.asarray(worst)
 
 
-def _beside(some: Int, count: int) -> Int:
+def _with_neighbours(intervals: Int, count: int) -> Int:
     """Intervals (k,), and those next to them, of so many."""
     near = np.zeros(count + 2, bool)
     for k in (0, 1, 2):
-        near[some + k] = True
+        near[intervals + k] = True
     return np.flatnonzero(near[1:-1])

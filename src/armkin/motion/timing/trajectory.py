@@ -46,7 +46,7 @@ class Stretch(Protocol):
     def top_speed(self) -> Array:
         """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
 
-    def at(self, t: Array, order: int = 0) -> Array:
+    def evaluate(self, t: Array, derivative: int = 0) -> Array:
         """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
 
 
@@ -68,10 +68,10 @@ class Straight:
         """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
         return np.asarray(np.abs(self.end - self.start) * self.law.peak)
 
-    def at(self, t: Array, order: int = 0) -> Array:
+    def evaluate(self, t: Array, derivative: int = 0) -> Array:
         """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
-        along = self.law.at(t, order)[:, None] * (self.end - self.start)
-        return np.asarray(self.start + along if order == 0 else along)
+        along = self.law.evaluate(t, derivative)[:, None] * (self.end - self.start)
+        return np.asarray(self.start + along if derivative == 0 else along)
 
 
 def brake(stretch: Stretch) -> float:
@@ -145,7 +145,7 @@ class Trajectory:
         >>> p.duration, np.rad2deg(p.q([0, 0.75, 1.5]))[:, 0].round(6).tolist()
         (1.5, [0.0, 30.0, 60.0])
         """
-        return self._at(t, 0)
+        return self._evaluate(t, 0)
 
     def qd(self, t: ArrayLike) -> Array:
         """Joint speeds at times.
@@ -156,7 +156,7 @@ class Trajectory:
         Returns:
             (..., n) [rad/s | mm/s].
         """
-        return self._at(t, 1)
+        return self._evaluate(t, 1)
 
     def qdd(self, t: ArrayLike) -> Array:
         """Joint accelerations at times.
@@ -167,7 +167,7 @@ class Trajectory:
         Returns:
             (..., n) [rad/s2 | mm/s2].
         """
-        return self._at(t, 2)
+        return self._evaluate(t, 2)
 
     def trace(self, step: float = 0.01) -> Trace:
         """The path in time, evenly sampled, with the end of every stretch.
@@ -183,18 +183,18 @@ class Trajectory:
         for stretch, began in zip(self.stretches, self.begins, strict=False):
             t = np.append(np.arange(step, stretch.duration - step / 4, step), stretch.duration)
             times.append(began + t)
-            joints.append(stretch.at(t))
+            joints.append(stretch.evaluate(t))
         q = np.concatenate(joints)
         return Trace(np.concatenate(times), q, frames(self.arm, q)[..., :3, 3])
 
-    def _at(self, t: ArrayLike, order: int) -> Array:
+    def _evaluate(self, t: ArrayLike, derivative: int) -> Array:
         when = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         flat = when.ravel()
-        out = np.tile(self.start if order == 0 else np.zeros(self.arm.n), (len(flat), 1))
+        out = np.tile(self.start if derivative == 0 else np.zeros(self.arm.n), (len(flat), 1))
         which = np.searchsorted(self.begins, flat, side="right") - 1
         which = np.clip(which, 0, max(len(self.stretches) - 1, 0))
         for k, here in grouped(which) if self.stretches else ():
-            out[here] = self.stretches[k].at(flat[here] - self.begins[k], order)
+            out[here] = self.stretches[k].evaluate(flat[here] - self.begins[k], derivative)
         return out.reshape(*when.shape, self.arm.n)
 
 

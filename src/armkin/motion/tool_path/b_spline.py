@@ -37,7 +37,7 @@ class Layout:
     count: int  # control points
 
     @staticmethod
-    def of(u: Array, curve: Int, knot: Bool) -> Layout:
+    def from_points(u: Array, curve: Int, knot: Bool) -> Layout:
         """The layout of points u on curves (numbers from 0, in order), some of which are knots: (N,) each."""
         at, which = u[knot], curve[knot]
         inner = np.flatnonzero(which[1:] == which[:-1])  # knots at which an interval begins

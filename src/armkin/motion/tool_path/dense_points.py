@@ -56,7 +56,7 @@ class Polyline:
 
     def pieces(self, tolerance: float) -> list[Piece]:
         """Smooth curves through all, one between each two places where the way turns back."""
-        spots = _Spots.of(self.task, self.first, self.rows)
+        spots = _Spots.from_rows(self.task, self.first, self.rows)
         speeds = np.array(self.speeds)
         y = spots.relative(0, len(spots.p) - 1)
         if y is None:  # the tool turns so far that it is laid line by line
@@ -80,7 +80,7 @@ class Polyline:
     def _lines(self, spots: _Spots, speeds: Array) -> list[Piece]:
         made = []
         for k, (speed, tool) in enumerate(speeds.tolist()):
-            one = line(self.task, spots.at(k), spots.at(k + 1))
+            one = line(self.task, spots.spot(k), spots.spot(k + 1))
             made.append(replace(one, speed=_or_none(speed), tool_speed=_or_none(tool)))
         return made
 
@@ -95,7 +95,7 @@ class _Spots:
     turned: Array | None  # (N, 3, 3), (N, 3) or nothing
 
     @staticmethod
-    def of(task: Task, first: Spot, rows: list[Sequence[float]]) -> _Spots:
+    def from_rows(task: Task, first: Spot, rows: list[Sequence[float]]) -> _Spots:
         """The first spot, and rows of numbers as the file has them; of the position alone the rest stays."""
         labels, N = task.labels, len(rows) + 1
         full = np.flatnonzero([False, *(len(row) > task.position for row in rows)])
@@ -115,7 +115,7 @@ class _Spots:
             turned = np.concatenate(parts)[since]
         return _Spots(task, p, np.concatenate([first.sums[None], sums])[since], turned)
 
-    def at(self, k: int) -> Spot:
+    def spot(self, k: int) -> Spot:
         """One of them."""
         return Spot(self.p[k], self.sums[k], None if self.turned is None else self.turned[k])
 
@@ -131,7 +131,7 @@ class _Spots:
                     if k and np.linalg.norm(other - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
                         w[k] = other
             else:
-                w = np.array([between(self.task, self.at(a), self.at(k)) for k in range(a, b + 1)])
+                w = np.array([between(self.task, self.spot(a), self.spot(k)) for k in range(a, b + 1)])
             if np.linalg.norm(w, axis=1).max() > _FARTHEST_TURN:
                 return None
         return np.concatenate([self.p[a : b + 1], self.sums[a : b + 1], w], axis=1)
@@ -162,8 +162,8 @@ def _block(
         values[moving], slopes[moving] = (each.T / scale[:, None] for each in curve.values(v))
         return values.T, slopes.T
 
-    whole, length = unit_speed(task, spots.at(numbers[0]), at, curve.begin)
-    given, bends, spans = length(curve.at), length(curve.bends), length(curve.begin)
+    whole, length = unit_speed(task, spots.spot(numbers[0]), at, curve.begin)
+    given, bends, spans = length(curve.parameters), length(curve.bends), length(curve.begin)
     same = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
     new = np.append(True, ~same.all(axis=1))
     made = []
@@ -184,18 +184,18 @@ def _block(
             speeds[begins, 1],
         )
         first = replace(whole.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
-        made.append(Piece(task, first, partial(_shifted, whole.along, low), high - low, dense=dense))
+        made.append(Piece(task, first, partial(_shifted, whole.curve, low), high - low, dense=dense))
     return made
 
 
-def _shifted(along: Callable[[Array], Array], begin: float, s: Array) -> Array:
-    return along(s + begin)
+def _shifted(curve: Callable[[Array], Array], begin: float, s: Array) -> Array:
+    return curve(s + begin)
 
 
 def _line(task: Task, spots: _Spots, numbers: Int, speeds: Array) -> Piece:
     """The line between two spots."""
     speed, tool = speeds[0].tolist()
-    made = line(task, spots.at(numbers[0]), spots.at(numbers[1]))
+    made = line(task, spots.spot(numbers[0]), spots.spot(numbers[1]))
     return replace(made, speed=_or_none(speed), tool_speed=_or_none(tool))
 
 

@@ -23,24 +23,26 @@ if TYPE_CHECKING:
 _IN_PLANE = 1e-6  # sine of the angle between the tool's axis and the arm's plane
 
 
-def placing(arm: Arm, at: Sequence[float], *, task: str | None = None, scale: float = 1.0) -> Placing:
-    """The frame of a drawing whose zero is `at`: x y z [mm], or with roll pitch yaw [deg].
+def placing(arm: Arm, origin: Sequence[float], *, task: str | None = None, scale: float = 1.0) -> Placing:
+    """The frame of a drawing whose zero is `origin`: x y z [mm], or with roll pitch yaw [deg].
 
-    The tool points against the drawing's z: its rotation is that of `at`, then half a turn about x. Raises UsageError
-    for a task that cannot hold it so.
+    The tool points against the drawing's z: its rotation is that of `origin`, then half a turn about x. Raises
+    UsageError for a task that cannot hold it so.
     """
     definition = task_for(arm, task)
     if definition.position != 3:
         raise UsageError(f"a drawing has x, y and z, and task {definition.name} has no z: it cannot lift the tool")
-    numbers = [float(x) for x in at]
+    numbers = [float(x) for x in origin]
     angles = numbers[3:] or [0.0, 0.0, 0.0]
     R = transform((0.0, 0.0, 0.0), angles)[:3, :3]
     tool = R @ np.diag([1.0, -1.0, -1.0])
     x, y, z = ((float(row[0]), float(row[1]), float(row[2])) for row in R)
-    return Placing((numbers[0], numbers[1], numbers[2]), (x, y, z), _rest(arm, definition, tool, angles[2]), scale)
+    return Placing(
+        (numbers[0], numbers[1], numbers[2]), (x, y, z), _orientation_numbers(arm, definition, tool, angles[2]), scale
+    )
 
 
-def _rest(arm: Arm, task: Task, tool: Array, yaw: float) -> tuple[float, ...]:
+def _orientation_numbers(arm: Arm, task: Task, tool: Array, yaw: float) -> tuple[float, ...]:
     """What follows x y z in a target that holds the tool so."""
     values = {"yaw": yaw, "roll": 0.0}
     if task.orientation == "full":

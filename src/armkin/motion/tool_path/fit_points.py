@@ -31,7 +31,7 @@ class Fitted:
 
     begin: Array  # (M + 1,) parameter at which each cubic begins, and the end
     powers: Array  # (M, 4, d) coefficients over the fraction of each
-    at: Array  # (N,) parameter of every given point
+    parameters: Array  # (N,) parameter of every given point
     bends: Array  # (k,) parameters at which the curvature jumps
 
     def values(self, v: Array) -> tuple[Array, Array]:
@@ -88,7 +88,7 @@ def fitted(y: Array, tolerance: float, stop: Bool | None = None) -> Fitted:
     for round_ in range(_TRIES + 1):
         begin, end, powers, missed = _curves(chords, used, tolerance)
         # cubics that waver: the chords themselves, rounded; in the end all of such a curve's
-        again = _of_curves(chords, missed)
+        again = _chords_of_curves(chords, missed)
         kept = ~again[np.searchsorted(chords.u, (begin + end) / 2) - 1] | (round_ == _TRIES)
         parts.append((begin[kept], end[kept], powers[kept]))
         if not again.any() or round_ == _TRIES:
@@ -102,10 +102,10 @@ def fitted(y: Array, tolerance: float, stop: Bool | None = None) -> Fitted:
     return _rounded(chords, stop, begin, end, powers, curve, tolerance)
 
 
-def _of_curves(chords: Chords, some: Bool) -> Bool:
+def _chords_of_curves(chords: Chords, chosen_points: Bool) -> Bool:
     """All chords (N - 1,) of the curves that some points (N,), none of them a corner, lie inside of."""
     found = np.zeros(int(chords.curve[-1]) + 1, bool)
-    found[chords.curve[np.flatnonzero(some)]] = True
+    found[chords.curve[np.flatnonzero(chosen_points)]] = True
     return np.asarray(found[chords.curve])
 
 
@@ -119,7 +119,7 @@ def _curves(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Array,
     begin, end, powers = u[:-1][alone], u[1:][alone], flat
     bent = used & ~alone
     if bent.any():
-        rows = Rows.of(chords, bent, tolerance)
+        rows = Rows.from_chords(chords, bent, tolerance)
         layout, control, off = least_knots(rows)
         bad = off > 1.0
         missed[rows.point[bad & (rows.point >= 0)]] = True

@@ -28,17 +28,17 @@ class Rows:
     u: Array  # (R,)
     y: Array  # (R, d)
     curve: Int  # (R,) from 0 without gaps
-    allowed: Array  # (R,) [mm]
+    tolerance: Array  # (R,) [mm]
     weight: Array  # (R,)
-    along: Array  # (R, d) direction of the chord of a place on one; 0 for a given point
+    chord_direction: Array  # (R, d) direction of the chord of a place on one; 0 for a given point
     point: Int  # (R,) number of the given point, -1: a place on a chord
     chord: Int  # (R,)
-    before: Array  # (R,) [mm] of its chord, from its begin to a place on it
-    beyond: Array  # (R,) from there to its end
+    chord_done: Array  # (R,) [mm] of its chord, from its begin to a place on it
+    chord_left: Array  # (R,) from there to its end
     ends: Bool  # (R,) ends of curves
 
     @staticmethod
-    def of(chords: Chords, used: Bool, tolerance: float) -> Rows:
+    def from_chords(chords: Chords, used: Bool, tolerance: float) -> Rows:
         """Rows of the chords that are used: (N - 1,)."""
         chord, f, weight = [np.flatnonzero(used)] * 2, [0.0, 0.5], [1.0, 0.0]
         last = used & np.append(chords.curve[1:] != chords.curve[:-1], True)
@@ -86,10 +86,12 @@ class Rows:
         along[1:-1] = values[2:] - values[:-2]
         along[0], along[-1] = along[1], along[-2]
         along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-        along = np.where(self.point[:, None] >= 0, along, self.along)
+        along = np.where(self.point[:, None] >= 0, along, self.chord_direction)
         along[self.ends] = 0.0
         far = (miss * along).sum(axis=1)
-        past = np.maximum(far - self.beyond, 0.0) + np.minimum(far + self.before, 0.0)  # a chord's end, or its begin
+        past = np.maximum(far - self.chord_left, 0.0) + np.minimum(
+            far + self.chord_done, 0.0
+        )  # a chord's end, or its begin
         far -= np.where(self.point >= 0, 0.0, past)
         return np.asarray(miss - far[:, None] * along)
 
@@ -123,10 +125,10 @@ def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
     weight, age = rows.weight.copy(), np.zeros(len(knot), int)  # age: rounds since an interval was divided, at its knot
     at_work, index = rows, np.arange(len(knot))
     for _ in range(_ROUNDS - 1):
-        layout = Layout.of(at_work.u, at_work.curve, knot[index])
+        layout = Layout.from_points(at_work.u, at_work.curve, knot[index])
         control = least_squares(layout, at_work.y, weight[index], at_work.ends)
         miss = at_work.miss(layout.values(control))
-        off = np.linalg.norm(miss, axis=1) / at_work.allowed
+        off = np.linalg.norm(miss, axis=1) / at_work.tolerance
         bad, astray = off > 1.0, _astray(at_work, layout, miss, weight[index])
         wrong = np.zeros(at_work.curve[-1] + 1, bool)
         wrong[at_work.curve[bad]] = wrong[layout.curve[astray]] = True
@@ -138,9 +140,9 @@ def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
         if not wrong.all():  # what is well stays as it is
             index = index[wrong[at_work.curve]]
             at_work = rows.part(index)
-    layout = Layout.of(rows.u, rows.curve, knot)
+    layout = Layout.from_points(rows.u, rows.curve, knot)
     control = least_squares(layout, rows.y, weight, rows.ends)
-    return layout, control, np.linalg.norm(rows.miss(layout.values(control)), axis=1) / rows.allowed
+    return layout, control, np.linalg.norm(rows.miss(layout.values(control)), axis=1) / rows.tolerance
 
 
 def _refine(
@@ -178,5 +180,5 @@ def _astray(rows: Rows, layout: Layout, miss: Array, weight: Array) -> Bool:
     many = np.bincount(where, minlength=M)
     weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # these miss the others for a few
     return np.asarray(
-        ~weighed & (many >= _TELLING) & (like > 0.5 * size) & (size > many * (_CLOSE * rows.allowed[0]) ** 2)
+        ~weighed & (many >= _TELLING) & (like > 0.5 * size) & (size > many * (_CLOSE * rows.tolerance[0]) ** 2)
     )

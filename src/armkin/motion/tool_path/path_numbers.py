@@ -13,6 +13,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
+from armkin.model.rotation import rpy
 from armkin.model.target_numbers import label_scale, targets_in
 from armkin.motion.tool_path.path_pieces import Spot, spot
 
@@ -37,8 +38,6 @@ def moves(arm: Arm, given: Any, task: str | None = None) -> PathFile:
     definition = task_for(arm, task)
     rows = np.asarray(given, dtype=float)
     if definition.orientation == "full" and rows.ndim == 3:
-        from armkin.model.rotation import rpy
-
         rows = np.concatenate([rows[:, :3, 3], units.angles_out(rpy(rows[:, :3, :3]))], axis=1)
     elif rows.ndim == 2:
         rows = rows / np.array(label_scale(definition.labels))[: rows.shape[-1]]

@@ -112,7 +112,7 @@ class Piece:
 
     task: Task
     first: Spot
-    along: Callable[[Array], Array]  # s (N,) -> y (N, dim): position, sums, rotation vector
+    curve: Callable[[Array], Array]  # s (N,) -> y (N, dim): position, sums, rotation vector
     length: float
     speed: float | None = None  # fraction of the joints' max_speed, of this move
     tool_speed: float | None = None  # [mm/s] of this move
@@ -121,7 +121,7 @@ class Piece:
 
     def targets(self, s: Array) -> Array:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,)."""
-        y = self.along(np.clip(s, 0.0, self.length))
+        y = self.curve(np.clip(s, 0.0, self.length))
         n, k = self.task.position, len(self.task.sums)
         if self.first.turned is None:
             return y[:, : n + k]
@@ -151,10 +151,10 @@ class Piece:
         """The part from length a to b."""
         at = spot(self.task, self.targets(np.array([a]))[0])
         n = self.task.position + len(self.task.sums)
-        turned = turn(self.along(np.array([a]))[:, n:])[0]
+        turned = turn(self.curve(np.array([a]))[:, n:])[0]
 
         def along(s: Array) -> Array:
-            y = self.along(s + a)
+            y = self.curve(s + a)
             if self.first.turned is None:
                 return y
             w = vector(turn(y[:, n:]) @ turned.T)
@@ -249,7 +249,7 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
     scale = weights(task)
     d0, d1 = a.direction(cut_a) / scale, b.direction(cut_b) / scale
     k = task.position + len(task.sums)
-    d1[k:] = _into(y1[k:], d1[k:])
+    d1[k:] = _rotation_rate(y1[k:], d1[k:])
     size = (a.length - cut_a) + cut_b
     cubic = (y0, size * d0, 3 * (y1 - y0) - size * (2 * d0 + d1), 2 * (y0 - y1) + size * (d0 + d1))
 
@@ -267,7 +267,7 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
 
 def _away(piece: Piece, corner: Array, s: float) -> float:
     """Distance of a piece's place from a corner [mm]."""
-    return float(np.linalg.norm(piece.along(np.array([s]))[0, : piece.task.position] - corner))
+    return float(np.linalg.norm(piece.curve(np.array([s]))[0, : piece.task.position] - corner))
 
 
 def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: float) -> float:
@@ -276,14 +276,14 @@ def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: flo
         return inner + math.copysign(radius / piece.rate, outer - inner)
     for _ in range(6):  # each time a part of 1/100 of what is left
         s = np.linspace(inner, outer, 101)
-        away = np.linalg.norm(piece.along(s)[:, : piece.task.position] - corner, axis=1)
+        away = np.linalg.norm(piece.curve(s)[:, : piece.task.position] - corner, axis=1)
         k = min(int(np.argmax(away[1:] >= radius)), 99) if (away[1:] >= radius).any() else 99
         inner, outer = float(s[k]), float(s[k + 1])
     return outer
 
 
-def _uniform(task: Task, a: Spot, b: Spot, at: Callable[[Array], Array], length: float) -> Piece:
-    """A piece whose position, sums and turning all are passed at constant speed; at: fraction -> position."""
+def _uniform(task: Task, a: Spot, b: Spot, position: Callable[[Array], Array], length: float) -> Piece:
+    """A piece whose position, sums and turning all are passed at constant speed; position: fraction -> position."""
     w = between(task, a, b)
     change = b.sums - a.sums
     angle = math.hypot(float(np.linalg.norm(change)), float(np.linalg.norm(w)))
@@ -291,27 +291,27 @@ def _uniform(task: Task, a: Spot, b: Spot, at: Callable[[Array], Array], length:
 
     def along(s: Array) -> Array:
         f = s / whole if whole > 0 else np.zeros_like(s)
-        parts = [at(f), a.sums + f[:, None] * change, f[:, None] * w]
+        parts = [position(f), a.sums + f[:, None] * change, f[:, None] * w]
         return np.concatenate(parts, axis=1)
 
     return Piece(task, a, along, whole)
 
 
 def unit_speed(
-    task: Task, first: Spot, at: Callable[[Array], tuple[Array, Array]], u: Array
+    task: Task, first: Spot, curve: Callable[[Array], tuple[Array, Array]], u: Array
 ) -> tuple[Piece, Callable[[Array], Array]]:
     """A piece from a curve over any parameter, given with its derivative, smooth between the values u.
 
     Returns also the function from parameters to lengths.
     """
     scale = weights(task)
-    grid = np.append(_places(u, _table(at, u, scale)), u[-1])
+    grid = np.append(_places(u, _table(curve, u, scale)), u[-1])
     step = np.diff(grid)
     nodes = grid[:-1, None] + step[:, None] * _GAUSS
-    speed = np.linalg.norm(at(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
+    speed = np.linalg.norm(curve(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
     s = np.concatenate([[0.0], np.cumsum(speed.mean(axis=1) * step)])
-    y, left = at(grid)
-    right = at(grid[1:] - 1e-9 * step)[1]  # where the way rests in a corner it comes and goes in two directions
+    y, left = curve(grid)
+    right = curve(grid[1:] - 1e-9 * step)[1]  # where the way rests in a corner it comes and goes in two directions
     left, right = (d / np.maximum(np.linalg.norm(d * scale, axis=1), 1e-12)[:, None] for d in (left[:-1], right))
     moving = np.flatnonzero((y != y[0]).any(axis=0))
     h, still = np.diff(s), y[0]
@@ -331,11 +331,11 @@ def unit_speed(
     return Piece(task, first, along, float(s[-1])), lambda v: np.interp(v, grid, s)
 
 
-def _table(at: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array) -> NDArray[np.intp]:
+def _table(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array) -> NDArray[np.intp]:
     """How many intervals of a table of lengths each span between the values u needs: one that is passed evenly, one."""
     f = (np.arange(4) + 0.5) / 4
     v = u[:-1, None] + np.diff(u)[:, None] * f
-    slopes = (at(v.ravel())[1] * scale).reshape(*v.shape, -1)
+    slopes = (curve(v.ravel())[1] * scale).reshape(*v.shape, -1)
     most = np.abs(slopes).max(axis=(1, 2))
     length = np.linalg.norm(slopes, axis=2).mean(axis=1) * np.diff(u)
     needed = np.ceil((length / _EXACT) ** 0.25)  # Hermite's error falls with the fourth power
@@ -365,7 +365,7 @@ def weights(task: Task) -> Array:
     return np.concatenate([np.ones(task.position), np.full(len(task.sums) + 3, PER_RADIAN)])
 
 
-def _into(w: Array, omega: Array) -> Array:
+def _rotation_rate(w: Array, omega: Array) -> Array:
     """Rate of a rotation vector w whose rotation turns at omega (inverse of the left Jacobian of SO(3))."""
     angle = float(np.linalg.norm(w))
     factor = 1 / 12 if angle < 1e-4 else (1 - angle / 2 / math.tan(angle / 2)) / angle**2

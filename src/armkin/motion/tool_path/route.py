@@ -27,7 +27,7 @@ class Detour:
     end: float
     by: Array
 
-    def at(self, s: Array) -> Array:
+    def offset(self, s: Array) -> Array:
         """How far aside at lengths s (N,): (N, 3) [mm], with a bend that does not jump."""
         f = (s - self.begin) / (self.end - self.begin)
         f = np.clip(3 * np.minimum(f, 1 - f), 0.0, 1.0)
@@ -53,25 +53,25 @@ class Route:
         """Whole length [mm, and 30 mm per rad]."""
         return float(self.ends[-1])
 
-    def which(self, s: Array) -> NDArray[np.intp]:
+    def piece_number(self, s: Array) -> NDArray[np.intp]:
         """Number of the piece at lengths s (N,)."""
         return np.clip(np.searchsorted(self.ends, s, side="right") - 1, 0, len(self.pieces) - 1)
 
     def targets(self, s: Array) -> Array:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,), increasing or not."""
         out: Array | None = None
-        for k, here in grouped(self.which(s)):
+        for k, here in grouped(self.piece_number(s)):
             values = self.pieces[k].targets(s[here] - self.ends[k])
             if out is None:
                 out = np.empty((len(s), *values.shape[1:]))
             out[here] = values
         assert out is not None
         for one in self.detours:
-            out[..., :3, 3] += one.at(s)
+            out[..., :3, 3] += one.offset(s)
         return out
 
     @cached_property
-    def aside(self) -> float:
+    def largest_detour(self) -> float:
         """How far its detours lead away from its pieces, at most [mm]."""
         return max((float(np.linalg.norm(one.by)) for one in self.detours), default=0.0)
 
@@ -216,5 +216,5 @@ def both_move(a: Piece, b: Piece) -> bool:
 
 
 def _moves(piece: Piece) -> bool:
-    p = [piece.along(np.array([f * piece.length]))[0, : piece.task.position] for f in (0.0, 0.5, 1.0)]
+    p = [piece.curve(np.array([f * piece.length]))[0, : piece.task.position] for f in (0.0, 0.5, 1.0)]
     return bool(max(np.linalg.norm(p[0] - p[1]), np.linalg.norm(p[1] - p[2])) > 1e-6)

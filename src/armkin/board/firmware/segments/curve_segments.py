@@ -78,8 +78,8 @@ class CurveSegments:
         _SETTLING of the motors' accelerations allow, so that in between nothing is off but the steps themselves.
         """
         whole = self.stretch.duration
-        ends = places(self.arm, self.stretch.at(np.array([0.0, whole])))
-        out = places(self.arm, self.stretch.at(t))
+        ends = places(self.arm, self.stretch.evaluate(np.array([0.0, whole])))
+        out = places(self.arm, self.stretch.evaluate(t))
         for off, since in ((self.start - ends[0], t), (self.end - ends[1], whole - t)):
             span = np.sqrt(6 * np.abs(off) / (_SETTLING * motor_accel(self.arm)))  # of f^2 (3 - 2 f)
             f = np.clip(since[:, None] / np.clip(span, 1e-9, whole), 0.0, 1.0)
@@ -120,7 +120,7 @@ class CurveSegments:
         up and slow down at once, and a segment has one ramp for all.
         """
         gain = self.arm.motor_gain.T
-        speed = np.linalg.norm(self.stretch.at(t, 1) @ gain, axis=1).tolist()
+        speed = np.linalg.norm(self.stretch.evaluate(t, 1) @ gain, axis=1).tolist()
         change = np.array([changing(a, b) for a, b in pairwise(speed)])
         h = np.diff(t)[:, None]
         most = _JUMP * motor_accel(self.arm)
@@ -129,7 +129,7 @@ class CurveSegments:
         share = np.minimum((most / size).min(axis=1), 1.0)
         spare = np.maximum(self._fastest() * h / np.maximum(np.abs(steps), 1e-12) - 1, 0.0).min(axis=1)
         share = np.minimum(share, 2 * spare / np.maximum(np.abs(change), 1e-12))
-        for end in (self.stretch.at(t[:-1] + 1e-9, 2) @ gain, self.stretch.at(t[1:] - 1e-9, 2) @ gain):
+        for end in (self.stretch.evaluate(t[:-1] + 1e-9, 2) @ gain, self.stretch.evaluate(t[1:] - 1e-9, 2) @ gain):
             room = (np.maximum(most + end * np.sign(ramp), 0.0) / size).min(axis=1)
             share = np.minimum(share, room)
         return np.asarray(share * change)
@@ -173,11 +173,11 @@ class CurveSegments:
         A chord that may be longer than any segment, with joints that bear on the tip no more than the arm's reach
         lets them, is not looked at more closely: it may be of any length.
         """
-        arm, qd, qdd = self.arm, self.stretch.at(t, 1), self.stretch.at(t, 2)
+        arm, qd, qdd = self.arm, self.stretch.evaluate(t, 1), self.stretch.evaluate(t, 2)
         stop = (np.abs(qd @ arm.motor_gain.T) / motor_accel(arm)).max(axis=1)
         lever = np.abs(arm.ratio) * np.where(arm.prismatic, 1.0, arm.reach)
         tight = np.flatnonzero(np.abs(qdd) @ lever > 8 * self.tolerance / _MOST**2)
-        J = jacobian(arm, self.stretch.at(t[tight]))[:, :3]
+        J = jacobian(arm, self.stretch.evaluate(t[tight]))[:, :3]
         v, bend = ((J @ x[tight, :, None])[..., 0] for x in (qd, qdd))
         along = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9)
         across = np.linalg.norm(bend - along * (along * bend).sum(axis=1, keepdims=True), axis=1)
@@ -204,4 +204,6 @@ def rates(arm: Arm, stretch: Stretch) -> Array:
     """Greatest rate of every motor: (motors,) [counts/s], sampled every 5 ms."""
     t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / _FINE), 16))
     parts = np.array_split(t, max(len(t) // _SAMPLES, 1))
-    return np.asarray(np.max([np.abs(stretch.at(part, 1) @ arm.motor_gain.T).max(axis=0) for part in parts], axis=0))
+    return np.asarray(
+        np.max([np.abs(stretch.evaluate(part, 1) @ arm.motor_gain.T).max(axis=0) for part in parts], axis=0)
+    )

@@ -28,14 +28,14 @@ class Place:
     part: int
     stretch: int  # of the part
     seconds: float  # since the stretch began
-    done: float  # seconds since the plan began
+    elapsed: float  # seconds since the plan began
 
 
-def onwards(part: Cut, place: Place, here: Array) -> Trajectory:
+def remaining_trajectory(part: Cut, place: Place, standing: Array) -> Trajectory:
     """What is left of a part of a plan, from rest at joint values (n,) [rad | mm] that lie on it."""
     stretches, arm = part.trajectory.stretches, part.trajectory.arm
-    first = remainder(arm, stretches[place.stretch], place.seconds, here)
-    return Trajectory(arm, here, (first, *stretches[place.stretch + 1 :]))
+    first = remainder(arm, stretches[place.stretch], place.seconds, standing)
+    return Trajectory(arm, standing, (first, *stretches[place.stretch + 1 :]))
 
 
 def left_of(
@@ -51,7 +51,7 @@ def left_of(
     place = next((p for p in places_on([first], here) if p.stretch == move), None)
     if place is None:
         return None
-    left = onwards(first, place, joints(first.trajectory.arm, here))
+    left = remaining_trajectory(first, place, joints(first.trajectory.arm, here))
     return [lay(left, here), *plans[1:]], place
 
 
@@ -86,8 +86,8 @@ def _refined(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
     t = guess
     for _ in range(8):
         when = np.array([t])
-        off = counts - places(arm, stretch.at(when))[0]
-        speed = stretch.at(when, 1)[0] @ arm.motor_gain.T
+        off = counts - places(arm, stretch.evaluate(when))[0]
+        speed = stretch.evaluate(when, 1)[0] @ arm.motor_gain.T
         if speed @ speed < 1.0:  # slower than a step a second: at rest, or all but
             break
         t = float(np.clip(t + np.clip(off @ speed / (speed @ speed), -0.02, 0.02), 0.0, stretch.duration))

@@ -57,7 +57,7 @@ class Pieces(IntEnum):
     ROUGH = 2  # so few that a bad line brings them in time; right to 10 %
 
 
-def along(
+def line_segments(
     start: Sequence[int],
     end: Sequence[int],
     law: Profile,
@@ -97,7 +97,7 @@ class LineSegments:
         cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
         unheard = law.is_trapezoid
         for times, ending in _on_steps(law, _bounds(law, steps, self.pieces), steps):
-            done, speed = law.at(times) / law.length, law.at(times, 1) / law.length
+            done, speed = law.evaluate(times) / law.length, law.evaluate(times, 1) / law.length
             if ending:
                 done[-1] = 1.0
             for k, (a, b) in enumerate(pairwise(times.tolist())):
@@ -136,7 +136,7 @@ def line(
     min_interval: int = MIN_INTERVAL,
 ) -> Move:
     """A straight line in counts from rest to rest: `top` [1/s] and `accel` [1/s^2] at most, both in lines."""
-    return along(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
+    return line_segments(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
 
 
 def _most(law: Profile, pieces: Pieces) -> int:
@@ -188,7 +188,7 @@ def _bounds(law: Profile, steps: int, pieces: Pieces) -> Iterator[float]:
 
 def _ramp(law: Profile, t0: float, t1: float, accel: float, steps: int, pieces: Pieces) -> list[float]:
     """Ends of segments of a phase of constant acceleration: speeds in geometric steps from the slow end."""
-    v0, v1 = (float(v) for v in law.at(np.array([t0, t1]), 1))
+    v0, v1 = (float(v) for v in law.evaluate(np.array([t0, t1]), 1))
     if accel < 0:
         v1 = max(0.0, v0 + accel * (t1 - t0))
     most, shortest = _most(law, pieces), _FIRST_ROUGH if pieces == Pieces.ROUGH else _FIRST
@@ -226,7 +226,7 @@ def _on_steps(law: Profile, bounds: Iterable[float], steps: int) -> Iterator[tup
         known += more
         times = np.array(known)
         if len(times) > 2:
-            at, speed = law.at(times) / law.length * steps, law.at(times, 1) / law.length * steps
+            at, speed = law.evaluate(times) / law.length * steps, law.evaluate(times, 1) / law.length * steps
             near = np.minimum(np.diff(at)[:-1], np.diff(at)[1:])
             whole = (np.rint(at) - at)[1:-1] / np.maximum(speed[1:-1], 1e-9)
             times[1:-1] += np.where((near > 4) & (speed[1:-1] > 0), whole, 0.0)

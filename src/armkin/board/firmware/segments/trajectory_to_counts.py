@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from armkin.board.backend.motion_start import Laid
 from armkin.board.firmware.segments.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
 from armkin.board.firmware.segments.curve_segments import CurveSegments, rates
-from armkin.board.firmware.segments.straight_lines import Pieces, along, count
+from armkin.board.firmware.segments.straight_lines import Pieces, count, line_segments
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
@@ -88,7 +88,7 @@ class Cut(Laid):
     def _move(self, stretch: Stretch, start: Counts, end: Counts, pieces: Pieces) -> Move:
         if self._is_line(stretch, start, end):
             a, b, clock, least = start.tolist(), end.tolist(), self.clock, self.min_interval
-            return along(a, b, stretch.law, clock=clock, min_interval=least, pieces=pieces)
+            return line_segments(a, b, stretch.law, clock=clock, min_interval=least, pieces=pieces)
         arm = self.trajectory.arm
         parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
         cycles = round(stretch.duration * self.clock)

@@ -25,7 +25,7 @@ def likely() -> Iterable[str]:
     return [port.device for port in list_ports() if port.board]
 
 
-def others() -> Iterable[str]:
+def foreign_ports() -> Iterable[str]:
     """Names of the ports where a board with other firmware may be: Arduinos, and the chips of ESP32s and adapters."""
     return [port.device for port in list_ports() if port.board or port.adapter]
 

@@ -63,15 +63,15 @@ class Splitter:
     def __init__(self, largest: int = MAX_FRAME) -> None:
         self.bad = 0
         self._largest = largest + 1
-        self._rest = bytearray()
+        self._incomplete = bytearray()
         self._skip = False  # in a frame that is too long already
 
     def feed(self, data: bytes) -> Iterator[bytes]:
         """The payloads that `data` completes."""
         *frames, rest = data.split(b"\0")
         for frame in frames:
-            whole = bytes(self._rest) + frame
-            self._rest.clear()
+            whole = bytes(self._incomplete) + frame
+            self._incomplete.clear()
             if self._skip or len(whole) > self._largest:
                 self._skip = False
                 self.bad += 1
@@ -81,7 +81,7 @@ class Splitter:
                     self.bad += 1
                 else:
                     yield payload
-        self._rest += rest
-        if len(self._rest) > self._largest:
-            self._rest.clear()
+        self._incomplete += rest
+        if len(self._incomplete) > self._largest:
+            self._incomplete.clear()
             self._skip = True

@@ -86,12 +86,12 @@ class Window:
         self._fill()
         patience = _EAGER if self._line.noisy else self._line.slowest + (_GAP if self._gap else _RESEND)
         if self._sent and begun - self._line.clear > patience:
-            self._again(0, len(self._sent[0][1]))
+            self._go_back(0, len(self._sent[0][1]))
         elif self._gap and not self._line.noisy and begun > self._deaf:
             # what told of it was the answer to the second or a later one: the oldest without one is the third
             behind = sum(len(data) for _, data in islice(self._sent, 3, None))
             if behind + len(self._sent[0][1]) <= self._receive - QUESTION:
-                self._again(behind, 0)
+                self._go_back(behind, 0)
 
     @property
     def late(self) -> bool:
@@ -133,7 +133,7 @@ class Window:
             credit -= frame.segments
             size += self._line.write_frame(data, room)
 
-    def _again(self, size: int, first: int) -> None:
+    def _go_back(self, size: int, first: int) -> None:
         """Go back to the first frame that was not acknowledged.
 
         size: bytes under way behind the oldest frame without an answer, first: of it what need not fit the ring.
@@ -154,7 +154,7 @@ class Window:
         """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
         reply_checks.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
 
-    def acknowledge(self, reply: Ack | Status, asked: float = 0.0) -> int:
+    def acknowledge(self, reply: Ack | Status, requested: float = 0.0) -> int:
         """Take a reply's `next` and `free`, asked for then; the number of frames that it acknowledges."""
         done = (reply.next - self._next) & 255
         if done > len(self._sent):
@@ -166,7 +166,7 @@ class Window:
             self._line.clear, self._gap = max(self._line.clear, self._line.port.now()), False
             self._bytes = _BYTES[0] if self._line.noisy else min(_BYTES[1], self._bytes + 20)
         elif self._sent and (
-            type(reply) is Ack or asked > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
+            type(reply) is Ack or requested > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
         ):
             self._gap = True  # something behind the first frame has arrived, the first has not
         return done

@@ -85,9 +85,9 @@ def check_reply(reply: Ack | Status, info: Info, port: str) -> None:
             raise _impossible(port, "counts", max(map(abs, reply.counts)), "31 bits")
 
 
-def check_session(digest: int, own: int, port: str) -> None:
+def check_session(digest: int, expected: int, port: str) -> None:
     """Raise ReplacedError if a reply belongs to another session than one's own."""
-    if digest != own:
+    if digest != expected:
         raise ReplacedError(
             f"another program has taken over the board on {port}: this one has ended\n"
             "only one program may move an arm; armkin status tells where it stands",
@@ -95,7 +95,7 @@ def check_session(digest: int, own: int, port: str) -> None:
         )
 
 
-def check_next(done: int, sent: int, port: str) -> None:
+def check_next(acknowledged: int, sent: int, port: str) -> None:
     """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
-    if done > sent:
-        raise _impossible(port, "next", f"{done} ahead", f"0 to {sent}")
+    if acknowledged > sent:
+        raise _impossible(port, "next", f"{acknowledged} ahead", f"0 to {sent}")

@@ -31,7 +31,7 @@ class Segment:
     bend: int = 0
     quick: bool = False
 
-    def of(self, axes: Sequence[int]) -> Segment:
+    def for_axes(self, axes: Sequence[int]) -> Segment:
         """The same for some of its axes."""
         return replace(self, rates=tuple(self.rates[k] for k in axes))
 

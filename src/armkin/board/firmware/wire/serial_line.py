@@ -66,7 +66,7 @@ class Line:
         """STATUS? written since the last one that was answered."""
         return len(self._asked_at)
 
-    def asked(self, tag: int) -> None:
+    def note_status_request(self, tag: int) -> None:
         """Note that a STATUS? of this tag is being written."""
         self._asked_at[tag] = self.port.now()
 

@@ -52,7 +52,7 @@ class Session:
         self._error: Ack | Status | None = None
         self.attend()
         self.heard, self._silent_for = self._turn, 0.0  # [s] in which an answer would have been heard
-        self._asked = 0.0
+        self._last_request = 0.0
         self._until = 0.0  # something has to go on by then
 
     # Opening
@@ -173,7 +173,7 @@ class Session:
         before, now = self._turn, self.port.now()
         self._turn = now
         self._window.send()
-        if now - self._asked >= _between_questions(self.line, self._window, ends):
+        if now - self._last_request >= _between_questions(self.line, self._window, ends):
             self._ask()
         self._hear(timeout)
         self.deaf = max(self.deaf, now - before, self.port.now() - now)
@@ -190,8 +190,8 @@ class Session:
             self._stalled()
 
     def _ask(self, page: int = 0, copies: int = 1) -> int:
-        self._asked, self._tag = self.port.now(), (self._tag + 1) & 255
-        self.line.asked(self._tag)
+        self._last_request, self._tag = self.port.now(), (self._tag + 1) & 255
+        self.line.note_status_request(self._tag)
         self.line.write(protocol.wire(protocol.status_query(self._tag, page)) * copies)
         return self._tag
 
@@ -251,7 +251,7 @@ class Session:
                 raise LinkError(f"the board on {self.port.name} does not come to rest: cut the motors' power")
             self._hear(0.03)
 
-    def rest(self) -> Status:
+    def wait_for_rest(self) -> Status:
         """Wait until the arm stands, whatever the session is; its status then."""
         self._until = self.port.now() + _HOLD
         while True:
