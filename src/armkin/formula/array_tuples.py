@@ -28,7 +28,7 @@ def stacked(parts: Sequence[Columns]) -> Columns:
 
 
 def replaced(columns: Columns, which: NDArray[Any], rows: Columns) -> Columns:
-    """The same with other rows in place of some, as wide as both need; in place where they need no more than there is."""
+    """The same with other rows in place of some, as wide as both need; in place where that is as wide."""
     each: Any = columns
     out: Columns = each._make(_replaced(column, which, new) for column, new in zip(each, rows, strict=True))  # type: ignore[call-overload]
     return out

@@ -12,6 +12,7 @@ arm_angle.py          those curves in closed form, of a shoulder, an elbow and a
 answers_on_planes.py  answers at values of a joint, of other joints without a closed form
 curve_points.py       points of their curves, and cubics between these
 traced_curves.py      such answers joined to curves
+missed_curves.py      answers that no such curve passes
 traced_families.py    and their families
 interval_pieces.py    pieces of such curves: intervals of the redundant joint
 families.py           one joint more than the target asks for: intervals of the redundant joint

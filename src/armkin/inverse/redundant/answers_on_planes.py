@@ -65,8 +65,11 @@ class Planes(NamedTuple):
         return Nodes(row[good], plane[good], rows_of(points, good)), good
 
 
-def answered(find: Follower) -> tuple[Planes, Nodes, Int]:
-    """The planes of all targets, and the answers on them; which is whose, by plane and branch (N, V, B), -1: none."""
+def answered(find: Follower, known: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
+    """The planes of all targets, and the answers on them; which is whose, by plane and branch (N, V, B), -1: none.
+
+    known: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
+    """
     guide, even, N = nearly_closed(find.arm, find.free), over_a_turn(PLANES), len(find.target)
     row, t = np.repeat(np.arange(N), PLANES), np.tile(even, N)
     source = find._replace(free=guide)
@@ -76,6 +79,7 @@ def answered(find: Follower) -> tuple[Planes, Nodes, Int]:
     else:
         q, missed = source.candidates(row, t)
         more, own = _between(source, even, missed.reshape(N, PLANES, -1))
+        more, own = np.append(more, known), np.append(own, postures, axis=0)
         row, t = np.append(row, more), np.append(t, own[:, guide.joint])
         others = source.candidates(more, t[N * PLANES :])
         q, there = np.append(q, others[0], axis=0), np.append(missed, others[1], axis=0) < tol.NEAR

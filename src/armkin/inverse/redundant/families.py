@@ -243,7 +243,7 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
         a, b = (end[index] for end in ends)
         costs(some, np.where(a * b < 0, low + (high - low) * a / np.where(a == b, 1.0, a - b), low))
         at_low, at_high = (motion(arm, end, near[some]) for end in q)
-        costs(some, vertex(low, middle, high, at_low, at_high, value))
+        costs(some, vertex(low, middle, high, at_low, value, at_high))
     return best
 
 

@@ -136,7 +136,7 @@ def golden_section(
     return low, high, np.where(at_left <= at_right, left, right), np.minimum(at_left, at_right)
 
 
-def vertex(low: Array, middle: Array, high: Array, at_low: Array, at_high: Array, at_middle: Array) -> Array:
+def vertex(low: Array, middle: Array, high: Array, at_low: Array, at_middle: Array, at_high: Array) -> Array:
     """Where the parabola through a cost at low, middle and high (M,) is least; middle where that is not between."""
     with np.errstate(invalid="ignore", divide="ignore"):
         a, b = (middle - low) * (at_middle - at_high), (middle - high) * (at_middle - at_low)

@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Bool, Int, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.answers_on_planes import Nodes, answered, once
 from armkin.inverse.redundant.curve_points import Points, Ways, onto
+from armkin.inverse.redundant.missed_curves import missed
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
@@ -31,9 +32,9 @@ ROUNDS = 20  # of arcs, each to the next plane
 class _Curves:
     """Nodes of curves, and which halves are joined."""
 
-    def __init__(self, find: Follower) -> None:
+    def __init__(self, find: Follower, known: Int, q: Array) -> None:
         self.find = find
-        self.planes, self.nodes, grid = answered(find)
+        self.planes, self.nodes, grid = answered(find, known, q)
         self.partner = np.full(2 * len(self.nodes.row), -1)
         behind = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
         following = np.take_along_axis(grid, behind[:, :, None], axis=1)
@@ -192,10 +193,38 @@ class Chains(NamedTuple):
     counts: Int  # (C,) of points
     closed: Bool  # (C,) the last one is joined to the first
 
+    @property
+    def after(self) -> Int:
+        """The point after each (P,), itself where an open curve ends."""
+        begin = np.cumsum(self.counts) - self.counts
+        after = np.arange(1, int(self.counts.sum()) + 1)
+        after[begin + self.counts - 1] = np.where(self.closed, begin, begin + self.counts - 1)
+        return after
+
+    def curves(self, which: Int) -> Chains:
+        """Some of the curves, in that order."""
+        count = self.counts[which]
+        first = np.cumsum(self.counts) - self.counts
+        point = np.arange(int(count.sum())) + np.repeat(first[which] - np.cumsum(count) + count, count)
+        return Chains(rows_of(self.points, point), self.row[which], count, self.closed[which])
+
 
 def curves_of(find: Follower) -> Chains:
-    """All curves of all targets that an answer is on."""
-    curves = _Curves(find)
+    """All curves of all targets that an answer is on; of targets with answers that no curve passes, anew from these."""
+    chains = _joined(find, np.zeros(0, np.intp), find.near[:0])
+    row, q = missed(find, chains.points, np.repeat(chains.row, chains.counts), chains.after)
+    if not len(row):
+        return chains
+    some, place = np.unique(row, return_inverse=True)
+    more = _joined(find.of(some), place, q)
+    kept = chains.curves(np.flatnonzero(~np.isin(chains.row, some)))
+    both = stacked([kept, more._replace(row=some[more.row])])
+    return both.curves(np.argsort(both.row, kind="stable"))
+
+
+def _joined(find: Follower, known: Int, q: Array) -> Chains:
+    """Curves of all targets that an answer on a plane, or one of q (M, n) of targets known (M,), is on."""
+    curves = _Curves(find, known, q)
     for _ in range(ROUNDS):
         if not len(curves.open()):
             break

@@ -60,10 +60,8 @@ class Traced(NamedTuple):
     @classmethod
     def of(cls, find: Follower, chains: Chains) -> Traced:
         """Curves of some targets."""
-        points, row, count, closed = chains
-        N, begin, P = len(find.target), np.cumsum(count) - count, len(points.step)
-        after = np.arange(1, P + 1)
-        after[begin + count - 1] = np.where(closed, begin, begin + count - 1)
+        points, row, count, _ = chains
+        N, begin, P, after = len(find.target), np.cumsum(count) - count, len(points.step), chains.after
         branch = np.arange(len(row)) - np.searchsorted(row, row)
         curve = np.zeros((N, int(branch.max(initial=0)) + 1), np.intp)
         curve[row, branch] = np.arange(len(row))
