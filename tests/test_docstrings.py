@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import enum
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -122,3 +124,26 @@ def test_every_field_has_a_line(name: str) -> None:
     lines = _entries(kind, "Attributes")
     assert list(lines) == [field for field, _ in told]
     assert not {field for field, type_ in told if _is_array(type_) and not SHAPE.match(lines[field])}
+
+
+FILES = sorted((Path(armkin.__file__).parent).rglob("*.py"))
+
+
+def test_every_class_and_public_function_of_the_package_has_a_docstring() -> None:
+    """Methods, too, those of private classes included; a setter's is its property's."""
+    silent = {
+        f"{path.name}: {node.name}"
+        for path in FILES
+        for owner in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(owner, ast.Module | ast.ClassDef)
+        for node in owner.body
+        if isinstance(node, ast.ClassDef) or (isinstance(node, ast.FunctionDef) and _is_public(node))
+        if ast.get_docstring(node) is None
+    }
+    assert not silent
+
+
+def _is_public(node: ast.FunctionDef) -> bool:
+    return not node.name.startswith("_") and not any(
+        ast.unparse(one).endswith(".setter") for one in node.decorator_list
+    )

@@ -173,6 +173,7 @@ def streamed_rows(
 
 @contextlib.contextmanager
 def opened(source: str) -> Iterator[IO[bytes]]:
+    """A file, or standard input for "-", as bytes."""
     if source == "-":
         if sys.stdin is None:
             raise FileError("standard input is closed; give --batch a file")
@@ -299,10 +300,12 @@ def _unread(source: str, error: Exception) -> FileError:
 
 
 def name_of(source: str) -> str:
+    """What messages call a source of rows."""
     return "standard input" if source == "-" else source
 
 
 def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator[Chunk]:
+    """Rows of some text, whose first line has the number `first`; a malformed one is raised behind those before it."""
     import numpy as np
 
     index: list[int] = []

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 
 def text(arm: Arm, answer: Ik) -> str:
+    """The answer for people: a table of branches, or the nearest pose."""
     headings = render.joint_headings(arm)
     goal = render.labelled(answer["target_labels"], answer["target"], label_units(answer["target_labels"]))
     rows = [["", "branch", *headings, "motion", ""]]

@@ -151,6 +151,7 @@ class Trace:
         return self.record("multiply", (a, b))
 
     def record(self, op: str, inputs: Sequence[Any]) -> Node:
+        """The node of an operation, which is one for equal inputs."""
         if op in COMMUTING and _place(inputs[0]) > _place(inputs[1]):
             inputs = inputs[::-1]  # equal ones have equal keys: constants first, then what was recorded first
         key = (op, *[id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs])

@@ -50,6 +50,7 @@ class _Outline(Walk):
         self.begun = self.q
 
     def take_posture(self) -> None:
+        """Refused: there is no posture before the path is planned."""
         raise UsageError("a way along the tool's axes hangs on the posture: give place offsets in the frame of targets")
 
     def _plan_group(self) -> None:
@@ -69,4 +70,5 @@ class _Outline(Walk):
         self.pieces, self.blends, self.pauses = [], [], {}
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
+        """Note where a joint move ends."""
         self.q = goal

@@ -193,6 +193,7 @@ class Walk:
         self._spot = replace(self.spot, sums=self.spot.sums + 2 * np.pi * turns)
 
     def queue_event(self, kind: str, value: Any) -> None:
+        """Something that happens where the tool is then: behind the moves that have gathered, if there are some."""
         self.lay_dense()
         if self.goal is None and not self.pieces:
             self.emit_event(kind, value)
@@ -200,6 +201,7 @@ class Walk:
             self.pauses.setdefault(len(self.pieces), []).append((kind, value))
 
     def emit_event(self, kind: str, value: Any) -> None:
+        """Put the gripper's move or a rest behind the motion so far."""
         if kind == "wait" and value == "enter":
             self.markers.append(Marker(len(self.stretches), "pause", None))
         elif kind == "wait":
@@ -208,6 +210,7 @@ class Walk:
             self.markers.append(Marker(len(self.stretches), kind, value))
 
     def add(self, move: Move, piece: Piece) -> None:
+        """Gather a piece of the tool's way; move: whose speed and blend it has."""
         speed = None if move.speed is None else move.speed / 100 * self.pace.speed
         self.group = (
             (self.group if self.goal is not None or self.pieces else self.current_moves)[0],
@@ -219,6 +222,7 @@ class Walk:
         self._spot = piece.last
 
     def target(self, value: list[float]) -> Spot:
+        """A target from where the tool is: what it leaves out stays."""
         return path_numbers.target(self.task, self.spot, value)
 
     # Groups

@@ -38,6 +38,8 @@ EXAMPLES = {
 
 
 class _Model(BaseModel):
+    """Keys that are not known are refused, and numbers are finite."""
+
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 

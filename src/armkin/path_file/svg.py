@@ -31,6 +31,8 @@ _SAME = 1e-9
 
 @dataclass
 class _Element:
+    """An element with its attributes, the line where it begins, and what stands in it."""
+
     tag: str
     attributes: dict[str, str]
     line: int

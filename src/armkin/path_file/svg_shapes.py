@@ -171,10 +171,12 @@ class _Outline:
         self.open = False
 
     def move(self, p: Point) -> None:
+        """Lift the pen and go to p."""
         self.at = self.begun = p
         self.open = False
 
     def line(self, p: Point) -> None:
+        """A straight line to p; a stroke begins with its first."""
         if not self.open:
             self.strokes.append([self._placed(self.at)])
             self.open = True
@@ -182,6 +184,7 @@ class _Outline:
         self.at = p
 
     def close(self) -> None:
+        """A line back to where the outline began."""
         if self.open:
             self.line(self.begun)
         self.at, self.open = self.begun, False

@@ -199,6 +199,7 @@ class _Drawing:
                 self.axes.text(where[0], where[1], where[2] + 0.035 * self.size, "   " + ", ".join(names), **beside)
 
     def line(self, points: Array, **style: Any) -> None:
+        """A line through points, in the plane or in space."""
         self.axes.plot(*points.T[: self.dimensions], **style)
 
     def single(self, bone: Skeleton, colour: str) -> None:

@@ -308,6 +308,7 @@ def arc(arm: Arm, q: Array, joint: int, count: int, sense: int) -> tuple[NDArray
 
 
 def whole_turn(arm: Arm, joint: int) -> bool:
+    """Whether a joint has a whole turn or more, or no limits."""
     low, high = float(arm.lower[joint]), float(arm.upper[joint])
     return not (math.isfinite(low) and math.isfinite(high)) or high - low + 2 * SLACK >= TURN
 

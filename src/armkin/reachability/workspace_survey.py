@@ -192,6 +192,7 @@ class _Tally:
         self._kept: list[Array] = []
 
     def add(self, part: Part) -> None:
+        """Count a part of the samples."""
         self.done += part.samples
         self.free += part.free
         self.low, self.high = np.minimum(self.low, part.low), np.maximum(self.high, part.high)
@@ -202,6 +203,7 @@ class _Tally:
             self._kept.append(np.column_stack([part.q, part.tip, *part.values])[chosen])
 
     def result(self, names: Sequence[str], size: Extent | None, seconds: float) -> Workspace:
+        """What they come to; names: of their measures, size: the volume or area."""
         n = self.arm.n
         kept = np.concatenate(self._kept) if self._kept else np.empty((0, n + 3 + len(names)))
         return Workspace(

@@ -55,15 +55,18 @@ class _Generator(GenerateJsonSchema):
     """An optional key is absent, not null; a homogeneous tuple is a list of so many items."""
 
     def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+        """Null is no value of a file."""
         return self.generate_inner(schema["schema"])
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        """A default of null is none."""
         made = super().default_schema(schema)
         if made.get("default") is None:
             made.pop("default", None)
         return made
 
     def tuple_schema(self, schema: core_schema.TupleSchema) -> JsonSchemaValue:
+        """One kind of item instead of a list of kinds."""
         made = super().tuple_schema(schema)
         items = made.pop("prefixItems", None)
         if items:

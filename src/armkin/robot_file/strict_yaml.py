@@ -175,6 +175,7 @@ class _Node:
         self.key: str | None = None
 
     def value_path(self) -> Path:
+        """The place of the next value."""
         return (*self.path, self.key if self.mapping and self.key is not None else len(self.items))
 
     def value(self) -> Any:
@@ -214,6 +215,7 @@ class _Builder:
         self._stack: list[_Node] = []
 
     def take(self, event: Any) -> None:
+        """Add an event; raises StrictYamlError for what is not allowed there."""
         line = event.start_mark.line + 1
         if isinstance(event, yaml.DocumentStartEvent) and self.root is not None:
             raise StrictYamlError(line, f"a second document begins here; a {self.kind.name} is one document")

@@ -43,6 +43,7 @@ class _Reader:
         self.within: list[str] = []
 
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
+        """An element begins."""
         self.depth += 1
         self._check(tag)
         if self.depth == 1:
@@ -84,6 +85,7 @@ class _Reader:
             self.joint = self.joints[name] = Joint(name, attributes.get("type", ""))
 
     def end(self, tag: str) -> None:
+        """An element ends."""
         if self.depth == 2:
             self.joint = None
         self.depth -= 1
@@ -122,6 +124,7 @@ def document(raw: bytes, name: str) -> tuple[str, Tree]:
 
 
 def is_xacro(name: str) -> RobotFileError:
+    """The error of a file that is a template of a URDF."""
     return RobotFileError(
         f"{name}: is a xacro, a template of a URDF; make the URDF first:\n"
         "`xacro FILE > arm.urdf` (ROS) or `pip install xacrodoc; xacrodoc FILE -o arm.urdf`"
@@ -256,4 +259,5 @@ class Tree:
 
 
 def in_words(names: list[str]) -> str:
+    """Names in a sentence, the first twelve of them."""
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

@@ -208,6 +208,7 @@ def _insert_pause(session: Session, todo: list[Segment], room: int, clock: int, 
 
 
 def seconds_of(segments: Sequence[Segment], clock: int) -> float:
+    """How long segments take [s]; clock: cycles a second."""
     return sum(s.units() for s in segments) * 256 / clock
 
 

@@ -26,6 +26,7 @@ class Goals(NamedTuple):
     near: Array
 
     def of(self, rows: Int) -> Goals:
+        """Those of some rows."""
         return Goals(self.arm, self.task, self.target[rows], self.near[rows])
 
 
@@ -84,6 +85,7 @@ class Batch(NamedTuple):
 
 
 def empty(N: int, B: int, n: int) -> Batch:
+    """Room for N targets with B branches of n joints, written by whoever solves them."""
     return Batch(
         np.empty((N, B, n)),
         np.empty((N, B), bool),

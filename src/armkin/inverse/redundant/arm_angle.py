@@ -233,6 +233,7 @@ class Turning(NamedTuple):
 
     @property
     def complete(self) -> Bool:
+        """(N,) whether no curve of a target can be missing."""
         return self.circles.complete
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:

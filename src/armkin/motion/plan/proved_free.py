@@ -64,6 +64,7 @@ class _OfCurve:
         return self.inner._sums
 
     def joints_at(self, place: Array) -> Array:
+        """Joint values at places along the way."""
         return self.smoothed.evaluate(self._time(place))
 
     def variation(self, begin: Array, end: Array) -> Array:
@@ -199,12 +200,15 @@ class _Lifted:
 
     @property
     def cells(self) -> int:
+        """How many cells the way has."""
         return self.way.cells
 
     def joints_at(self, place: Array) -> Array:
+        """Joint values at places along the way."""
         return whole_arm(self.arm, self.way.joints_at(place))[1]
 
     def variation(self, begin: Array, end: Array) -> Array:
+        """How far each joint of the whole arm goes between two places."""
         arm, found = self.arm, self.way.variation(begin, end)
         while arm.whole is not None:
             arm, held = arm.whole

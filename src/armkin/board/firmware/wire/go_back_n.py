@@ -26,6 +26,8 @@ QUESTION = 12  # [bytes] of a STATUS? on the line
 
 @dataclass
 class _Frame:
+    """A frame that is kept until the board has acknowledged it; make: its bytes for a sequence number."""
+
     make: Callable[[int], bytes]
     segments: int
     seconds: float  # of motion
