@@ -78,16 +78,16 @@ def feetech(board: Board, sim: Any) -> Emulated:
         sim.servos[2].advance = lambda seconds: None
 
     def nudge() -> None:
-        sim.servos[1].set(registers.GOAL_POSITION, round(sim.servos[1].at) + 60)
+        sim.servos[1].set(registers.GOAL_POSITION, round(sim.servos[1].position) + 60)
 
     def reset() -> None:
         for number, servo in sim.servos.items():
-            sim.servos[number] = Servo(number, servo.at)
+            sim.servos[number] = Servo(number, servo.position)
 
     return Emulated(
         board,
         sim,
-        lambda: [sim.servos[k].at for k in (1, 2, 3)],
+        lambda: [sim.servos[k].position for k in (1, 2, 3)],
         reset=reset,
         foreign=[nudge],
         stall=stick,

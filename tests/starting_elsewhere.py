@@ -135,7 +135,7 @@ def watch(arm: armkin.Arm, kind: str, port: Any, seen: list[list[float]]) -> Non
     elif arm.motors[0].kind == "bus":
 
         def pins() -> list[float]:
-            return [port.servos[k].at for k in (1, 2, 3)]
+            return [port.servos[k].position for k in (1, 2, 3)]
 
     elif kind == "klipper":
         found = axes_of(arm)
