@@ -14,8 +14,9 @@ from xdist.scheduler import LoadScopeScheduling
 
 _ROOT = Path(__file__).parents[1]
 _BROWSER = re.compile(r"^(?:from|import) browsing\b", re.MULTILINE)
-# helpers that compile the firmware, or an exported arm; a cluster; syntax trees of the whole package
-_SHARED = re.compile(r"^(?:from|import) (?:emulator|measure|bare_host|exported|kills|ast)\b", re.MULTILINE)
+# helpers that compile the firmware, or an exported arm; a cluster; an installed kind; syntax trees of the whole package
+_HELPERS = "emulator|measure|bare_host|exported|kills|emulated_kinds|ast"
+_SHARED = re.compile(rf"^(?:from|import) (?:{_HELPERS})\b", re.MULTILINE)
 
 
 @cache

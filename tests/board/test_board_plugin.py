@@ -46,7 +46,7 @@ def installed(packages: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
 def robots(folder: Path) -> list[Path]:
     """The WidowX 250 and the OpenMANIPULATOR with their servos' drives."""
     arm = folder / "open_manipulator.yaml"
-    found = process("import", "docs/open_manipulator.urdf", "--tip", "end_effector_link")
+    found = run("import", "docs/open_manipulator.urdf", "--tip", "end_effector_link")
     assert found.code == 0, found.err
     files = []
     for text, ids in ((found.out, {}), ((ROOT / "robots/wx250s.yaml").read_text(), WIDOW_X)):
