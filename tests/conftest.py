@@ -58,7 +58,7 @@ gc.disable()
 
 import built_once  # noqa: E402
 import quickly_built  # noqa: E402
-from quickly_built import optimised  # noqa: E402, F401  # a fixture
+from quickly_built import optimised, quickly  # noqa: E402, F401  # fixtures
 
 built_once.install()
 quickly_built.install()

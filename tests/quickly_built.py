@@ -45,3 +45,9 @@ def optimised(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(toolchain, "load", _load)
     monkeypatch.setattr(armkin.compiled.compiled_arm, "_compiled", _optimised)
+
+
+@pytest.fixture
+def quickly(optimised: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Among tests of `armkin.compile` as users have it: an arm of a class of which another one is optimised."""
+    monkeypatch.setattr(toolchain, "load", load)

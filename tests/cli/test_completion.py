@@ -1,4 +1,4 @@
-"""What Tab offers, asked as bash asks it."""
+"""What Tab offers, asked as bash asks it: in this process, and once in a bash of its own."""
 
 import os
 import shutil
@@ -8,15 +8,16 @@ import pytest
 
 from armkin.cli.commands import COMMANDS
 from armkin.robot_file import catalogue
-from command_line import ROOT, process
+from command_line import ROOT, process, run
 
 
-def offered(line: str) -> list[str]:
+def offered(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
     """What Tab offers at the end of a line."""
     words = line.split()
     index = len(words) if line.endswith(" ") else len(words) - 1
-    asked = {"COMP_WORDS": line, "COMP_CWORD": str(index), "_ARMKIN_COMPLETE": "complete_bash"}
-    result = process(env={**os.environ, **asked})
+    for name, value in (("COMP_WORDS", line), ("COMP_CWORD", str(index)), ("_ARMKIN_COMPLETE", "complete_bash")):
+        monkeypatch.setenv(name, value)
+    result = run()
     assert result.err == ""
     return result.out.split()
 
@@ -42,8 +43,8 @@ def offered(line: str) -> list[str]:
         ("armkin nonsense --", []),
     ],
 )
-def test_tab(line: str, wanted: list[str]) -> None:
-    found = offered(line)
+def test_tab(line: str, wanted: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    found = offered(monkeypatch, line)
     assert sorted(found) == sorted(wanted) if wanted else not set(found) - {"--help", "--version"} - _GROUP
 
 
@@ -51,7 +52,7 @@ _GROUP = {"--install-completion", "--show-completion"}
 
 
 def test_an_offered_branch_is_understood() -> None:
-    named = process("ik", "three_dof", 390, 80, 300, "--branch", "left/elbow-up", "--json").json
+    named = run("ik", "three_dof", 390, 80, 300, "--branch", "left/elbow-up", "--json").json
     assert named["branches"][0]["name"] == "left, elbow up"
 
 

@@ -14,7 +14,15 @@ from armkin.inverse.tasks.task import targets_of
 WRISTS = {"three_dof": False, "puma560": True, "ur5e": False, "irb120": True, "labvolt_5150": False, "ra02": False}
 COUNT = 48
 BESIDE = np.geomspace(1e-8, 1e-3, COUNT)
+OPTIMISED = "three_dof", "puma560", "ur5e", "labvolt_5150"  # in other tests, too
 ROOT = 3e-8  # [rad] how far rounding of a target parts the two branches of a fold that are one
+
+
+@pytest.fixture
+def arm(name: str, request: pytest.FixtureRequest) -> armkin.Arm:
+    if name not in OPTIMISED:
+        request.getfixturevalue("quickly")
+    return armkin.load(name)
 
 
 def beside_folds(arm: armkin.Arm) -> np.ndarray:
@@ -27,8 +35,7 @@ def beside_folds(arm: armkin.Arm) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", WRISTS)
-def test_merging_branches_are_told_without_python(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    arm = armkin.load(name)
+def test_merging_branches_are_told_without_python(arm: armkin.Arm, monkeypatch: pytest.MonkeyPatch) -> None:
     fast, target = armkin.compile(arm), beside_folds(arm)
     expected = armkin.ik(arm, target)
     left = left_to_python(monkeypatch)
@@ -56,9 +63,8 @@ def test_a_posture_on_a_fold_that_near_has_stays() -> None:
 
 
 @pytest.mark.parametrize("name", ["puma560", "ur5e", "irb120"])
-def test_short_self_motions_are_told_without_python(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_short_self_motions_are_told_without_python(arm: armkin.Arm, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside a straight wrist, whose joints 4 and 6 may move by some tenths of a radian."""
-    arm = armkin.load(name)
     q = np.random.default_rng(12).uniform(-np.pi, np.pi, (COUNT, arm.n))
     q[:, 4] = np.geomspace(6e-9, 6e-8, COUNT)
     fast, target = armkin.compile(arm), armkin.fk(arm, q)

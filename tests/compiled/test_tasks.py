@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import armkin
-import quickly_built
 from armkin.compiled import compiled_arm, toolchain
 
 
@@ -26,6 +25,7 @@ def loaded(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return contents
 
 
+@pytest.mark.usefixtures("quickly")
 def test_a_task_by_name_is_built_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """The arm's usual task, and that of the arm whose last joint is held, were built, too."""
     arm, contents = armkin.load("ur5e"), loaded(monkeypatch)
@@ -44,8 +44,8 @@ def test_the_usual_task_by_its_name_is_the_usual_one(monkeypatch: pytest.MonkeyP
     assert len(contents) == 1
 
 
-def test_the_files_task_is_not_the_one_that_the_structure_suggests(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(toolchain, "load", quickly_built.load)
+@pytest.mark.usefixtures("quickly")
+def test_the_files_task_is_not_the_one_that_the_structure_suggests() -> None:
     arm = replace(armkin.load("so101"), task="xyz_axis")
     fast, T = armkin.compile(arm, "xyz_pitch_roll"), armkin.fk(arm, arm.home + 0.1)
     target = np.concatenate([T[:3, 3], T[:3, 2]])

@@ -47,7 +47,9 @@ def scene(tmp_path: Path) -> Path:
 
 @pytest.mark.usefixtures("optimised")
 @pytest.mark.parametrize("robot", ["three_dof", "ur5e"])
-def test_compiled_clearances_are_pythons(robot: str, scene: Path) -> None:
+def test_compiled_clearances_are_pythons(robot: str, scene: Path, request: pytest.FixtureRequest) -> None:
+    if robot != "three_dof":
+        request.getfixturevalue("quickly")
     arm = armkin.load(robot, scene=scene)
     q = np.random.default_rng(3).uniform(-3, 3, (3000, arm.n))
     fast, plain = armkin.compile(arm).clearance(q), armkin.clearance(arm, q)
