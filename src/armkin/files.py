@@ -21,8 +21,8 @@ _HEAD = 2_000_000  # [bytes] of a file that are looked at: robot files are short
 _kept: set[tuple[int, int]] = set()  # device and inode of the files that the running command reads
 
 
-def keep(path: str | os.PathLike[str] | int) -> None:
-    """Remember a file that is read: `whole` does not replace it, however it is spelled or linked.
+def protect_input(path: str | os.PathLike[str] | int) -> None:
+    """Remember a file that is read: `write_whole` does not replace it, however it is spelled or linked.
 
     A number is a descriptor: 0 is what standard input comes from.
     """
@@ -38,7 +38,9 @@ def forget() -> None:
 
 
 @contextmanager
-def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w", *, corrects: bool = False) -> Iterator[IO[Any]]:
+def write_whole(
+    path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w", *, corrects: bool = False
+) -> Iterator[IO[Any]]:
     """Open a file for writing that takes its name only when all of it is written.
 
     The text (UTF-8) or bytes go to a temporary file in the same folder, which is renamed at the end and
@@ -78,7 +80,7 @@ def whole(path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w", *, corre
 
 
 def check(path: str | os.PathLike[str]) -> None:
-    """Raise what `whole` would of a name: before long work, not after it."""
+    """Raise what `write_whole` would of a name: before long work, not after it."""
     name = os.fspath(path)
     if "\0" in name:
         raise FileError(f"{name!r}: cannot write: a name has no null bytes", file=name)
@@ -93,10 +95,10 @@ def check(path: str | os.PathLike[str]) -> None:
         raise FileError(f"{name}: cannot write: there is no folder {os.path.dirname(name)}", file=name)
 
 
-def ending(path: str | os.PathLike[str], what: str, allowed: Sequence[str], *, bare: bool = False) -> str:
+def ending(path: str | os.PathLike[str], content: str, allowed: Sequence[str], *, may_lack: bool = False) -> str:
     """The ending of a file's name, in lower case: what the file is written as, one of `allowed`.
 
-    what: such a file's content with its verb, for the message. bare: a name without an ending will do, too, and
+    content: such a file's content with its verb, for the message. may_lack: a name without an ending will do, too, and
     gives ""; so does a pipe or device, whatever its name. Raises UsageError for another ending, and for two.
 
     >>> ending("poses.NPZ", "rows are", (".csv", ".npz"))
@@ -105,28 +107,28 @@ def ending(path: str | os.PathLike[str], what: str, allowed: Sequence[str], *, b
     name = os.fspath(path)
     stem, end = os.path.splitext(name.lower())
     before = os.path.splitext(stem)[1]
-    if bare and (not end or (os.path.exists(name) and not os.path.isfile(name))):
+    if may_lack and (not end or (os.path.exists(name) and not os.path.isfile(name))):
         return ""
     if end not in allowed:
         *others, last = allowed
         kinds, them = (f"{', '.join(others)} or {last}", "one of them") if others else (last, "that")
-        raise UsageError(f"{name}: {what} written as {kinds}; end the file's name with {them}")
+        raise UsageError(f"{name}: {content} written as {kinds}; end the file's name with {them}")
     if before in (*allowed, *_DATA):
         raise UsageError(f"{name}: its name has two endings, {before} and {end}; end it with one of them")
     return end
 
 
-def _is_stream(there: os.stat_result) -> bool:
+def _is_stream(status: os.stat_result) -> bool:
     """Whether a file is what stdout or stderr are redirected to: writing to /dev/stdout that goes to a log."""
     for number in (1, 2):
         with suppress(OSError):
-            if os.path.samestat(there, os.fstat(number)):
+            if os.path.samestat(status, os.fstat(number)):
                 return True
     return False
 
 
-def _check_replaceable(name: str, real: str, there: os.stat_result, *, corrects: bool = False) -> None:
-    if not there.st_mode & 0o222:
+def _check_replaceable(name: str, real: str, status: os.stat_result, *, corrects: bool = False) -> None:
+    if not status.st_mode & 0o222:
         raise FileError(f"{name}: cannot write: it is read-only; give another name", file=name)
     if corrects:
         return
@@ -134,7 +136,7 @@ def _check_replaceable(name: str, real: str, there: os.stat_result, *, corrects:
         head = file.read(_HEAD)
     if all(re.search(key, head) for key in _ROBOT):
         raise UsageError(f"{name} is a robot file, which no output replaces; give another name", file=name)
-    if (there.st_dev, there.st_ino) in _kept:
+    if (status.st_dev, status.st_ino) in _kept:
         raise UsageError(f"{name} is what this command reads; give the output another name", file=name)
 
 

@@ -123,7 +123,7 @@ def jacobian(arm: Arm, q: ArrayLike) -> Jacobians:
 def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Poses, Jacobians]:
     """`fk` and `jacobian` in one, at little more than the cost of the latter: (..., 4, 4) and (..., 6, n)."""
     values = as_joints(arm, q)
-    both = _batched(arm, values, (16 + 6 * arm.n,), _both)
+    both = _batched(arm, values, (16 + 6 * arm.n,), _pose_and_jacobian)
     lead = values.shape[:-1]
     return both[..., :16].reshape(*lead, 4, 4), both[..., 16:].reshape(*lead, 6, arm.n)
 
@@ -199,12 +199,12 @@ def _turned(arm: Arm, joint: int, value: Motion) -> tuple[Entry, Entry]:
     return value if isinstance(value, tuple) else arrays.cos_sin(_slid(arm, joint, value))
 
 
-def one_pose(arm: Arm, q: ArrayLike, what: str) -> Array:
-    """``q`` as the finite joint values (n,) of one pose; what: its name, for the message."""
+def one_pose(arm: Arm, q: ArrayLike, name: str) -> Array:
+    """``q`` as the finite joint values (n,) of one pose; name: its name, for the message."""
     values = as_joints(arm, q)
     if values.ndim != 1 or not np.isfinite(values).all():
         raise UsageError(
-            f"{what}: expected the {arm.n} finite joint values of one pose, got shape {values.shape} or nan"
+            f"{name}: expected the {arm.n} finite joint values of one pose, got shape {values.shape} or nan"
         )
     return values
 
@@ -242,10 +242,10 @@ def _frames(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
 
 def jacobian_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The Jacobian, row by row: 6 n entries."""
-    return _both(arm, q)[16:]
+    return _pose_and_jacobian(arm, q)[16:]
 
 
-def _both(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
+def _pose_and_jacobian(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's pose and the Jacobian, row by row: 16 + 6 n entries."""
     P = pose.constant(arm.link[0])
     axes = []

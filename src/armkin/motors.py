@@ -316,10 +316,10 @@ def joints_per_pulse(arm: Arm) -> Array:
     return found
 
 
-def _nearest(arm: Arm, q: Array, exact: Array, around: Array) -> Array:
+def _nearest(arm: Arm, q: Array, exact: Array, corners: Array) -> Array:
     """Per pose, the neighbouring pulses with the nearest tip: (N, motors)."""
     rounded = pulses(arm, q).astype(float)
-    near = np.concatenate([rounded[:, None], np.floor(exact)[:, None] + around], axis=1)  # (N, C, motors)
+    near = np.concatenate([rounded[:, None], np.floor(exact)[:, None] + corners], axis=1)  # (N, C, motors)
     actual = arm.home + (near - arm.motor_bias) @ joints_per_pulse(arm).T
     tip = position(arm, actual)
     distance = np.linalg.norm(tip - position(arm, q)[:, None], axis=-1)

@@ -35,11 +35,11 @@ def put_off(number: int, frame: FrameType | None) -> bool:
         return False
     if number not in _waiting:
         _waiting.add(number)
-        _thread.start_new_thread(_again, (number, _thread.get_ident()))
+        _thread.start_new_thread(_repeat_signal, (number, _thread.get_ident()))
     return True
 
 
-def _again(number: int, main: int) -> None:
+def _repeat_signal(number: int, main: int) -> None:
     """Send the signal until it is taken.
 
     Once would not do: this thread runs as soon as the other one lets go of the interpreter, which is just before

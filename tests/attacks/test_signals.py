@@ -45,7 +45,7 @@ def test_a_file_that_is_half_written_is_none(number: str, code: int, times: int,
 def test_signals_while_rows_are_read_are_not_lost() -> None:
     """pyarrow's reader lost one in twenty: a command that was told to end went on to its end, with exit code 0."""
     columns = Columns(("q1", "q2", "q3"), "pose")
-    columns.begun = True
+    columns.first_row_read = True
     text = b"1,2,3\n" * 16_000
     seen: list[int] = []
     before = signal.signal(signal.SIGTERM, lambda number, frame: seen.append(number))

@@ -3,7 +3,7 @@
 import pytest
 
 from armkin.cli.negative_numbers import options_first
-from armkin.cli.number_parsing import comma_separated, number, numbers, whole
+from armkin.cli.number_parsing import comma_separated, number, numbers, whole_number
 from armkin.errors import UsageError
 from command_line import THREE_DOF, run
 
@@ -62,13 +62,13 @@ def test_counts() -> None:
         numbers(["1", "2", "3"], ["x", "y"], "xy")
     with pytest.raises(UsageError, match="with commas: 0,90"):
         comma_separated("0 90", ["a", "b"], "--near")
-    assert whole("1e2", "count", 1, 100) == 100
+    assert whole_number("1e2", "count", 1, 100) == 100
     for text in ("1.5", "0", "101"):
         with pytest.raises(UsageError, match="whole number from 1 to 100"):
-            whole(text, "count", 1, 100)
-    assert whole("2e9", "--samples", 1, 10**15) == 2_000_000_000
+            whole_number(text, "count", 1, 100)
+    assert whole_number("2e9", "--samples", 1, 10**15) == 2_000_000_000
     with pytest.raises(UsageError, match="from 1 to 1000000000000000"):
-        whole("1e18", "--samples", 1, 10**15)
+        whole_number("1e18", "--samples", 1, 10**15)
 
 
 @pytest.mark.parametrize(

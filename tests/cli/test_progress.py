@@ -35,7 +35,7 @@ def _told(monkeypatch: pytest.MonkeyPatch, steps: list[tuple[float, int]]) -> li
     monkeypatch.setattr(sys, "stderr", _Terminal())
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(time, "monotonic", lambda: now)
-    monkeypatch.setattr(progress_bar, "begun", lambda what: bar)
+    monkeypatch.setattr(progress_bar, "start_bar", lambda task: bar)
     with output.progress("bytes", 10_000) as tick:
         for now, done in steps:  # noqa: B007  (the clock reads it)
             tick(done)

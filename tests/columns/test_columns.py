@@ -83,7 +83,7 @@ def test_a_number_is_read_as_python_reads_it(row: list[float], form: str) -> Non
     words = [form % value for value in row]
     text = (",".join(words).encode() + b"\n") * 3000
     columns = Columns("abcd", "a test")
-    columns.begun = True
+    columns.first_row_read = True
     found = columns.all_plain(text)
     assert found is not None
     assert found.tolist() == [[float(word) for word in words]] * 3000

@@ -79,9 +79,9 @@ def test_a_library_of_another_user_is_not_loaded(cache: Path, monkeypatch: pytes
     toolchain.load(SOURCE, "abc")
     [kept] = cache.glob("*.so")
     name = kept.stem.partition("-")[0]
-    assert toolchain._kept(cache, name, "abc") is not None
+    assert toolchain._stored_library(cache, name, "abc") is not None
     monkeypatch.setattr(os, "geteuid", lambda: kept.stat().st_uid + 1)
-    assert toolchain._kept(cache, name, "abc") is None
+    assert toolchain._stored_library(cache, name, "abc") is None
     assert toolchain._folder() is None
 
 
@@ -91,7 +91,7 @@ def test_a_library_by_a_link_is_not_loaded(cache: Path, tmp_path: Path) -> None:
     [kept] = cache.glob("*.so")
     kept.rename(tmp_path / kept.name)
     kept.symlink_to(tmp_path / kept.name)
-    assert toolchain._kept(cache, kept.stem.partition("-")[0], "abc") is None
+    assert toolchain._stored_library(cache, kept.stem.partition("-")[0], "abc") is None
 
 
 @pytest.mark.parametrize("above", [0, 1, 2])

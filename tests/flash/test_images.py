@@ -107,7 +107,7 @@ def test_bytes_are_counted_from_when_the_boot_loader_is_found(monkeypatch: pytes
 
     counted: list[tuple[int, int]] = []
     monkeypatch.setattr(uploading, "_loader", lambda chip, kind, port: (Loader(), io.BytesIO(), 115_200))
-    monkeypatch.setattr(uploading, "_asked", lambda kind, port: "3.0")
+    monkeypatch.setattr(uploading, "_answered_version", lambda kind, port: "3.0")
     monkeypatch.setattr(avrdude, "program", lambda: None)
     data = b":04001000DEADBEEFB4\n:00000001FF\n"
     upload(Image("uno_servos", Path("uno_servos.hex"), data), "port", lambda done, total: counted.append((done, total)))

@@ -246,7 +246,7 @@ def test_the_tool_points_against_the_drawing(robot: str) -> None:
     arm = armkin.load(robot)
     place = placing(arm, [300, 0, 50])
     definition = task_for(arm, None)
-    target = targets_in(definition.labels, [[*(0.25 * arm.reach, 0.0, 0.2 * arm.reach), *place.rest]])
+    target = targets_in(definition.labels, [[*(0.25 * arm.reach, 0.0, 0.2 * arm.reach), *place.orientation]])
     found = armkin.ik(arm, target[0])
     assert found.valid.any()
     assert armkin.fk(arm, found.q[found.valid][0])[:3, 2] == pytest.approx([0, 0, -1], abs=1e-6)
@@ -283,7 +283,7 @@ def test_lines_that_are_read_in_one_step_are_read_as_word_by_word(monkeypatch: p
 
     quick = [read(text) for text in programs]
     assert sum(not isinstance(one, str) for one in quick) > 20
-    monkeypatch.setattr(gcode._Program, "_plain", lambda *_: False)
+    monkeypatch.setattr(gcode._Program, "_plain_line", lambda *_: False)
     assert [read(text) for text in programs] == quick
 
 

@@ -161,12 +161,12 @@ def test_a_long_path_shows_some_arms_and_the_whole_way(tmp_path: Path, drawn: li
 
 def boxes(figure: Any) -> tuple[Any, Any]:
     """What is seen of the axes in space, and the legend: [pixels]."""
-    from armkin.plot.canvas import _seen
+    from armkin.plot.canvas import _visible_corners
 
     axes = figure.axes[0]
     legend = axes.get_legend()
     renderer: Any = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
-    return _seen(axes), None if legend is None else legend.get_window_extent(renderer)
+    return _visible_corners(axes), None if legend is None else legend.get_window_extent(renderer)
 
 
 @pytest.mark.parametrize("first", range(0, len(catalogue.names()), 2))

@@ -23,7 +23,7 @@ def test_bodies_meet_at_every_joint_and_end_at_the_tip(robot: str) -> None:
     assert end == pytest.approx(arm.link[0][:3, 3], abs=1e-9)
     for i, value in enumerate(q * arm.ratio):
         # The body before ends where the joint sits; a slide carries the next one along its axis.
-        at = T[:3, :3] @ [0, 0, form.at[i]] + T[:3, 3]
+        at = T[:3, :3] @ [0, 0, form.joint_offsets[i]] + T[:3, 3]
         assert end == pytest.approx(at, abs=1e-6)
         move = np.eye(4)
         if arm.prismatic[i]:

@@ -161,7 +161,7 @@ def model(arm: Arm) -> Model:
         parameters.append(Parameter("ratios", f"{name} ratio", "1", RATIO))
         if i == arm.n - 1:
             break
-        A = _along(arm.link[i + 1], arm.reach)
+        A = _link_along_normal(arm.link[i + 1], arm.reach)
         steps.append(_Step(A))
         move("lengths", f"{name} d", "mm", LENGTH, 2)
         move("lengths", f"{name} a", "mm", LENGTH, 0)
@@ -173,7 +173,7 @@ def model(arm: Arm) -> Model:
     return Model(arm, tuple(parameters), tuple(steps))
 
 
-def _along(link: Array, reach: float) -> Array:
+def _link_along_normal(link: Array, reach: float) -> Array:
     """A_i: x along the common normal of a link's two axes, the origin on the second."""
     z, p = link[:3, 2], link[:3, 3]
     sine = math.hypot(z[0], z[1])

@@ -31,12 +31,16 @@ def loss(r: Array, scale: float) -> float:
     return float((u2 / (1.0 + u2 / K**2)).sum())
 
 
-def scales(off: Array, turned: Array | None, held: float) -> tuple[float, float]:
-    """The noise of a component [mm, rad] from the median residual, larger by the `held` numbers that a fit has used."""
-    numbers = off.size + (0 if turned is None else turned.size)
-    used = np.sqrt(numbers / max(numbers - held, 0.25 * numbers))
-    size = float(np.median(np.linalg.norm(off, axis=1))) / MEDIAN * used
-    turn = 0.0 if turned is None else float(np.median(np.linalg.norm(turned, axis=1))) / MEDIAN * used
+def scales(position_residuals: Array, rotation_residuals: Array | None, fitted_numbers: float) -> tuple[float, float]:
+    """The noise of a component [mm, rad] from the median residual, larger by the numbers that a fit has used."""
+    numbers = position_residuals.size + (0 if rotation_residuals is None else rotation_residuals.size)
+    used = np.sqrt(numbers / max(numbers - fitted_numbers, 0.25 * numbers))
+    size = float(np.median(np.linalg.norm(position_residuals, axis=1))) / MEDIAN * used
+    turn = (
+        0.0
+        if rotation_residuals is None
+        else float(np.median(np.linalg.norm(rotation_residuals, axis=1))) / MEDIAN * used
+    )
     return max(size, FINEST[0]), max(turn, FINEST[1])
 
 

@@ -67,7 +67,7 @@ def _spread(data: Measured) -> None:
 class _Reading(NamedTuple):
     """Another way to read the rows."""
 
-    says: str
+    explanation: str
     c: Array
     position: Array
 
@@ -76,7 +76,7 @@ def _meaning(arm: Arm, data: Measured) -> None:
     """Units and columns: whether another reading of the rows fits far better than the one given."""
     expected = position(arm, data.c)
     size = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
-    miss, plain = _aligned(expected, data.position), _plain(expected, data.position)
+    miss, plain = _aligned_miss(expected, data.position), _median_miss(expected, data.position)
     says = ""
     if plain > FITS * size:
         says = _axes_in_place(expected, data.position, 0.2 * plain, FITS * size)
@@ -84,9 +84,9 @@ def _meaning(arm: Arm, data: Measured) -> None:
         least = EXPLAINS * miss
         for reading in _readings(arm, data):
             moved = position(arm, reading.c)
-            off = _aligned(moved, reading.position) * size / max(_size(reading.position), 1e-12)
+            off = _aligned_miss(moved, reading.position) * size / max(_size(reading.position), 1e-12)
             if off < least:
-                least, says = 0.999 * off, reading.says
+                least, says = 0.999 * off, reading.explanation
     if says:
         raise UsageError(f"{says}; as given, the rows miss the arm by {miss:.3g} mm (median); nothing is written")
 
@@ -97,13 +97,13 @@ def _axes_in_place(expected: Array, measured: Array, most: float, largest: float
     Measuring frames may stand anywhere, so `_readings` allows any rigid motion; these need none, and are tried first.
     """
     found = [
-        (_plain(expected, measured[:, order]), f"columns {_named(order)} of the measured points look like x y z")
+        (_median_miss(expected, measured[:, order]), f"columns {_named(order)} of the measured points look like x y z")
         for order in itertools.permutations(range(3))
         if order != (0, 1, 2)
     ]
     found += [
         (
-            _plain(expected, measured * flip),
+            _median_miss(expected, measured * flip),
             f"the measured {axis} looks negative (or the first joint turns the other way)",
         )
         for flip, axis in _FLIPS
@@ -148,12 +148,12 @@ def _size(x: Array) -> float:
     return float(np.median(np.linalg.norm(x - np.median(x, axis=0), axis=1)))
 
 
-def _plain(expected: Array, measured: Array) -> float:
+def _median_miss(expected: Array, measured: Array) -> float:
     """The median miss, frames as they are."""
     return float(np.median(np.linalg.norm(measured - expected, axis=1)))
 
 
-def _aligned(expected: Array, measured: Array) -> float:
+def _aligned_miss(expected: Array, measured: Array) -> float:
     """The median miss after the best rigid motion of the expected points (Kabsch, 1976), robustly."""
     weight = np.ones(len(expected))
     off = np.zeros(len(expected))

@@ -28,19 +28,19 @@ CANDIDATES = 400
 UNLIMITED = np.pi, 200.0  # [rad, mm] how far an unlimited joint is moved for a suggestion
 
 
-def doubts(model: Model, found: Fit) -> Array:
+def doubts(model: Model, fit: Fit) -> Array:
     """How large each free correction may still be: (F,) standard deviations [mm, rad, 1]."""
-    return np.asarray(np.sqrt(np.diag(np.linalg.inv(found.normal))) * model.prior[found.free])
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(fit.normal))) * model.prior[fit.free])
 
 
-def unseen(model: Model, found: Fit) -> list[str]:
+def unseen(model: Model, fit: Fit) -> list[str]:
     """Corrections that the rows do not show, in words; those of which they show the sum stand together."""
-    if not len(found.free):
+    if not len(fit.free):
         return []
-    spread = np.linalg.inv(found.normal)
+    spread = np.linalg.inv(fit.normal)
     left = np.sqrt(np.diag(spread))
     correlation = spread / np.outer(left, left)
-    names = [model.parameters[k].name for k in found.free]
+    names = [model.parameters[k].name for k in fit.free]
     weak = np.flatnonzero(left > UNSEEN)
     told: list[str] = []
     done: set[int] = set()
@@ -53,19 +53,19 @@ def unseen(model: Model, found: Fit) -> list[str]:
     return told
 
 
-def left_open(model: Model, found: Fit) -> float:
+def left_open(model: Model, fit: Fit) -> float:
     """The tip's standard deviation after a fit, by the fit's covariance [mm]: root mean square over 100 poses.
 
     The poses are random, within limits.
     """
-    J = model.poses(found.p, _anywhere(model.arm, 100))[1][:, :3, found.free] * model.prior[found.free]
-    return float(np.sqrt(np.einsum("mip,pq,miq->m", J, np.linalg.inv(found.normal), J, optimize=True).mean()))
+    J = model.poses(fit.p, _anywhere(model.arm, 100))[1][:, :3, fit.free] * model.prior[fit.free]
+    return float(np.sqrt(np.einsum("mip,pq,miq->m", J, np.linalg.inv(fit.normal), J, optimize=True).mean()))
 
 
-def suggestions(model: Model, count: int, free: NDArray[np.intp], before: Array | None = None) -> Array:
+def suggestions(model: Model, count: int, free: NDArray[np.intp], measured: Array | None = None) -> Array:
     """Joint values (count, n) whose measurement would tell most, one after the other, within limits.
 
-    free: the corrections to see; before: (M, n) poses measured already. Each next pose is that of 400 random ones
+    free: the corrections to see; measured: (M, n) poses measured already. Each next pose is that of 400 random ones
     with the largest gain of information, log det(I + J N^-1 J^T) (D-optimality, greedily).
     """
     if count < 1 or count > 1000:
@@ -76,8 +76,8 @@ def suggestions(model: Model, count: int, free: NDArray[np.intp], before: Array 
     candidates = np.clip(np.round(_anywhere(arm, CANDIDATES) / step) * step, low, high)
     J = _whitened(model, candidates, free)
     N = np.eye(len(free))
-    if before is not None and len(before):
-        rows = _whitened(model, before, free).reshape(-1, len(free))
+    if measured is not None and len(measured):
+        rows = _whitened(model, measured, free).reshape(-1, len(free))
         N += rows.T @ rows
     chosen: list[int] = []
     for _ in range(count):

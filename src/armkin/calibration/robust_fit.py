@@ -29,9 +29,11 @@ class Measured:
     def __len__(self) -> int:
         return len(self.c)
 
-    def rows(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Measured:
+    def rows(self, selected: NDArray[np.intp] | NDArray[np.bool_]) -> Measured:
         """Some of the rows."""
-        return Measured(self.c[which], self.position[which], None if self.rotation is None else self.rotation[which])
+        return Measured(
+            self.c[selected], self.position[selected], None if self.rotation is None else self.rotation[selected]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,19 +102,26 @@ def fit(
     return Fit(p, scale, np.minimum(weight, weight_turn), H + np.eye(len(free)), free)
 
 
-def _cost(off: Array, turned: Array | None, scale: tuple[float, float], z: Array) -> float:
-    return float(z @ z) + sum(loss(r, s) for r, s in ((off, scale[0]), (turned, scale[1])) if r is not None)
+def _cost(position_residuals: Array, rotation_residuals: Array | None, scale: tuple[float, float], z: Array) -> float:
+    return float(z @ z) + sum(
+        loss(r, s) for r, s in ((position_residuals, scale[0]), (rotation_residuals, scale[1])) if r is not None
+    )
 
 
 def _normal(
-    J: Array, off: Array, turned: Array | None, weight: Array, weight_turn: Array, scale: tuple[float, float]
+    J: Array,
+    position_residuals: Array,
+    rotation_residuals: Array | None,
+    weight: Array,
+    weight_turn: Array,
+    scale: tuple[float, float],
 ) -> tuple[Array, Array]:
     """J^T W J and J^T W r in units of the prior and the scales, without the prior."""
     rows = J[:, :3] * (np.sqrt(weight) / scale[0])[:, None, None]
-    values = off * (np.sqrt(weight) / scale[0])[:, None]
+    values = position_residuals * (np.sqrt(weight) / scale[0])[:, None]
     A, b = rows.reshape(values.size, J.shape[2]), values.reshape(-1)
-    if turned is not None:
+    if rotation_residuals is not None:
         rows = J[:, 3:] * (np.sqrt(weight_turn) / scale[1])[:, None, None]
-        values = turned * (np.sqrt(weight_turn) / scale[1])[:, None]
+        values = rotation_residuals * (np.sqrt(weight_turn) / scale[1])[:, None]
         A, b = np.concatenate([A, rows.reshape(values.size, J.shape[2])]), np.concatenate([b, values.reshape(-1)])
     return A.T @ A, A.T @ b

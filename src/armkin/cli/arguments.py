@@ -30,9 +30,9 @@ def load(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
         raise UsageError("the robot file's name is empty; name a file, for example robots/three_dof.yaml")
     if is_number(robot) and not os.path.exists(robot):
         raise UsageError(f"ROBOT comes first, then the numbers: '{robot}' is no robot file")
-    files.keep(locate(robot))
+    files.protect_input(locate(robot))
     if scene is not None:
-        files.keep(scene)
+        files.protect_input(scene)
     arm = load(robot, scene, tool=None if tool is None else _six(tool))
     unit_notes.robot_file(arm)
     return arm
@@ -60,7 +60,7 @@ def standard_input(most: int, instead: str = "") -> bytes:
     """
     if sys.stdin is None:
         raise FileError("standard input is closed")
-    files.keep(0)
+    files.protect_input(0)
     try:
         data = sys.stdin.buffer.read(most + 1)
     except (OSError, ValueError) as error:
@@ -139,21 +139,21 @@ def _other_task(arm: Arm, task: Task, got: int) -> str:
     return "".join(f"; {words}" for words in told)
 
 
-def target_list(arm: Arm, task: Task, text: str, rest: Sequence[str] | None = None) -> list[float]:
-    """The numbers of `--target X,Y,Z` [mm, deg]; rest: words that stand behind the option, numbers for its target."""
-    if rest and is_number(text) and all(map(is_number, rest)):
-        whole = ",".join([text, *rest])
+def target_list(arm: Arm, task: Task, text: str, words: Sequence[str] | None = None) -> list[float]:
+    """The numbers of `--target X,Y,Z` [mm, deg]; words: words that stand behind the option, numbers for its target."""
+    if words and is_number(text) and all(map(is_number, words)):
+        whole = ",".join([text, *words])
         raise UsageError(f"--target: separate the numbers with commas: --target {whole}")
     values = comma_separated(text, task.labels, f"--target (task {task.name})")
     unit_notes.target(arm, task.labels, values)
     return values
 
 
-def check_commas(arm: Arm, task: str | None, text: str, rest: Sequence[str]) -> None:
+def check_commas(arm: Arm, task: str | None, text: str, words: Sequence[str]) -> None:
     """Raise UsageError for `--target 390 80 300`, where a target's numbers stand behind it as words of their own."""
     from armkin.inverse.tasks.choose_task import task_for
 
-    target_list(arm, task_for(arm, task), text, rest)
+    target_list(arm, task_for(arm, task), text, words)
 
 
 def one_alone(workers: int, cluster: str | None, resume: bool) -> None:

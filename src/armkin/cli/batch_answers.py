@@ -88,7 +88,7 @@ class Done(NamedTuple):
     tally: Tally
     problem: ArmkinError | None = None  # a malformed row behind those that were answered
     near: list[float] | None = None  # where the next piece goes on, for questions that follow each other
-    kept: bool = False  # the bytes stand in a part already
+    stored: bool = False  # the bytes stand in a part already
 
     def about(self) -> dict[str, Any]:
         """What is kept beside the bytes."""
@@ -135,7 +135,7 @@ def work(job: Job, piece: Piece) -> Done:
     if job.parts is None or problem is not None:
         return done
     job.parts.keep(done.number, done.about(), done.data)
-    return done._replace(data=b"", kept=True)
+    return done._replace(data=b"", stored=True)
 
 
 def _lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
@@ -166,12 +166,12 @@ class Batch:
     workers: int
     cluster: str | None
     resume: bool
-    asked: Mapping[str, Any]  # what the bytes depend on besides robot and input, for --resume
+    settings: Mapping[str, Any]  # what the bytes depend on besides robot and input, for --resume
 
     @property
     def compiled(self) -> bool:
         """Whether machine code may be used."""
-        return bool(self.asked.get("compiled"))
+        return bool(self.settings.get("compiled"))
 
     @property
     def engine(self) -> Engine:
@@ -214,7 +214,7 @@ class Batch:
                 raise pieces.empty(tally.skipped)
             if kept:
                 whole = io.BytesIO()
-                format.together(whole, lambda: map(io.BytesIO, kept))
+                format.write_parts(whole, lambda: map(io.BytesIO, kept))
                 write(whole.getvalue())
 
 
@@ -236,7 +236,7 @@ def _binary(out: str | None) -> Iterator[Callable[[bytes], object]]:
             yield lambda data: write(data.decode())
         return
 
-    with files.whole(out, "wb") as file:
+    with files.write_whole(out, "wb") as file:
         yield file.write
 
 
@@ -248,7 +248,7 @@ class _ToFile:
         self.path = str(batch.out)
         files.check(self.path)
         asked = {"armkin": __version__, "format": format.name, "json": batch.as_json, "input size": size}
-        self.parts = Parts(self.path, {**batch.asked, **asked})
+        self.parts = Parts(self.path, {**batch.settings, **asked})
         self.first: Done | None = None  # the only piece so far: it may be the last
         self.count = 0
 
@@ -299,7 +299,7 @@ class _ToFile:
             raise done.problem
         if self.first is None and done.number == 0 and not self.parts.held:
             self.first = done
-        elif not done.kept:
+        elif not done.stored:
             if not self.parts.held:
                 self.parts.begin()
                 assert self.first is not None
@@ -310,7 +310,7 @@ class _ToFile:
     def _write(self) -> None:
         held = self.parts.held
         try:
-            with files.whole(self.path, "wb") as file:
+            with files.write_whole(self.path, "wb") as file:
                 self._put(file)
         except FileError as error:
             if held:
@@ -334,6 +334,6 @@ class _ToFile:
             file.write((csv_line(heading) + "\n").encode())
         first = self.first
         if self.parts.held or first is None:
-            self.format.together(file, lambda: self.parts.opened(self.count))
+            self.format.write_parts(file, lambda: self.parts.opened(self.count))
         else:
-            self.format.together(file, lambda: [io.BytesIO(first.data)])
+            self.format.write_parts(file, lambda: [io.BytesIO(first.data)])

@@ -46,14 +46,14 @@ class Rows:
         self,
         source: str | None,
         names: Sequence[str],
-        what: str,
+        purpose: str,
         named: Mapping[str, Sequence[float]] | None = None,
         values: Sequence[Sequence[float]] = (),
     ) -> None:
-        """source: a name, or None for values that are there already; the rest: see `csv_rows.Columns`."""
-        self.source, self.names, self.what, self.named, self.values = source, tuple(names), what, named, values
+        """source: a name, or None for values that are there already; the rest: see `csv_to_numbers.Columns`."""
+        self.source, self.names, self.purpose, self.named, self.values = source, tuple(names), purpose, named, values
         if source is not None:
-            files.keep(0 if source == "-" else source)  # before an output of that name is opened
+            files.protect_input(0 if source == "-" else source)  # before an output of that name is opened
 
     @property
     def size(self) -> int | None:
@@ -97,15 +97,15 @@ class Rows:
             first += len(values)
 
     def _of_text(self, source: str) -> Iterator[Piece]:
-        learner = Columns(self.names, self.what, self.named)  # learns the heading, for the pieces after it
+        learner = Columns(self.names, self.purpose, self.named)  # learns the heading, for the pieces after it
         number, first = 0, 1
         with csv_to_numbers.opened(source) as file:
             for block in csv_to_numbers.blocks(file, source):
                 columns = copy.copy(learner)
                 columns.skipped = 0
                 yield Piece(number, first, csv_to_numbers.name_of(source), self.names, block, columns)
-                for i, line in enumerate([] if learner.begun else block.split(b"\n"), first):
-                    if learner.begun:
+                for i, line in enumerate([] if learner.first_row_read else block.split(b"\n"), first):
+                    if learner.first_row_read:
                         break
                     try:
                         learner.row(line, i)

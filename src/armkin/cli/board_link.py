@@ -11,7 +11,7 @@ import typer
 
 from armkin.cli import arguments, completion, output, render
 from armkin.cli.default_port import port_name
-from armkin.cli.number_parsing import whole
+from armkin.cli.number_parsing import whole_number
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -25,7 +25,7 @@ _FASTEST = 4_000_000  # what USB adapters make; a bus has 1,000,000
 
 
 def _rate(text: str | None) -> int | None:
-    return None if text is None else whole(text, "--baud", 1, _FASTEST)
+    return None if text is None else whole_number(text, "--baud", 1, _FASTEST)
 
 
 Baud = Annotated[
@@ -120,9 +120,9 @@ def _goes_on(machine: Backend) -> str:
     return "; --resume goes on with this motion" if getattr(machine, "resumable", False) else ""
 
 
-def can_resume(others: Mapping[str, object]) -> None:
+def can_resume(options: Mapping[str, object]) -> None:
     """Raise UsageError for what makes no sense beside --resume: option -> whether it is given."""
-    for option, given in others.items():
+    for option, given in options.items():
         if given:
             raise UsageError(f"--resume and {option}: a motion that was held goes on from where the arm stands")
 
@@ -204,17 +204,17 @@ def prepare(arm: Arm, machine: Backend, text: str | None, assume: Array | None) 
         output.note(f"the board takes the arm to stand {where}")
 
 
-def where_text(arm: Arm, found: Mapping[str, Any]) -> str:
+def where_text(arm: Arm, answer: Mapping[str, Any]) -> str:
     """What `armkin.board.planner.where_arm_stands` has found, as tables."""
     from armkin.motors import motor_names, pulse_units
 
-    if found["joints"] is None:
-        why = found.get("lost_because")
+    if answer["joints"] is None:
+        why = answer.get("lost_because")
         return f"{arm.name}: its position is lost{f' ({why})' if why else ''}\n"
     head = [f"{name}/{unit}" for name, unit in zip(motor_names(arm), pulse_units(arm), strict=True)]
     tables = [
-        render.row("joints", render.joint_headings(arm), [render.fixed(value) for value in found["joints"]]),
-        render.row("pulses", head, [str(value) for value in found["pulses"]]),
-        render.row("tool", ["x/mm", "y/mm", "z/mm"], [render.fixed(value) for value in found["position_mm"]]),
+        render.row("joints", render.joint_headings(arm), [render.fixed(value) for value in answer["joints"]]),
+        render.row("pulses", head, [str(value) for value in answer["pulses"]]),
+        render.row("tool", ["x/mm", "y/mm", "z/mm"], [render.fixed(value) for value in answer["position_mm"]]),
     ]
-    return "\n".join([f"{arm.name}: position {found['position']}", *tables, ""])
+    return "\n".join([f"{arm.name}: position {answer['position']}", *tables, ""])

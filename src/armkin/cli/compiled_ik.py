@@ -32,8 +32,8 @@ def fk(arm: Arm, q: Array, task: str | None = None) -> Array:
     return armkin.compile(arm, task).fk(q)
 
 
-def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
+def nearest(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
     """`armkin.columns.ik_columns.nearest`, where it serves."""
     from armkin.compiled import least_motion as found
 
-    return found.nearest(q, wanted, near, scale)
+    return found.nearest(q, candidates, near, scale)

@@ -39,12 +39,12 @@ class Columns:
     are x. A row whose wanted cells are all empty (a target that `ik` did not reach) is skipped and counted.
     """
 
-    def __init__(self, names: Sequence[str], what: str, named: Mapping[str, Sequence[float]] | None = None) -> None:
-        self.names, self.what, self.named = names, what, named or {}
+    def __init__(self, names: Sequence[str], purpose: str, named: Mapping[str, Sequence[float]] | None = None) -> None:
+        self.names, self.purpose, self.named = names, purpose, named or {}
         self.places: list[int] | None = None
         self.heading: list[str] = []
         self.skipped = 0
-        self.begun = False
+        self.first_row_read = False
 
     def row(self, line: bytes, number: int) -> list[float] | None:
         """One line; None for a heading, a comment, an empty line or a row without values."""
@@ -53,22 +53,22 @@ class Columns:
             return None
         cells = _cells(text)
         if len(cells) == 1 and cells[0] in self.named:
-            self.begun = True
+            self.first_row_read = True
             return list(self.named[cells[0]])
-        if not self.begun:
-            self.begun = True
+        if not self.first_row_read:
+            self.first_row_read = True
             if self._read_heading(cells):
                 return None
         if self.places is not None:
-            cells = self._chosen(cells, self.places)
+            cells = self._wanted_cells(cells, self.places)
             if not any(cells) and len(self.heading) > len(self.names):
                 self.skipped += 1
                 return None
         elif len(cells) == 1 and len(self.names) > 1:
             self._check_separator(text)
-        return numbers(cells, self.names, self.what)
+        return numbers(cells, self.names, self.purpose)
 
-    def _chosen(self, cells: list[str], places: list[int]) -> list[str]:
+    def _wanted_cells(self, cells: list[str], places: list[int]) -> list[str]:
         """The cells of the columns, of a row below a heading."""
         if len(cells) != len(self.heading):
             have, want = len(cells), len(self.heading)
@@ -127,21 +127,21 @@ class Columns:
 
 
 def batch_rows(
-    source: str, names: Sequence[str], what: str, named: Mapping[str, Sequence[float]] | None = None
+    source: str, names: Sequence[str], purpose: str, named: Mapping[str, Sequence[float]] | None = None
 ) -> Iterator[Chunk]:
     """Rows of a CSV file, or of standard input for "-", in chunks.
 
     names, what, named: see `Columns`. A malformed row raises UsageError that names its number (from 1, as an
     editor counts lines), after the complete rows before it were given out.
     """
-    files.keep(0 if source == "-" else source)  # before an output of that name is opened
-    return _all_rows(source, names, what, named)
+    files.protect_input(0 if source == "-" else source)  # before an output of that name is opened
+    return _all_rows(source, names, purpose, named)
 
 
 def _all_rows(
-    source: str, names: Sequence[str], what: str, named: Mapping[str, Sequence[float]] | None
+    source: str, names: Sequence[str], purpose: str, named: Mapping[str, Sequence[float]] | None
 ) -> Iterator[Chunk]:
-    columns = Columns(names, what, named)
+    columns = Columns(names, purpose, named)
     first, empty = 1, True
     with opened(source) as file:
         for block in blocks(file, source):
@@ -157,10 +157,10 @@ def _all_rows(
 
 
 def streamed_rows(
-    source: str, names: Sequence[str], what: str, named: Mapping[str, Sequence[float]] | None = None
+    source: str, names: Sequence[str], purpose: str, named: Mapping[str, Sequence[float]] | None = None
 ) -> Iterator[tuple[int, list[float]]]:
     """Rows of a CSV file one by one, each as soon as it can be read: its number and its values."""
-    columns = Columns(names, what, named)
+    columns = Columns(names, purpose, named)
     with opened(source) as file:
         for number, line in enumerate(iter(lambda: _line(file, source), b""), 1):
             try:
@@ -256,7 +256,7 @@ def blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
     while some := _read(file, source):
         ends = some.count(b"\n")
         while lines + ends >= ROWS:
-            cut = _behind(some, ROWS - lines)
+            cut = _end_of_lines(some, ROWS - lines)
             yield b"".join([*held, some[:cut]])
             some, ends, held, lines, open_ = some[cut:], ends - (ROWS - lines), [], 0, 0
         held.append(some)
@@ -275,7 +275,7 @@ def _read(file: IO[bytes], source: str) -> bytes:
         raise _unread(source, error) from None
 
 
-def _behind(text: bytes, lines: int) -> int:
+def _end_of_lines(text: bytes, lines: int) -> int:
     """Where so many lines have ended."""
     at = 0
     for _ in range(lines):
@@ -313,7 +313,7 @@ def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator
     problem: UsageError | None = None
     at, number, tried = 0, first, False
     while at < len(text):
-        if columns.begun and not tried:  # what the columns are is known: the rest in one go, if it is plain
+        if columns.first_row_read and not tried:  # what the columns are is known: the rest in one go, if it is plain
             tried, values = True, columns.all_plain(text[at:])
             if values is not None:
                 rest = range(number, number + len(values))

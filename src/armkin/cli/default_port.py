@@ -36,30 +36,30 @@ PortName = Annotated[
 ]
 
 
-def port_name(given: str | None, board: Board, baud: int | None, *, reset: bool = True) -> str:
+def port_name(port: str | None, board: Board, baud: int | None, *, reset: bool = True) -> str:
     """The port given (or ARMKIN_PORT), else the only one where a board of the robot file's kind answers.
 
     It is asked for its status or numbers: nothing moves.
     """
-    if given is not None:
-        return given
+    if port is not None:
+        return port
     from armkin.board.stop_signals import stoppable
 
     with stoppable() as stop:
         found = [name for name in board.likely() if board.answers(name, baud, stop, reset=reset)]
-    return only(found, board.called, board.hint)
+    return only_port(found, board.called, board.hint)
 
 
-def only(found: Sequence[str], called: str, hint: str = "armkin ports lists them", *, asked: bool = True) -> str:
+def only_port(ports: Sequence[str], called: str, hint: str = "armkin ports lists them", *, asked: bool = True) -> str:
     """The one port that was found. Raises UsageError if there are none or several.
 
     asked: whether a board answered there; else a port's adapter looks like one, and sim is none.
     """
     one, many = ("answers", "boards answer") if asked else ("is plugged in", "ports look like one")
-    if len(found) == 1:
-        output.note(f"using {found[0]}, the only port where {called} {one}")
-        return found[0]
-    where = f"{len(found)} {many} ({', '.join(found)})" if found else f"no port where {called} {one} was found"
+    if len(ports) == 1:
+        output.note(f"using {ports[0]}, the only port where {called} {one}")
+        return ports[0]
+    where = f"{len(ports)} {many} ({', '.join(ports)})" if ports else f"no port where {called} {one} was found"
     sim = "; sim is a board in this process" if asked else ""
     raise UsageError(
         f"--port is missing, and {where}\n{hint}, ARMKIN_PORT names one for every command{sim}",

@@ -57,7 +57,7 @@ def moves(
     factor = 1.0 if scale is None else _bounded(scale, "--scale", (1e-6, 1e6), "from 1e-6 to 1e6")
     speed = None if feed is None else _bounded(feed, "--feed", (1e-3, LARGEST), "at least 0.001")
     height = 5.0 if lift is None else _bounded(lift, "--lift", (0.0, LARGEST), "at least 0")
-    files.keep(file)
+    files.protect_input(file)
     made = drawing(arm, file, zero, task=task, scale=factor, feed=speed, lift=height, grip_by=grip_by)
     for text in made.notes:
         output.note(text)

@@ -39,7 +39,7 @@ def exit_code(error: BaseException) -> int:
         output.error(advice.message(error), error.kind, code, error.fields, advice.next_step(error))
         return code
     if isinstance(error, ClosedPipe):
-        return _enough()
+        return _closed_pipe()
     if isinstance(error, OSError):
         return _os_error(error)
     if isinstance(error, MemoryError):
@@ -48,15 +48,15 @@ def exit_code(error: BaseException) -> int:
     return _unexpected(error)
 
 
-def no_command(name: str, rest: list[str]) -> errors.UsageError:
-    """The error of a first word that is no command, before the words `rest`."""
-    return errors.UsageError(f"there is no command '{name}'; {_other_command(name, rest)}")
+def no_command(name: str, words: list[str]) -> errors.UsageError:
+    """The error of a first word that is no command, before the words `words`."""
+    return errors.UsageError(f"there is no command '{name}'; {_other_command(name, words)}")
 
 
-def _other_command(name: str, rest: list[str]) -> str:
+def _other_command(name: str, words: list[str]) -> str:
     """What to type in place of a word that is no command."""
-    if rest and rest[0] in COMMANDS:
-        return f"the command comes first: armkin {rest[0]} {name} ..."
+    if words and words[0] in COMMANDS:
+        return f"the command comes first: armkin {words[0]} {name} ..."
     close = get_close_matches(name.lower(), COMMANDS, 1)
     return f"did you mean {close[0]}?" if close else "armkin --help lists them"
 
@@ -64,7 +64,7 @@ def _other_command(name: str, rest: list[str]) -> str:
 def _os_error(error: OSError) -> int:
     """An error of the system that nobody foresaw; of those, stdout's are the usual ones."""
     if is_closed_pipe(error):
-        return _enough()
+        return _closed_pipe()
     where = error.filename if error.filename is not None else "standard output"
     output.error(f"{where}: {error.strerror or error}", "system", RUNTIME, {"file": str(where)})
     _drop_stdout()
@@ -76,7 +76,7 @@ def is_closed_pipe(error: OSError) -> bool:
     return error.errno == errno.EPIPE or (os.name == "nt" and error.errno == errno.EINVAL)
 
 
-def _enough() -> int:
+def _closed_pipe() -> int:
     """Exit code 0 where the reader has closed the pipe, as `| head` does."""
     _drop_stdout()
     return 0
@@ -91,7 +91,7 @@ def _drop_stdout() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _meant(error: Any, context: Any) -> list[str]:
+def _similar_options(error: Any, context: Any) -> list[str]:
     """Options that a mistyped one is near to, or begins: --all for --all-branches."""
     word = getattr(error, "option_name", None)
     if not isinstance(word, str) or context is None:
@@ -108,7 +108,7 @@ def _unexpected(error: BaseException) -> int:
 
         message = str(error.format_message()).rstrip(".")
         context = getattr(error, "ctx", None)
-        if possible := _meant(error, context):
+        if possible := _similar_options(error, context):
             message = f"{str(error).rstrip('.')}; did you mean {' or '.join(possible)}?"
         if message.endswith("'ROBOT'"):
             message += ": a robot file or the name of a shipped robot (armkin robots)"

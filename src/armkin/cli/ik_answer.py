@@ -23,7 +23,7 @@ def answer_of(
     task: Task,
     values: list[float],
     goal: Array,
-    found: choose_branch.Answer,
+    chosen: choose_branch.Answer,
     all_branches: bool,
     turns: bool,
     *,
@@ -32,7 +32,7 @@ def answer_of(
 ) -> Ik:
     """The JSON of one target [mm, deg]: its branches, or the nearest pose where none is; nearest: if it is known."""
     arm = request.arm
-    listed, best = found.branches, found.best
+    listed, best = chosen.branches, chosen.best
     if not all_branches:
         listed, best = ([], None) if best is None else ([listed[best]], 0)
     head = render.head(arm)
@@ -44,36 +44,36 @@ def answer_of(
         "target": values,
         "target_labels": list(task.labels),
         "near": request.near_out,
-        "status": found.status,
-        "method": found.method,
-        "why": found.why,
-        "complete": found.complete,
+        "status": chosen.status,
+        "method": chosen.method,
+        "why": chosen.why,
+        "complete": chosen.complete,
         "joint_units": units.names(arm),
-        "branch_count": found.total,
-        "branches_within_limits": found.within_limits,
+        "branch_count": chosen.total,
+        "branches_within_limits": chosen.within_limits,
         "branches": [_branch(request, branch, turns) for branch in listed],
         "best": best,
-        "closest": _closest(request, goal, found, nearest) if best is None and with_closest else None,
-        "free_joints": found.free,
+        "closest": _closest(request, goal, chosen, nearest) if best is None and with_closest else None,
+        "free_joints": chosen.free,
     }
-    answer.update(render.given(arm))
+    answer.update(render.scene_and_tool(arm))
     if arm.keep_out:
-        answer["branches_free"] = sum(branch.may_be_taken for branch in found.branches)
+        answer["branches_free"] = sum(branch.may_be_taken for branch in chosen.branches)
     return answer
 
 
 def nearest_to(
-    request: choose_branch.Request, targets: Array, found: Sequence[choose_branch.Answer]
+    request: choose_branch.Request, targets: Array, answers: Sequence[choose_branch.Answer]
 ) -> dict[int, NearestPose]:
     """The nearest poses of those targets that no legal branch reaches, all at once."""
     from armkin.inverse import choose_branch
 
-    rows = [k for k, one in enumerate(found) if one.best is None and not one.within_limits]
+    rows = [k for k, one in enumerate(answers) if one.best is None and not one.within_limits]
     return dict(zip(rows, choose_branch.closest(request, targets[rows]), strict=True)) if rows else {}
 
 
 def _closest(
-    request: choose_branch.Request, goal: Array, found: choose_branch.Answer, nearest: NearestPose | None
+    request: choose_branch.Request, goal: Array, chosen: choose_branch.Answer, nearest: NearestPose | None
 ) -> Closest | None:
     """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for.
 
@@ -82,8 +82,8 @@ def _closest(
     from armkin.inverse import choose_branch
 
     arm = request.arm
-    if found.branches and found.branches[0].within_limits:  # only the branch asked for is outside
-        legal = found.branches[0]
+    if chosen.branches and chosen.branches[0].within_limits:  # only the branch asked for is outside
+        legal = chosen.branches[0]
         if legal.hits:
             return None
         answer: Closest = {

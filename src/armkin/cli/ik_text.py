@@ -25,7 +25,7 @@ def text(arm: Arm, answer: Ik) -> str:
             _family(branch),
             _turned(branch["residual_deg"]),
             f"outside limits: {bad}" if bad else "",
-            render.hits_said(branch),
+            render.hits_in_words(branch),
         ]
         note = "; ".join(filter(None, notes))
         rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
@@ -38,7 +38,7 @@ def text(arm: Arm, answer: Ik) -> str:
             miss += f", {turned}"
         rows.append(["", "closest", *map(fixed, nearest["joints"]), "", miss])
     last = len(headings) + 3
-    table = f"{render.table(rows, left=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
+    table = f"{render.table(rows, left_aligned=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
     return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
 
 

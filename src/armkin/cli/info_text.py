@@ -66,7 +66,7 @@ def _screws(joints: Sequence[dict[str, Any]]) -> str:
         at = f"q = {_triple(screw['q'])}" if screw["v"] is None else f"v = {_triple(screw['v'])}"
         sign = "" if joint["sign"] > 0 else "  (counts against its axis)"
         rows.append([joint["name"], _triple(screw["w"]), at + sign])
-    return table(rows, left=(0, 1, 2))
+    return table(rows, left_aligned=(0, 1, 2))
 
 
 def _triple(values: Sequence[float]) -> str:
@@ -102,7 +102,7 @@ def _ranges(answer: Mapping[str, Any]) -> str:
         )
     if not any(row[-1] for row in rows[1:]):
         rows = [row[:-1] for row in rows]
-    return table(rows, left=(0, 5, 6))
+    return table(rows, left_aligned=(0, 5, 6))
 
 
 def _poses(answer: Mapping[str, Any]) -> str:
@@ -133,7 +133,7 @@ def _steppers(answer: Mapping[str, Any]) -> str:
                     _remarks(motor),
                 ]
             )
-    return table(rows, left=(0, 1, 8, 9)) if len(rows) > 1 else ""
+    return table(rows, left_aligned=(0, 1, 8, 9)) if len(rows) > 1 else ""
 
 
 def _remarks(motor: dict[str, Any]) -> str:
@@ -156,7 +156,7 @@ def _servos(answer: Mapping[str, Any]) -> str:
                     "inverted" if motor["invert"] else "",
                 ]
             )
-    return table(rows, left=(0, 1, 6)) if len(rows) > 1 else ""
+    return table(rows, left_aligned=(0, 1, 6)) if len(rows) > 1 else ""
 
 
 def _bus_servos(answer: Mapping[str, Any]) -> str:
@@ -166,7 +166,7 @@ def _bus_servos(answer: Mapping[str, Any]) -> str:
             figures = (short(motor["zero"]), short(motor["pulses_per_unit"]))
             way = "inverted" if motor["invert"] else ""
             rows.append([motor["name"], str(motor["id"]), str(motor["counts"]), *figures, way])
-    return table(rows, left=(0, 5)) if len(rows) > 1 else ""
+    return table(rows, left_aligned=(0, 5)) if len(rows) > 1 else ""
 
 
 def _matrix(answer: Mapping[str, Any]) -> str:
@@ -225,7 +225,7 @@ def _keep_outs(answer: Mapping[str, Any]) -> str:
         from armkin.keep_out.clearance import hits_text
 
         lines.append(wrapped(hits_text(answer["hits_at_home"]), "  at home  ", " " * 11))
-    return "\n".join([table(rows, left=(0, 2)), "", *lines])
+    return "\n".join([table(rows, left_aligned=(0, 2)), "", *lines])
 
 
 def _lacks(lacks: dict[str, list[str]], add: list[str]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.cli import arguments, output, render
 from armkin.errors import UsageError
-from armkin.files import keep
+from armkin.files import protect_input
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def record(
 
     arm = board.arm
     q = None if pose is None else units.joints_in(arm, arguments.joint_list(arm, pose, "--pose"))
-    keep(path)
+    protect_input(path)
     try:
         found = board.calibration(path, q)
     except UsageError as error:
@@ -78,4 +78,4 @@ def _table(arm: Arm, found: Any) -> str:
     if found.gripper is not None and found.gripper_ends is not None and arm.gripper is not None:
         ends = "open {:.3f}, closed {:.3f}".format(*found.gripper_ends)
         rows.append(["gripper", f"{found.gripper.middle:g}", f"{arm.gripper.zero:g}", ends, ""])
-    return render.table(rows, left=(0, 4))
+    return render.table(rows, left_aligned=(0, 4))

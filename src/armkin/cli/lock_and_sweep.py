@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli.number_parsing import number, whole
+from armkin.cli.number_parsing import number, whole_number
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -50,18 +50,18 @@ def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> 
         if len(parts) != 3:
             raise UsageError(f"--sweep {text}: write {_RANGE}")
         low, high = number(parts[0], f"--sweep {name}"), number(parts[1], f"--sweep {name}")
-        count = whole(parts[2], f"--sweep {name}: count", 1, MOST_SWEEPS)
+        count = whole_number(parts[2], f"--sweep {name}: count", 1, MOST_SWEEPS)
         found[name] = [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
     return found
 
 
-def _named(arm: Arm, text: str, option: str, example: str, taken: dict[str, Any]) -> tuple[str, str]:
+def _named(arm: Arm, text: str, option: str, example: str, given_joints: dict[str, Any]) -> tuple[str, str]:
     from armkin.model.lock import joint_index
 
     name, equals, value = text.partition("=")
     if not equals:
         raise UsageError(f"{option} {text}: write {example}")
     joint_index(arm, name)
-    if name in taken:
+    if name in given_joints:
         raise UsageError(f"{option} {text}: {name} is held already")
     return name, value

@@ -25,7 +25,7 @@ def number(text: str, name: str, largest: float = LARGEST) -> float:
     if len(plain) > _LONGEST:
         raise UsageError(f"{name}: '{shown}' is too long for a number", argument=name, value=shown)
     if not _NUMBER.fullmatch(plain):
-        raise UsageError(f"{name}: {_why_not(plain, shown)}", argument=name, value=shown)
+        raise UsageError(f"{name}: {_refusal_reason(plain, shown)}", argument=name, value=shown)
     value = float(plain)
     if abs(value) > largest:
         message = f"{name}: '{shown}' is too large; numbers here go up to {largest:g}"
@@ -48,45 +48,45 @@ def is_number(text: str) -> bool:
     return _NUMBER.fullmatch(text.strip()) is not None
 
 
-def numbers(words: Sequence[str], names: Sequence[str], what: str) -> list[float]:
-    """One number a name; what: who wants them, for the message about a wrong count.
+def numbers(words: Sequence[str], names: Sequence[str], purpose: str) -> list[float]:
+    """One number a name; purpose: who wants them, for the message about a wrong count.
 
     >>> numbers(["390", "80"], ["x", "y"], "task xy")
     [390.0, 80.0]
     """
     if len(words) != len(names):
         raise UsageError(
-            f"{what} takes {len(names)} number{'s' if len(names) != 1 else ''} ({' '.join(names)}), "
+            f"{purpose} takes {len(names)} number{'s' if len(names) != 1 else ''} ({' '.join(names)}), "
             f"got {len(words)}{_separator_hint(words, names)}",
-            argument=what,
+            argument=purpose,
             names=list(names),
             got=len(words),
         )
     return [number(word, name) for word, name in zip(words, names, strict=True)]
 
 
-def comma_separated(text: str, names: Sequence[str], what: str) -> list[float]:
+def comma_separated(text: str, names: Sequence[str], purpose: str) -> list[float]:
     """Comma-separated numbers, as options take them: ``--near 0,90,-90``."""
     words = text.split(",")
     if len(words) == 1 and len(names) > 1 and len(text.split()) == len(names):
-        raise UsageError(f"{what}: separate the numbers with commas: {','.join(text.split())}")
+        raise UsageError(f"{purpose}: separate the numbers with commas: {','.join(text.split())}")
     if len(words) == len(names):
-        names = [f"{what}: {name}" for name in names]
+        names = [f"{purpose}: {name}" for name in names]
     elif len(words) == 1:
         example = ",".join([text.strip() or "0", *["0"] * (len(names) - 1)])
         raise UsageError(
-            f"{what} takes {len(names)} numbers ({' '.join(names)}) with commas and no spaces, as {example}; got 1"
+            f"{purpose} takes {len(names)} numbers ({' '.join(names)}) with commas and no spaces, as {example}; got 1"
         )
-    return numbers(words, names, what)
+    return numbers(words, names, purpose)
 
 
-def place(text: str, what: str) -> list[float]:
+def place(text: str, purpose: str) -> list[float]:
     """``X,Y,Z``, or with roll, pitch and yaw, as options take them: three numbers or six [mm, deg]."""
     names = ("x", "y", "z", "roll", "pitch", "yaw")
-    return comma_separated(text, names[: 6 if text.count(",") > 2 else 3], what)
+    return comma_separated(text, names[: 6 if text.count(",") > 2 else 3], purpose)
 
 
-def whole(text: str, name: str, low: int, high: int) -> int:
+def whole_number(text: str, name: str, low: int, high: int) -> int:
     """A whole number within bounds."""
     value = number(text, name, float("inf"))
     if not low <= value <= high or value != int(value):
@@ -96,23 +96,23 @@ def whole(text: str, name: str, low: int, high: int) -> int:
     return int(value)
 
 
-def _why_not(plain: str, shown: str) -> str:
-    bare = plain.lower().lstrip("+-")
+def _refusal_reason(number: str, shown: str) -> str:
+    bare = number.lower().lstrip("+-")
     if not bare:
         return "a number is missing"
     if bare in NOT_FINITE:
         return f"'{shown}' is not finite; give a number"
     for unit in ("mm", "degrees", "deg", "\u00b0", "%"):
         if bare.endswith(unit) and _NUMBER.fullmatch(bare.removesuffix(unit).strip()):
-            value = plain[: -len(unit)].strip()
+            value = number[: -len(unit)].strip()
             fixed = f"units are fixed (mm, degrees); write {value}"
             return f"'{shown}': {f'write {value}, without a sign for its unit' if unit == '%' else fixed}"
-    if (angle := of_pi(plain)) is not None:
+    if (angle := of_pi(number)) is not None:
         return f"'{shown}': angles are degrees; write {angle:.10g}"
-    if _NUMBER.fullmatch(plain.rstrip(",")):
-        return f"'{shown}' ends with a comma; write {plain.rstrip(',')}"
-    if plain.count(",") == 1 and _NUMBER.fullmatch(plain.replace(",", ".")):
-        return f"'{shown}' is not a number; write {plain.replace(',', '.')} with a point"
+    if _NUMBER.fullmatch(number.rstrip(",")):
+        return f"'{shown}' ends with a comma; write {number.rstrip(',')}"
+    if number.count(",") == 1 and _NUMBER.fullmatch(number.replace(",", ".")):
+        return f"'{shown}' is not a number; write {number.replace(',', '.')} with a point"
     return f"'{shown}' is not a number"
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from armkin.cli import completion, output
-from armkin.cli.number_parsing import whole
+from armkin.cli.number_parsing import whole_number
 
 Robot = Annotated[
     str,
@@ -70,7 +70,7 @@ def _out(what: str, *allowed: str) -> Any:
         if path:
             from armkin import files
 
-            files.ending(path, what, allowed, bare=True)
+            files.ending(path, what, allowed, may_lack=True)
         return path
 
     return typer.Option(
@@ -145,7 +145,7 @@ Compiled = Annotated[
 
 
 def _workers(text: str) -> int:
-    return whole(text, "--workers", 1, 1000)
+    return whole_number(text, "--workers", 1, 1000)
 
 
 Workers = Annotated[

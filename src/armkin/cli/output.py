@@ -17,7 +17,7 @@ _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warning
 
 
 @contextmanager
-def destination(path: str | None, what: str = "", endings: Sequence[str] = ()) -> Iterator[Write]:
+def destination(path: str | None, content: str = "", endings: Sequence[str] = ()) -> Iterator[Write]:
     """The function that writes a command's data: to stdout ("-"), or to a file that appears whole or not at all.
 
     what, endings: what is written, and how the file's name may end (`files.ending`), where no option has checked it.
@@ -29,9 +29,9 @@ def destination(path: str | None, what: str = "", endings: Sequence[str] = ()) -
     if path is not None and path != "-":
         from armkin import files
 
-        with files.whole(path) as file:
+        with files.write_whole(path) as file:
             if endings:
-                files.ending(path, what, endings, bare=True)
+                files.ending(path, content, endings, may_lack=True)
             yield file.write
     elif sys.stdout is None:
         raise FileError("standard output is closed; give --out FILE or open it")
@@ -39,17 +39,17 @@ def destination(path: str | None, what: str = "", endings: Sequence[str] = ()) -
         yield sys.stdout.write
 
 
-def check(path: str | None, what: str, *endings: str) -> None:
+def check(path: str | None, content: str, *endings: str) -> None:
     """Raise before long work what `destination` would of a file's name, or that it does not end as what is written."""
     if path not in (None, "", "-"):
         from armkin import files
 
         files.check(path)
-        files.ending(path, what, endings, bare=True)
+        files.ending(path, content, endings, may_lack=True)
 
 
 @contextmanager
-def beside(path: str | None) -> Iterator[Write]:
+def answer_stream(path: str | None) -> Iterator[Write]:
     """Where a command's answer goes while other data goes to `path`: stderr if that is stdout ("-")."""
     if path == "-" and sys.stderr is not None:
         yield sys.stderr.write
@@ -86,9 +86,9 @@ def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | N
 
     message: as people read it, with the advice in it; fields: what it is about.
     """
-    message = _whole(message)
+    message = _without_breaks(message)
     if _waiting is None:
-        _say("error", message)
+        _print_message("error", message)
         return
     import json
 
@@ -110,30 +110,30 @@ def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | N
 def flush() -> None:
     """Say what has waited: the command had no error."""
     for word, message in _waiting or ():
-        _say(word, message)
+        _print_message(word, message)
     for_programs(False)
 
 
 def _one_line(message: str, word: str) -> str:
     """A message for programs; what is a line of its own for people follows a semicolon, or a sentence's end."""
-    lines = [_plain(line.strip(), _LONGEST[word]) for line in message.splitlines() if line.strip()]
+    lines = [_printable(line.strip(), _LONGEST[word]) for line in message.splitlines() if line.strip()]
     text = "".join(lines[:1])
     for line in lines[1:]:
         text += f" {line}" if text[-1] in ".?!;:" else f"; {line}"
     return text
 
 
-def _whole(message: str) -> str:
+def _without_breaks(message: str) -> str:
     """A message whose quoted words have no line breaks of their own."""
     for word in _broken:
-        message = message.replace(word, _plain(word, len(word) * 10))
+        message = message.replace(word, _printable(word, len(word) * 10))
     return message
 
 
 def _later(word: str, message: str) -> None:
-    message = _whole(message)
+    message = _without_breaks(message)
     if _waiting is None:
-        _say(word, message)
+        _print_message(word, message)
     else:
         _waiting.append((word, message))
 
@@ -149,12 +149,12 @@ def _plain_values(value: Any) -> Any:
     return value if isinstance(value, str | int | bool | None) else str(value)
 
 
-def _say(word: str, message: str) -> None:
+def _print_message(word: str, message: str) -> None:
     if sys.stderr is None:
         return
     head = f"\x1b[{_COLOURS[word]}m{word}:\x1b[0m" if _coloured(sys.stderr) else f"{word}:"
     # A file's name may hold anything: two lines of printable text, whatever it is.
-    lines = [_plain(line, _LONGEST[word]) for line in message.splitlines() if line.strip()]
+    lines = [_printable(line, _LONGEST[word]) for line in message.splitlines() if line.strip()]
     text = "\n".join(f"{head} {line}" if i == 0 else f"  {line}" for i, line in enumerate(lines))
     _print(text)
 
@@ -164,7 +164,7 @@ def _print(text: str) -> None:
         print(text.encode("utf-8", "backslashreplace").decode(), file=sys.stderr, flush=True)
 
 
-def _plain(line: str, most: int) -> str:
+def _printable(line: str, most: int) -> str:
     """Without control characters, which a terminal would obey, and not longer than people read."""
     text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
     return text if len(text) <= most else f"{text[: most - 90]} ... {text[-80:]}"
@@ -181,7 +181,7 @@ class Tick(Protocol):
 
 
 @contextmanager
-def progress(what: str, total: int | Callable[[], int | None] | None = None) -> Iterator[Tick]:
+def progress(task: str, total: int | Callable[[], int | None] | None = None) -> Iterator[Tick]:
     """A bar with rate and time left on stderr, or a counter without a total, if that is a terminal.
 
     Call it with the count so far; 0 starts the clock anew, where what came before is not the counted work.
@@ -205,9 +205,9 @@ def progress(what: str, total: int | Callable[[], int | None] | None = None) -> 
             return
         last = now
         if shown is None:
-            from armkin.cli.progress_bar import begun
+            from armkin.cli.progress_bar import start_bar
 
-            shown = begun(what)
+            shown = start_bar(task)
         shown.tell(done, known, now - began)
 
     try:

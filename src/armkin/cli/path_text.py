@@ -10,34 +10,34 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
 
 
-def text(plan: PathPlan, found: dict[str, Any]) -> str:
+def text(plan: PathPlan, answer: dict[str, Any]) -> str:
     """The plan for people."""
-    parts = [_heads(plan, found)]
-    if found["branches"]:
+    parts = [_heads(plan, answer)]
+    if answer["branches"]:
         rows = [["branch at the start", "carries/mm", ""]]
-        rows += [[b["name"] or "unnamed", f"{b['carries_mm']:.3f}", b["ends_because"]] for b in found["branches"]]
-        parts.append(["", render.table(rows, left=(0, 2))])
-    if "clearance" in found:
-        parts.append([_clearance_text(found["clearance"])])
-    if found["limits"] is not None:
-        parts.append(_close_to_limits(plan, found))
+        rows += [[b["name"] or "unnamed", f"{b['carries_mm']:.3f}", b["ends_because"]] for b in answer["branches"]]
+        parts.append(["", render.table(rows, left_aligned=(0, 2))])
+    if "clearance" in answer:
+        parts.append([_clearance_text(answer["clearance"])])
+    if answer["limits"] is not None:
+        parts.append(_close_to_limits(plan, answer))
     return "\n".join(line for part in parts for line in part) + "\n"
 
 
-def _heads(plan: PathPlan, found: dict[str, Any]) -> list[str]:
+def _heads(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     """How long it is and takes, what is held, and which branch carries which part of it."""
     from armkin.motion.branch_report import words
 
-    lines = [f"{plan.arm.name}: {found['length_mm']:.3f} mm of path"]
-    if found["duration_s"] is not None:
-        lines[0] += f", {found['duration_s']:.3f} s"
-        if found["segments"] is not None:
-            lines[0] += f", {found['segments']} segments"
-        if "approach" in found:
-            lines.append(f"  before it {found['approach']['duration_s']:.3f} s from where the arm stands to its start")
+    lines = [f"{plan.arm.name}: {answer['length_mm']:.3f} mm of path"]
+    if answer["duration_s"] is not None:
+        lines[0] += f", {answer['duration_s']:.3f} s"
+        if answer["segments"] is not None:
+            lines[0] += f", {answer['segments']} segments"
+        if "approach" in answer:
+            lines.append(f"  before it {answer['approach']['duration_s']:.3f} s from where the arm stands to its start")
     if plan.held:
-        lines.append(f"  held: {', '.join(f'{name} at {value:.4g}' for name, value in found['held'].items())}")
-    for run in found["runs"]:
+        lines.append(f"  held: {', '.join(f'{name} at {value:.4g}' for name, value in answer['held'].items())}")
+    for run in answer["runs"]:
         names = ", then ".join(
             f"{one['name'] or 'unnamed'}" + (f" from {one['s_mm']:.3f}" if k else "")
             for k, one in enumerate(run["branches"])
@@ -56,14 +56,14 @@ def _clearance_text(near: dict[str, Any]) -> str:
     return f"  at {near['s_mm']:.3f} mm: {near['body']} nearest to {near['with']}, {size}"
 
 
-def _close_to_limits(plan: PathPlan, found: dict[str, Any]) -> list[str]:
+def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     """What it takes of the joints' limits, how near it comes to a singularity and to the path, what was changed."""
     from armkin.motion.branch_report import closeness, passes
 
     rows = [["share of", *plan.arm.joint_names]]
-    rows += [[key, *(f"{100 * share:.1f} %" for share in each.values())] for key, each in found["limits"].items()]
+    rows += [[key, *(f"{100 * share:.1f} %" for share in each.values())] for key, each in answer["limits"].items()]
     lines = ["", render.table(rows), ""]
-    worst = found["nearest_singularity"]
+    worst = answer["nearest_singularity"]
     if worst is not None:
         size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
         lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")

@@ -13,17 +13,17 @@ _WIDTH = 10  # of the bar: with counts in millions the time left, at the end, st
 class Bar:
     """One line that is drawn anew, and gone at the end."""
 
-    def __init__(self, what: str, console: Console) -> None:
-        self.what = what
+    def __init__(self, task: str, console: Console) -> None:
+        self.task = task
         columns = (BarColumn(_WIDTH), TextColumn("{task.fields[progress_text]}"))
         self._drawn = Progress(*columns, console=console, auto_refresh=False, transient=True)
         self._task: TaskID = self._drawn.add_task("", total=None, progress_text="")
         self._drawn.start()
 
-    def tell(self, done: int, total: int | None, seconds: float) -> None:
+    def update(self, done: int, total: int | None, seconds: float) -> None:
         """So many are done, of so many, after so long."""
         self._drawn.update(
-            self._task, completed=done, total=total, progress_text=progress_text(self.what, done, total, seconds)
+            self._task, completed=done, total=total, progress_text=progress_text(self.task, done, total, seconds)
         )
         self._drawn.refresh()
 
@@ -32,12 +32,12 @@ class Bar:
         self._drawn.stop()
 
 
-def begun(what: str) -> Bar:
+def start_bar(task: str) -> Bar:
     """A bar on stderr."""
-    return Bar(what, Console(file=sys.stderr, highlight=False))
+    return Bar(task, Console(file=sys.stderr, highlight=False))
 
 
-def progress_text(what: str, done: int, total: int | None, seconds: float) -> str:
+def progress_text(task: str, done: int, total: int | None, seconds: float) -> str:
     """Count, rate and time left in words.
 
     >>> progress_text("rows", 250_000, 1_000_000, 5.0)
@@ -47,9 +47,9 @@ def progress_text(what: str, done: int, total: int | None, seconds: float) -> st
     """
     rate = done / max(seconds, 1e-3)
     if not total:
-        return f"{done:,} {what}, {rate:,.0f}/s, {_clock(seconds)}"
+        return f"{done:,} {task}, {rate:,.0f}/s, {_clock(seconds)}"
     left = f", {_clock((total - done) / rate)} left" if 0 < done <= total else ""
-    return f"{100 * done // total} %  {done:,} of {total:,} {what}, {rate:,.0f}/s{left}"
+    return f"{100 * done // total} %  {done:,} of {total:,} {task}, {rate:,.0f}/s{left}"
 
 
 def _clock(seconds: float) -> str:

@@ -19,11 +19,11 @@ _TERMINAL = 80  # columns
 def head(arm: Arm) -> Head:
     """What every JSON object begins with: the robot, its file as given and the file's hash; the scene's, too."""
     found: Head = {"robot": arm.name, "robot_file": arm.path, "robot_sha256": arm.sha256}
-    found.update(given(arm))
+    found.update(scene_and_tool(arm))
     return found
 
 
-def given(arm: Arm) -> Any:
+def scene_and_tool(arm: Arm) -> Any:
     """The keys of an answer that was made in a scene, or with another tool than the robot file's; none without."""
     found: dict[str, Any] = {"scene": arm.scene, "scene_sha256": arm.scene_sha256} if arm.scene else {}
     if arm.tool is not None:
@@ -50,13 +50,13 @@ def near_by(arm: Arm, q: Array) -> list[Any]:
     return [{"clearance_mm": mm, "hits": hit} for mm, hit in hits(arm, q)]
 
 
-def hits_said(found: Mapping[str, Any]) -> str:
+def hits_in_words(answer: Mapping[str, Any]) -> str:
     """Hits in words: ``hits table by 12.3 mm (q3)``; nothing where there are none."""
-    if not found.get("hits"):
+    if not answer.get("hits"):
         return ""
     from armkin.keep_out.clearance import hits_text
 
-    return hits_text(found["hits"])
+    return hits_text(answer["hits"])
 
 
 def violation(arm: Arm, joint: int, value: float) -> Violation:
@@ -95,8 +95,8 @@ def short(value: float) -> str:
     return f"{value:.10g}" if value else "0"
 
 
-def table(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,), indent: str = "  ") -> str:
-    """Aligned columns, two spaces apart; left: columns that align left, the others right.
+def table(rows: Sequence[Sequence[str]], left_aligned: Sequence[int] = (0,), indent: str = "  ") -> str:
+    """Aligned columns, two spaces apart; left_aligned: columns that align left, the others right.
 
     >>> print(table([["", "x", "y"], ["elbow", "110.053", "7.5"]]))
                  x    y
@@ -106,7 +106,7 @@ def table(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,), indent: str
     lines = []
     for row in rows:
         cells = [
-            cell.ljust(width) if i in left else cell.rjust(width)
+            cell.ljust(width) if i in left_aligned else cell.rjust(width)
             for i, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
         lines.append((indent + "  ".join(cells)).rstrip())
@@ -130,11 +130,11 @@ def pose_line(arm: Arm, values: Sequence[float]) -> str:
     return f"{arm.name}: {labelled(arm.joint_names, values, units.names(arm))}"
 
 
-def wrapped(text: str, first: str = "", rest: str = "") -> str:
-    """Running text in lines of a page's width; first, rest: what the first and the other lines begin with."""
+def wrapped(text: str, first: str = "", indent: str = "") -> str:
+    """Running text in lines of a page's width; first, indent: what the first and the other lines begin with."""
     from textwrap import fill
 
-    return fill(" ".join(text.split()), 90, initial_indent=first, subsequent_indent=rest)
+    return fill(" ".join(text.split()), 90, initial_indent=first, subsequent_indent=indent)
 
 
 def labelled(names: Sequence[str], values: Sequence[float], each_unit: Sequence[str]) -> str:
@@ -151,9 +151,9 @@ def joint_headings(arm: Arm) -> list[str]:
     return [f"{name}/{unit}" for name, unit in zip(arm.joint_names, units.names(arm), strict=True)]
 
 
-def warn_of_limits(arm: Arm, found: list[Violation], near: Mapping[str, Any] | None = None) -> None:
+def warn_of_limits(arm: Arm, violations: list[Violation], near: Mapping[str, Any] | None = None) -> None:
     """Say which joints of a pose are outside their limits, and what it hits."""
-    if found:
-        output.warn("; ".join(violation_text(arm, violation) for violation in found))
-    if near is not None and (words := hits_said(near)):
+    if violations:
+        output.warn("; ".join(violation_text(arm, violation) for violation in violations))
+    if near is not None and (words := hits_in_words(near)):
         output.warn(f"this pose {words}")

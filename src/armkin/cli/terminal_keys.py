@@ -24,7 +24,7 @@ class Keys:
     def __init__(self, poll: Callable[[float], str]) -> None:
         """poll: the next key that comes within so many seconds, else an empty text."""
         self._poll = poll
-        self._other = ""  # a key that came while another one was held
+        self._next_key = ""  # a key that came while another one was held
 
     def say(self, text: str) -> None:
         """A line to read."""
@@ -32,9 +32,9 @@ class Keys:
 
     def key(self) -> str:
         """The next key: a character, ``+`` and ``-`` also for arrows, a line feed for Enter."""
-        while not self._other:
-            self._other = self._poll(0.5)
-        found, self._other = self._other, ""
+        while not self._next_key:
+            self._next_key = self._poll(0.5)
+        found, self._next_key = self._next_key, ""
         return found
 
     def ask(self, question: str, answers: str) -> str:
@@ -49,7 +49,7 @@ class Keys:
         """Whether a key is still held, asked again and again; None if it was pressed and let go at once."""
         found = self._poll(_BEGINS)
         if found != key:
-            self._other = found
+            self._next_key = found
             return None
         last = time.monotonic()
 
@@ -59,14 +59,14 @@ class Keys:
             if found == key:
                 last = time.monotonic()
             elif found:
-                self._other = found
+                self._next_key = found
             return found in ("", key) and time.monotonic() - last < _AGAIN
 
         return more
 
     def _quiet(self) -> None:
         """Wait until no key comes: one that was held until now answers nothing."""
-        self._other = ""
+        self._next_key = ""
         while self._poll(_AGAIN):
             pass
 

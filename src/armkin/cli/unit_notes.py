@@ -52,12 +52,12 @@ def _is_turn(angle: float) -> bool:
     return any(abs(abs(angle) - turn) < 1e-3 for turn in _TURNS)
 
 
-def joint_values(arm: Arm, values: Sequence[float], what: str = "joint values") -> None:
-    """Joint values that are all below pi, with digits after the point; what: where they stand."""
+def joint_values(arm: Arm, values: Sequence[float], source: str = "joint values") -> None:
+    """Joint values that are all below pi, with digits after the point; source: where they stand."""
     turning = [value for value, sliding in zip(values, arm.prismatic, strict=True) if not sliding]
     if not turning or max(map(abs, turning)) > _RADIANS or not any(_has_digits(value) for value in turning):
         return
-    output.note(f"{what} are degrees, and these look like radians ({', '.join(f'{value:g}' for value in values)})")
+    output.note(f"{source} are degrees, and these look like radians ({', '.join(f'{value:g}' for value in values)})")
 
 
 def target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> None:

@@ -19,7 +19,7 @@ class Format:
 
     name: str
     encoded: Callable[..., bytes]
-    together: Callable[[IO[bytes], Source], None]
+    write_parts: Callable[[IO[bytes], Source], None]
     is_text: bool = False
 
 
@@ -31,8 +31,8 @@ def _joined(file: IO[bytes], parts: Source) -> None:
 CSV = Format("csv", csv_and_json_lines.csv, _joined, is_text=True)
 JSON_LINES = Format("jsonl", csv_and_json_lines.json_lines, _joined, is_text=True)
 _BY_ENDING = {
-    ".npz": Format("npz", npz.encoded, npz.together),
-    ".parquet": Format("parquet", parquet.encoded, parquet.together),
+    ".npz": Format("npz", npz.encoded, npz.write_parts),
+    ".parquet": Format("parquet", parquet.encoded, parquet.write_parts),
     ".jsonl": JSON_LINES,
     ".csv": CSV,
     "": CSV,
@@ -48,4 +48,4 @@ def format_of(path: str | None) -> Format:
     >>> format_of("poses.npz").name, format_of("-").name
     ('npz', 'csv')
     """
-    return CSV if path is None else _BY_ENDING[ending(path, "rows are", ENDINGS, bare=True)]
+    return CSV if path is None else _BY_ENDING[ending(path, "rows are", ENDINGS, may_lack=True)]

@@ -39,11 +39,11 @@ def columns(
     request: choose_branch.Request,
     targets: Array,
     rows: NDArray[np.integer],
-    every: bool,
+    all_branches: bool,
     quick: Callable[..., tuple[NDArray[np.intp], Array] | None] | None = None,
     **more: Any,
 ) -> Listed:
-    """The columns of ik: targets (N, ...) [mm, rad], rows (N,) their numbers; every: all branches, not the best alone.
+    """The columns of ik: targets (N, ...) [mm, rad], rows (N,) their numbers; all_branches: not the best alone.
 
     more: of `armkin.ik`. The request sweeps no joint. quick: `nearest` by machine code, None where it does not serve.
     """
@@ -58,7 +58,7 @@ def columns(
     free = within & s.clear if arm.keep_out else within
     names = () if request.branch is None else find(s.names, request.branch)
     parts = [
-        _listed(request, _Found(s, slice(i, i + BLOCK), q, within, free, near, names), rows, every, quick)
+        _listed(request, _Found(s, slice(i, i + BLOCK), q, within, free, near, names), rows, all_branches, quick)
         for i in range(0, max(len(q), 1), BLOCK)
     ]
     return Listed(joined([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
@@ -71,22 +71,22 @@ class _Found(NamedTuple):
     """
 
     s: Solutions
-    some: slice
+    rows: slice
     q: Array
-    within: Bool
+    within_limits: Bool
     free: Bool
     near: Array
     names: Sequence[int]
 
 
 def _listed(
-    request: choose_branch.Request, found: _Found, rows: NDArray[np.integer], every: bool, quick: Any
+    request: choose_branch.Request, answers: _Found, rows: NDArray[np.integer], all_branches: bool, quick: Any
 ) -> Listed:
-    s, some, scale = found.s, found.some, units.scale(request.arm)
-    q, within, free, valid = found.q[some], found.within[some], found.free[some], s.valid[some]
-    wanted = free if request.branch is None else free & np.isin(s.branch[some], found.names)
-    if every:
-        unsolved, motion = ~_any(wanted), _motion(q, found.near, scale)
+    s, some, scale = answers.s, answers.rows, units.scale(request.arm)
+    q, within, free, valid = answers.q[some], answers.within_limits[some], answers.free[some], s.valid[some]
+    wanted = free if request.branch is None else free & np.isin(s.branch[some], answers.names)
+    if all_branches:
+        unsolved, motion = ~_any_column(wanted), _motion(q, answers.near, scale)
         key = np.where(valid, motion.round(EQUAL), np.inf)
         count = valid.sum(axis=1)
         lines = np.maximum(count, 1)
@@ -96,7 +96,7 @@ def _listed(
         branch = _ranked(key, valid, within, free)[target[there], place[there]]
         motion = motion[target[there], branch]
     else:
-        best, motion = (quick and quick(q, wanted, found.near, scale)) or nearest(q, wanted, found.near, scale)
+        best, motion = (quick and quick(q, wanted, answers.near, scale)) or nearest(q, wanted, answers.near, scale)
         target, there = np.arange(len(best)), best >= 0
         unsolved, branch, motion = ~there, best[there], motion[there]
     chosen = target[there], branch
@@ -104,19 +104,19 @@ def _listed(
     return Listed(_table(request, s, rows[some], some, values), unsolved)
 
 
-def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
+def nearest(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
     """The branch (N,) of q (N, B, n) that moves the joints least of those wanted (N, B), -1 if none is; and how far.
 
     Motions are sums of |change| from near (n,), each joint by its scale (n,); to `EQUAL` decimals the first one counts.
     """
-    there, motion = _any(wanted), _motion(q, near, scale)
+    there, motion = _any_column(candidates), _motion(q, near, scale)
     if not q.shape[1]:
         return np.full(len(q), -1), np.full(len(q), np.nan)
-    branch = np.where(wanted, motion.round(EQUAL), np.inf).argmin(axis=1)
+    branch = np.where(candidates, motion.round(EQUAL), np.inf).argmin(axis=1)
     return np.where(there, branch, -1), motion[np.arange(len(q)), branch]
 
 
-def _any(flags: Bool) -> Bool:
+def _any_column(flags: Bool) -> Bool:
     """``flags.any(axis=1)`` of a few columns, column by column, which is quicker."""
     found = np.zeros(len(flags), bool)
     for column in flags.T:
@@ -124,12 +124,12 @@ def _any(flags: Bool) -> Bool:
     return found
 
 
-def _ranked(key: Array, valid: Bool, within: Bool, free: Bool) -> NDArray[np.intp]:
+def _ranked(key: Array, valid: Bool, within_limits: Bool, free: Bool) -> NDArray[np.intp]:
     """Branches (N, B) in the order in which they are listed: free, with hits, outside limits; equal ones as found."""
     rank = np.argsort(key, axis=1, kind="stable")
     other = np.flatnonzero((free != valid).any(axis=1))
     if len(other):
-        k, v, w, f = key[other], valid[other], within[other], free[other]
+        k, v, w, f = key[other], valid[other], within_limits[other], free[other]
         rank[other] = np.lexsort((k, w & ~f, ~w, ~v), axis=-1)
     return rank
 
@@ -158,46 +158,46 @@ def _sum(values: Array) -> Array:
 
 
 class _Lines(NamedTuple):
-    """Lines (L,), of the targets `of`, with K of them a branch: which are `there`, and what the branches are."""
+    """Lines (L,), of the targets `line_target`, with K of them a branch: `has_branch`, and what the branches are."""
 
-    of: NDArray[np.intp]  # (L,)
-    there: Bool  # (L,)
+    line_target: NDArray[np.intp]  # (L,)
+    has_branch: Bool  # (L,)
     q: Array  # (K, n)
-    within: Bool  # (K,)
+    within_limits: Bool  # (K,)
     motion: Array  # (K,)
     target: NDArray[np.intp]  # (K,)
     branch: NDArray[np.intp]  # (K,)
 
 
 def _table(
-    request: choose_branch.Request, s: Solutions, rows: NDArray[np.integer], some: slice, lines: _Lines
+    request: choose_branch.Request, s: Solutions, rows: NDArray[np.integer], rows_of_part: slice, lines: _Lines
 ) -> Table:
     """One line for each target, or branch of it, with numbers where there is a branch."""
-    there, every = lines.there, bool(lines.there.all())
-    mm, rad = _missed(request, s, some, lines)
+    there, every = lines.has_branch, bool(lines.has_branch.all())
+    mm, rad = _missed(request, s, rows_of_part, lines)
     names = tuple(name.replace(",", "") for name in s.names)  # so that `cut` sees one column
     label = np.full(len(there), -1)
-    label[there] = s.branch[some][lines.target, lines.branch]
+    label[there] = s.branch[rows_of_part][lines.target, lines.branch]
     table: Table = {
-        "row": rows[lines.of],
-        "status": Words(s.status[some][lines.of], _STATUS),
+        "row": rows[lines.line_target],
+        "status": Words(s.status[rows_of_part][lines.line_target], _STATUS),
         "branch": Words(label, names),
     }
     joints = np.ascontiguousarray(units.joints_out(request.arm, lines.q).T)
     legal = np.zeros(len(there), bool)
-    legal[there] = lines.within
+    legal[there] = lines.within_limits
     table |= dict(zip(request.arm.joint_names, joints, strict=True)) | {"within_limits": legal}
     table |= {"residual_mm": mm, "residual_deg": units.angles_out(rad), "motion": lines.motion}
     if every:
         return table
     numbers = (*request.arm.joint_names, "residual_mm", "residual_deg", "motion")
-    return table | {name: _spread(np.asarray(table[name]), there) for name in numbers}
+    return table | {name: _with_gaps(np.asarray(table[name]), there) for name in numbers}
 
 
-def _missed(request: choose_branch.Request, s: Solutions, some: slice, lines: _Lines) -> tuple[Array, Array]:
+def _missed(request: choose_branch.Request, s: Solutions, part: slice, lines: _Lines) -> tuple[Array, Array]:
     """What some branches miss: (K,) [mm] and (K,) [rad]."""
-    q = s.q[some][lines.target, lines.branch] if request.held else lines.q
-    target = s.target[some] if len(q) == len(lines.there) == len(s.target[some]) else s.target[some][lines.target]
+    q = s.q[part][lines.target, lines.branch] if request.held else lines.q
+    target = s.target[part] if len(q) == len(lines.has_branch) == len(s.target[part]) else s.target[part][lines.target]
     missing = residual(s.task, request.fk(s.arm, q), q, target)
     p = s.task.position
     return _norm(missing[:, :p]), _norm(missing[:, p:])
@@ -211,8 +211,8 @@ def _norm(values: Array) -> Array:
     return np.asarray(np.sqrt(total))
 
 
-def _spread(values: Array, there: Bool) -> Array:
-    """Values where they are `there`, nan elsewhere."""
-    out = np.full(len(there), np.nan)
-    out[there] = values
+def _with_gaps(values: Array, present: Bool) -> Array:
+    """Values where they are `present`, nan elsewhere."""
+    out = np.full(len(present), np.nan)
+    out[present] = values
     return out

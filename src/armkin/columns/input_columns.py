@@ -32,7 +32,7 @@ def places(heading: Sequence[str], name: str) -> list[int]:
     return exact or [i for i, cell in enumerate(heading) if cell in others]
 
 
-def _chosen(path: str, heading: Sequence[str], names: Sequence[str]) -> list[str]:
+def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str]) -> list[str]:
     """The file's names of the columns wanted."""
     lower = [cell.lower() for cell in heading]
     found = {name: places(lower, name.lower()) for name in names}
@@ -51,7 +51,7 @@ def _npz(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
         with ExitStack() as stack:
             archive = stack.enter_context(zipfile.ZipFile(path))
             heading = [name.removesuffix(".npy") for name in archive.namelist()]
-            files = [stack.enter_context(archive.open(f"{name}.npy")) for name in _chosen(path, heading, names)]
+            files = [stack.enter_context(archive.open(f"{name}.npy")) for name in _wanted_names(path, heading, names)]
             heads = [_head(path, name, file) for name, file in zip(names, files, strict=True)]
             if len({count for count, _ in heads}) > 1:
                 raise UsageError(f"{path}: its columns are not of one length")
@@ -81,7 +81,7 @@ def _parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
     pa = parquet.require()
     try:
         file = pa.parquet.ParquetFile(path)
-        chosen = _chosen(path, file.schema_arrow.names, names)
+        chosen = _wanted_names(path, file.schema_arrow.names, names)
         for batch in file.iter_batches(batch_size=rows, columns=chosen):
             columns = [batch.column(name) for name in chosen]
             for name, column in zip(chosen, columns, strict=True):
@@ -101,7 +101,7 @@ def _json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
                 table = []
                 for number, line in lines:
                     row = _object(path, number, line)
-                    chosen = chosen or _chosen(path, list(row), names)
+                    chosen = chosen or _wanted_names(path, list(row), names)
                     table.append([_number(path, number, name, row.get(name)) for name in chosen])
                 yield np.array(table, dtype=float)
     except (OSError, UnicodeDecodeError) as error:

@@ -17,7 +17,7 @@ class _Kept(NamedTuple):
     """A column of a part: where its numbers begin in the file, how many, of which type; words: they are indices."""
 
     name: str
-    at: int
+    offset: int
     rows: int
     dtype: np.dtype[Any]
     words: tuple[str, ...] | None
@@ -29,13 +29,13 @@ class _Kept(NamedTuple):
 
     def read(self, part: IO[bytes]) -> Column:
         """Its values."""
-        part.seek(self.at)
+        part.seek(self.offset)
         values = np.frombuffer(part.read(self.rows * self.dtype.itemsize), self.dtype)
         return values if self.words is None else Words(values, self.words)
 
 
 def encoded(table: Table) -> bytes:
-    """A table as a part: a line of JSON about its columns, then their numbers; `together` makes an .npz of parts."""
+    """A table as a part: a line of JSON about its columns, then their numbers; `write_parts` makes an .npz of parts."""
     each = [(column.index, column.names) if isinstance(column, Words) else (column, None) for column in table.values()]
     head = [[name, len(v), v.dtype.str, words] for name, (v, words) in zip(table, each, strict=True)]
     return b"".join([json.dumps(head).encode(), b"\n", *(np.ascontiguousarray(values).data for values, _ in each)])
@@ -47,7 +47,7 @@ def decoded(data: bytes) -> Table:
     return {one.name: one.read(part) for one in _columns(part)}
 
 
-def together(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
+def write_parts(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
     """One .npz of several, column by column: memory does not grow with their number."""
     heads = [_columns(part) for part in parts()]
     with zipfile.ZipFile(file, "w") as whole:

@@ -21,7 +21,7 @@ def require() -> Any:
 
 
 def encoded(table: Table) -> bytes:
-    """A table as the bytes of an Arrow stream, which `together` makes a row group of."""
+    """A table as the bytes of an Arrow stream, which `write_parts` makes a row group of."""
     pa = require()
     whole = pa.table({name: _array(pa, column) for name, column in table.items()})
     out = io.BytesIO()
@@ -30,7 +30,7 @@ def encoded(table: Table) -> bytes:
     return out.getvalue()
 
 
-def together(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
+def write_parts(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
     """One Parquet file, a row group a part."""
     pa = require()
     writer = None

@@ -34,10 +34,10 @@ def rows(table: Table) -> int:
     return len(next(iter(table.values()))) if table else 0
 
 
-def part(table: Table, some: slice) -> Table:
+def part(table: Table, rows: slice) -> Table:
     """Some rows of a table."""
     return {
-        name: Words(column.index[some], column.names) if isinstance(column, Words) else column[some]
+        name: Words(column.index[rows], column.names) if isinstance(column, Words) else column[rows]
         for name, column in table.items()
     }
 

@@ -26,11 +26,11 @@ class Results:
 
     def __init__(self, N: int, B: int, n: int) -> None:
         self.N, self.B, self.n = N, B, n
-        self._take(max(B, ROOM) if 8 * N * max(B, 1) * n > MOVABLE else B)
+        self._allocate(max(B, ROOM) if 8 * N * max(B, 1) * n > MOVABLE else B)
         self.status, self.state = np.zeros(N, np.int8), np.empty(N, np.uint8)
         self.free, self.complete = np.zeros((N, n), bool), np.ones(N, bool)
 
-    def _take(self, room: int) -> None:
+    def _allocate(self, room: int) -> None:
         """Memory for that many columns."""
         N, n = self.N, self.n
         self._room = room
@@ -54,7 +54,7 @@ class Results:
         before = self.B
         self.B = B
         if self._room < B:
-            self._take(2 * B)
+            self._allocate(2 * B)
         else:
             self._shape()
         new: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
@@ -66,16 +66,16 @@ class Results:
                 wide[start : start + BLOCK, :before] = rows
                 wide[start : start + BLOCK, before:] = none
 
-    def write(self, rows: slice | NDArray[np.intp], found: Results | Solutions) -> None:
+    def write(self, rows: slice | NDArray[np.intp], answers: Results | Solutions) -> None:
         """Some rows, which may have more columns than there are."""
-        within = found.within if isinstance(found, Results) else found.within_limits
-        B = found.q.shape[-2]
+        within = answers.within if isinstance(answers, Results) else answers.within_limits
+        B = answers.q.shape[-2]
         self.widen(B)
-        self.q[rows, :B], self.q[rows, B:] = found.q, math.nan
-        self.valid[rows, :B], self.valid[rows, B:] = found.valid, False
+        self.q[rows, :B], self.q[rows, B:] = answers.q, math.nan
+        self.valid[rows, :B], self.valid[rows, B:] = answers.valid, False
         self.within[rows, :B], self.within[rows, B:] = within, False
-        self.branch[rows, :B], self.branch[rows, B:] = found.branch, -1
-        self.status[rows], self.free[rows], self.complete[rows] = found.status, found.free, found.complete
+        self.branch[rows, :B], self.branch[rows, B:] = answers.branch, -1
+        self.status[rows], self.free[rows], self.complete[rows] = answers.status, answers.free, answers.complete
 
     def narrow(self) -> None:
         """Leave columns away that no target needs; a copy."""

@@ -76,11 +76,11 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         "lanes": str(LANES),
     }
     parts = [_part("head"), c_program.settings(), _fast_numbers()]
-    parts += [c_functions.forward_kinematics(commanded), _of_joints("Poses", "arm_pose", 16)]
-    parts += [c_functions.position(commanded), _of_joints("Positions of the tool", "arm_point", 3)]
+    parts += [c_functions.forward_kinematics(commanded), _joint_loop("Poses", "arm_pose", 16)]
+    parts += [c_functions.position(commanded), _joint_loop("Positions of the tool", "arm_point", 3)]
     if commanded.keep_out and commanded.whole is None:
         parts += [keep_out_tables.clearances(commanded), _part("clearances")]
-        parts += [_of_joints("Least clearances and their pairs", "arm_clearance", 2)]
+        parts += [_joint_loop("Least clearances and their pairs", "arm_clearance", 2)]
     if branches:
         assert task is not None
         accepted = ACCEPTED**2
@@ -180,9 +180,9 @@ def _part(name: str) -> str:
     return (PARTS / f"{name}.c").read_text(encoding="utf-8")
 
 
-def _of_joints(what: str, formula: str, size: int) -> str:
+def _joint_loop(content: str, formula: str, size: int) -> str:
     """A loop over a batch of joint values."""
-    return c_program.filled(_part("joint_batches"), {"what": what, "formula": formula, "size": str(size)})
+    return c_program.filled(_part("joint_batches"), {"what": content, "formula": formula, "size": str(size)})
 
 
 def _fast_numbers() -> str:
@@ -199,15 +199,15 @@ def _choose(arm: Arm, branches: int) -> str:
         at = f"q[(b * {arm.n} + {j}) * ARM_LANES + i]"
         close = f"near[{j} * ARM_LANES + i]"
         if arm.prismatic[j]:
-            loops.append(_every(f"in[i] &= ({at} >= {lower} - ARM_SLACK) & ({at} <= {upper} + ARM_SLACK);"))
+            loops.append(_in_every_lane(f"in[i] &= ({at} >= {lower} - ARM_SLACK) & ({at} <= {upper} + ARM_SLACK);"))
             continue
-        copied = _every(f"{at} = arm_copy({at}, {close}, {lower}, {upper}, &in[i]);")
+        copied = _in_every_lane(f"{at} = arm_copy({at}, {close}, {lower}, {upper}, &in[i]);")
         if arm.lower[j] >= -math.pi and arm.upper[j] <= math.pi:
             loops.append(copied)
             continue
         # all that is within half a turn of `near` is legal, as a rule: the nearest copy is one
-        turned = _every(f"{at} = arm_nearest({at}, {close});")
-        positive = _every(f"{at} = arm_principal({at});")
+        turned = _in_every_lane(f"{at} = arm_nearest({at}, {close});")
+        positive = _in_every_lane(f"{at} = arm_principal({at});")
         wide = f"arm_wide(near + {j} * ARM_LANES, {lower}, {upper}, count)"
         choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, turned, positive), strict=True)
         loops.append(f"wide = {wide};\n" + " ".join(f"{when} {{\n{loop}\n}}" for when, loop in choices))
@@ -228,5 +228,5 @@ static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, 
 """
 
 
-def _every(line: str) -> str:
+def _in_every_lane(line: str) -> str:
     return f"for (i = 0; i < count; i++)\n    {line}"

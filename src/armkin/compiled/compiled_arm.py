@@ -68,7 +68,7 @@ def compile(arm: Arm, task: str | None = None) -> CompiledArm:
     np.int64(4)
     """
     found = _compiled(arm)
-    found._of(task)
+    found._library_for(task)
     return found
 
 
@@ -102,7 +102,7 @@ class CompiledArm:
         Returns:
             (..., 4, 4) [mm] homogeneous transforms.
         """
-        return self._any().joint_functions.fk(q, workers)
+        return self._any_library().joint_functions.fk(q, workers)
 
     def position(self, q: ArrayLike, *, workers: int = 1) -> Array:
         """Position of the tool alone.
@@ -114,7 +114,7 @@ class CompiledArm:
         Returns:
             (..., 3) [mm] x, y, z.
         """
-        return self._any().joint_functions.position(q, workers)
+        return self._any_library().joint_functions.position(q, workers)
 
     def clearance(self, q: ArrayLike) -> Clearance:
         """How far the arm is from hitting anything, as `armkin.clearance`.
@@ -125,7 +125,7 @@ class CompiledArm:
         Returns:
             The least distances (...) [mm] and the names of the pairs that have them.
         """
-        return self._any().joint_functions.clearance(q)
+        return self._any_library().joint_functions.clearance(q)
 
     def ik(
         self,
@@ -151,13 +151,13 @@ class CompiledArm:
         """
         if workers != 1:
             check(workers)
-        return (self._tasks.get(task) or self._of(task)).ik(targets, near, workers, rounding)
+        return (self._tasks.get(task) or self._library_for(task)).ik(targets, near, workers, rounding)
 
-    def _any(self) -> _CompiledTask:
+    def _any_library(self) -> _CompiledTask:
         """A library: each has the chain, whatever its task."""
         return next(iter(self._tasks.values()))
 
-    def _of(self, task: str | None) -> _CompiledTask:
+    def _library_for(self, task: str | None) -> _CompiledTask:
         """The library for a task, built at its first use."""
         found = self._tasks.get(task)
         if found is None:

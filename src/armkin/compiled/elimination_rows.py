@@ -26,10 +26,10 @@ class InC:
     """A class whose rows come from `arm_rows` of parts/elimination_rows.c; what that does not settle, from Python."""
 
     def __init__(
-        self, geometry: Geometry, plain: Geometry, call: Callable[..., Any], branches: int, joints: int
+        self, geometry: Geometry, unnamed: Geometry, call: Callable[..., Any], branches: int, joints: int
     ) -> None:
-        """plain: the elimination without names; branches, joints: those that a row of C has room for."""
-        self._complete, self._slow = plain.complete, geometry.unmoved or plain.rows
+        """unnamed: the elimination without names; branches, joints: those that a row of C has room for."""
+        self._complete, self._slow = unnamed.complete, geometry.unmoved or unnamed.rows
         self._call, self._shape = call, (branches, joints)
         rows = named(self._rows, geometry) if geometry.places else self._rows
         self.geometry = replace(geometry, rows=rows, unmoved=None)

@@ -19,13 +19,13 @@ SOURCE = Path(__file__).parent / "parts" / "least_motion.c"
 MOST = 7  # joints that numpy adds up from left to right
 
 
-def nearest(q: Array, wanted: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
+def nearest(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
     """See `armkin.columns.ik_columns.nearest`; None for more joints than are added up one after the other."""
     N, B, n = q.shape
     if n > MOST:
         return None
     branch, motion, away = np.empty(N, np.int64), np.full(N, np.nan), np.empty(B * n)
-    inputs = np.ascontiguousarray(q), np.ascontiguousarray(wanted), np.tile(near, B), np.tile(scale, B), away
+    inputs = np.ascontiguousarray(q), np.ascontiguousarray(candidates), np.tile(near, B), np.tile(scale, B), away
     pointers = (one.ctypes.data for one in inputs)
     _library()(N, B, n, *pointers, 10.0**EQUAL, branch.ctypes.data, motion.ctypes.data)
     return branch, motion

@@ -38,15 +38,15 @@ class Single:
         shape: tuple[int, ...],
         home: Array,
         branches: int,
-        same: dict[str, Any],
+        shared_fields: dict[str, Any],
         names: Callable[[int], tuple[str, ...]] | None,
     ) -> None:
-        """call: takes a block's address; shape: of a target; same: fields that all solutions share.
+        """call: takes a block's address; shape: of a target; shared_fields: fields that all solutions share.
 
         names: of that many branches, for classes that list no more rows than a target has branches; else None.
         """
         self._call, self._shape, self._home, self._names = call, shape, home, names
-        self._same = same | {"rounding": _fixed(0.0), "complete": _fixed(same["complete"])}
+        self._shared_fields = shared_fields | {"rounding": _fixed(0.0), "complete": _fixed(shared_fields["complete"])}
         self._n, self._branches = len(home), branches
         self._cuts: dict[int, tuple[Any, ...]] = {}
         self._local = threading.local()
@@ -64,14 +64,14 @@ class Single:
         self._local.block = parts
         return parts
 
-    def _cut(self, rows: int) -> tuple[Any, ...]:
+    def _split_block(self, rows: int) -> tuple[Any, ...]:
         """Of that many branches: where q, valid, within, branch and free stand, and the fields that do not differ.
 
         q's shape follows its place.
         """
         n, B, at = self._n, self._branches, self._bytes
         masks = [slice(start, start + rows) for start in (at, at + B, at + 2 * B)]
-        same = self._same if self._names is None else {**self._same, "names": self._names(rows)}
+        same = self._shared_fields if self._names is None else {**self._shared_fields, "names": self._names(rows)}
         self._cuts[rows] = slice(0, rows * n), (rows, n), *masks, slice(at + 3 * B, at + 3 * B + n), same
         return self._cuts[rows]
 
@@ -94,7 +94,7 @@ class Single:
         flags, rows = found.view(_FLAGS), self._branches
         if self._names is not None:
             rows = int(flags[self._bytes : self._bytes + rows].sum())
-        q, shape, valid, within, branch, free, same = self._cuts.get(rows) or self._cut(rows)
+        q, shape, valid, within, branch, free, same = self._cuts.get(rows) or self._split_block(rows)
         out = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one, for two microseconds
         out.__dict__.update(
             same,

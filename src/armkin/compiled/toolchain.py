@@ -79,15 +79,15 @@ def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
         day = [] if way == level else [str(int(time.time() // _DAY))]
         key = "\0".join([source, *command, _version(command[0]), _processor(), *day])
         commands[name := hashlib.sha256(key.encode()).hexdigest()] = command
-        if folder is not None and (found := _kept(folder, name, content)) is not None:
+        if folder is not None and (found := _stored_library(folder, name, content)) is not None:
             return found
     announce()
     try:
         with tempfile.TemporaryDirectory(prefix="armkin-") as own:
             built, name = _build(commands, source, Path(own))
             if folder is not None:
-                _keep(built, folder, name)
-                if (found := _kept(folder, name, content)) is not None:
+                _store(built, folder, name)
+                if (found := _stored_library(folder, name, content)) is not None:
                     return found
             return ctypes.CDLL(str(built))
     except OSError as error:  # a full disk, a folder from which nothing may be run
@@ -128,7 +128,7 @@ def _run(
         raise MissingExtraError(f"the C compiler {words[0]} cannot be run: {error.strerror or error}") from None
 
 
-def _keep(built: Path, folder: Path, name: str) -> None:
+def _store(built: Path, folder: Path, name: str) -> None:
     """Put a library into the cache, whole; a full disk keeps nothing."""
     held = built.read_bytes()
     with suppress(OSError):
@@ -143,8 +143,8 @@ def _keep(built: Path, folder: Path, name: str) -> None:
             raise
 
 
-def _digest(held: bytes) -> str:
-    return hashlib.sha256(held).hexdigest()[:32]
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:32]
 
 
 def _folder() -> Path | None:
@@ -164,16 +164,16 @@ def _folder() -> Path | None:
     return folder if own and os.access(folder, os.W_OK) else None
 
 
-def _is_ours(path: Path, alone: bool = True) -> bool:
-    """Whether a file or folder is no link, belongs to this user (or, not `alone`, to root), and others cannot write."""
-    status = os.lstat(path) if alone else os.stat(path)
+def _is_ours(path: Path, only_user: bool = True) -> bool:
+    """Whether a file or folder is no link, belongs to this user (not `only_user`: or to root); no other can write."""
+    status = os.lstat(path) if only_user else os.stat(path)
     if sys.platform == "win32":  # a user's own folders are closed to others
         return not stat.S_ISLNK(status.st_mode)
-    owner = status.st_uid == os.geteuid() or (not alone and status.st_uid == 0)
+    owner = status.st_uid == os.geteuid() or (not only_user and status.st_uid == 0)
     return owner and not stat.S_ISLNK(status.st_mode) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _kept(folder: Path, name: str, content: str) -> ctypes.CDLL | None:
+def _stored_library(folder: Path, name: str, content: str) -> ctypes.CDLL | None:
     """A library of the cache, if it may be loaded and is what it should be."""
     for library in folder.glob(f"{name}-*.so"):
         try:

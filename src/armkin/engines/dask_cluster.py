@@ -47,7 +47,7 @@ def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> I
             threads = sum(client.nthreads().values()) if not waiting else 0
             window = max(AHEAD * threads, 2, len(waiting))
             while len(waiting) < window and (some := next(source, waiting)) is not waiting:
-                waiting.append(client.submit(_done, data, name, some, pure=False))
+                waiting.append(client.submit(_run_chunk, data, name, some, pure=False))
             if not waiting:
                 return
             result = waiting.popleft().result()
@@ -58,7 +58,7 @@ def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> I
         yield result
         # one out, one in: the window stays full
         with suppress(StopIteration):
-            waiting.append(client.submit(_done, data, name, next(source), pure=False))
+            waiting.append(client.submit(_run_chunk, data, name, next(source), pure=False))
 
 
 def _lost(client: Any, address: str, error: Exception) -> ClusterError:
@@ -101,8 +101,8 @@ def _check_reached(address: str) -> None:
         raise _no_scheduler(address, why) from None
 
 
-def _no_scheduler(address: str, why: str) -> ClusterError:
-    return ClusterError(f"{address}: no scheduler answers ({why}); start one with: dask scheduler", address=address)
+def _no_scheduler(address: str, reason: str) -> ClusterError:
+    return ClusterError(f"{address}: no scheduler answers ({reason}); start one with: dask scheduler", address=address)
 
 
 def _check_workers(client: Any, address: str) -> None:
@@ -133,7 +133,7 @@ def versions() -> dict[str, str]:
     return {"armkin": __version__, "numpy": numpy.__version__, "Python": platform.python_version().rpartition(".")[0]}
 
 
-def _done(data: bytes, name: str, chunk: Any) -> Any:
+def _run_chunk(data: bytes, name: str, chunk: Any) -> Any:
     work, job = _unpacked(_Packed(data, name))
     return work(job, chunk)
 

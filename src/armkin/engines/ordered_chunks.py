@@ -18,7 +18,7 @@ class Engine(NamedTuple):
     cluster: str | None = None
 
     @property
-    def alone(self) -> bool:
+    def in_process(self) -> bool:
         """Whether all is done in this process."""
         return self.workers == 1 and self.cluster is None
 

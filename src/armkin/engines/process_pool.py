@@ -72,7 +72,7 @@ def _threads() -> int:
 def _submitted(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
     """A chunk given to the pool; of one that is broken already, a future that says so, as those given before do."""
     try:
-        return pool.submit(_done, chunk)
+        return pool.submit(_run_chunk, chunk)
     except BrokenProcessPool as error:
         lost: Future[Any] = Future()
         lost.set_exception(error)
@@ -96,7 +96,7 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _done(chunk: Any) -> Any:
+def _run_chunk(chunk: Any) -> Any:
     assert _job is not None
     work, job = _job
     return work(job, chunk)

@@ -181,16 +181,16 @@ def _degrees(angle: float) -> float:
 
 
 def _file(
-    arm: Arm, convention: str, rows: list[dict[str, Any]], base: Array, tool: Array, more: dict[str, Any]
+    arm: Arm, convention: str, rows: list[dict[str, Any]], base: Array, tool: Array, keys: dict[str, Any]
 ) -> dict[str, Any]:
     """A robot file with these rows, and all else as it was."""
-    head, joints, rest = _kept(arm)
+    head, joints, rest = _unchanged_parts(arm)
     data: dict[str, Any] = {**head, "convention": convention}
     for key, frame in (("base", base), ("tool", tool)):
         if np.abs(frame - np.eye(4)).max() > 1e-15:
             data[key] = pose(frame.tolist())
     order = ("name", "type")
-    data |= more | {
+    data |= keys | {
         "joints": [
             {k: old[k] for k in order if k in old} | row | {k: v for k, v in old.items() if k not in order}
             for old, row in zip(joints, rows, strict=True)
@@ -200,7 +200,7 @@ def _file(
     return _same_pitch(arm, data)
 
 
-def _kept(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
+def _unchanged_parts(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
     """What a change of convention leaves alone: the file's head, the joints without geometry, and the rest."""
     if arm.file is None:
         return {"name": arm.name}, _joints_without_a_file(arm), {}

@@ -50,7 +50,9 @@ def urdf(arm: Arm) -> str:
     ]
     for i, name in enumerate(arm.joint_names):
         lines += _joint(turned, i, name, links[i], links[i + 1])
-        lines += _link(links[i + 1], [_hub(float(form.at[i]), radius), *_body(form.bodies[i + 1], radius * 0.85)])
+        lines += _link(
+            links[i + 1], [_hub(float(form.joint_offsets[i]), radius), *_body(form.bodies[i + 1], radius * 0.85)]
+        )
     tool = _free("tool", tuple(links))
     lines += [
         f'  <joint name="{_free("tool_joint", arm.joint_names)}" type="fixed">',
@@ -68,8 +70,8 @@ def _comment(arm: Arm) -> str:
     return text.replace("--", "- -").replace("\n", " ")
 
 
-def _free(name: str, taken: tuple[str, ...]) -> str:
-    while name in taken:
+def _free(name: str, used: tuple[str, ...]) -> str:
+    while name in used:
         name += "_"
     return name
 
@@ -113,10 +115,10 @@ def _body(corners: Array, radius: float) -> list[list[str]]:
     return [_piece(start, end, radius) for start, end in pairwise(corners)]
 
 
-def _hub(at: float, radius: float) -> list[str]:
-    """A joint: a short cylinder about its axis, `at` [mm] along it."""
+def _hub(offset: float, radius: float) -> list[str]:
+    """A joint: a short cylinder about its axis, `offset` [mm] along it."""
     size = f'<cylinder radius="{_size(radius)}" length="{_size(2.2 * radius)}"/>'
-    return _visual("joint", f'<origin xyz="0 0 {_size(at)}" rpy="0 0 0"/>', size)
+    return _visual("joint", f'<origin xyz="0 0 {_size(offset)}" rpy="0 0 0"/>', size)
 
 
 def _piece(start: Array, end: Array, radius: float) -> list[str]:

@@ -35,22 +35,22 @@ class Stk500v1:
         """The chip's three bytes."""
         return self._ask(bytes([_SIGNATURE]), 3)
 
-    def write(self, at: int, data: bytes) -> None:
+    def write(self, address: int, data: bytes) -> None:
         """A page (up to `page` bytes) at an address in bytes."""
-        self._go_to(at)
+        self._go_to(address)
         self._ask(bytes([_WRITE, *len(data).to_bytes(2, "big"), ord("F")]) + data)
 
-    def read(self, at: int, count: int) -> bytes:
+    def read(self, address: int, count: int) -> bytes:
         """Bytes of the flash."""
-        self._go_to(at)
+        self._go_to(address)
         return self._ask(bytes([_READ, *count.to_bytes(2, "big"), ord("F")]), count)
 
     def leave(self) -> None:
         """Start the program."""
         self._ask(bytes([_LEAVE]))
 
-    def _go_to(self, at: int) -> None:
-        self._ask(bytes([_ADDRESS, *(at // 2).to_bytes(2, "little")]))
+    def _go_to(self, address: int) -> None:
+        self._ask(bytes([_ADDRESS, *(address // 2).to_bytes(2, "little")]))
 
     def _ask(self, request: bytes, count: int = 0) -> bytes:
         self._port.write(request + bytes([_END]))

@@ -40,22 +40,22 @@ class Stk500v2:
         """The chip's three bytes."""
         return b"".join(self._ask(bytes([_SIGNATURE, 4, 0x30, 0, i, 0]))[:1] for i in range(3))
 
-    def write(self, at: int, data: bytes) -> None:
+    def write(self, address: int, data: bytes) -> None:
         """A page (up to `page` bytes) at an address in bytes."""
-        self._go_to(at)
+        self._go_to(address)
         self._ask(bytes([_WRITE, *len(data).to_bytes(2, "big"), 0xC1, 10, 0x40, 0x4C, 0x20, 0, 0]) + data)
 
-    def read(self, at: int, count: int) -> bytes:
+    def read(self, address: int, count: int) -> bytes:
         """Bytes of the flash."""
-        self._go_to(at)
+        self._go_to(address)
         return self._ask(bytes([_READ, *count.to_bytes(2, "big"), 0x20]))[:count]
 
     def leave(self) -> None:
         """Start the program."""
         self._ask(bytes([_LEAVE, 1, 1]))
 
-    def _go_to(self, at: int) -> None:
-        words = at // 2 | (_BEYOND_64K if at >= 1 << 16 else 0)
+    def _go_to(self, address: int) -> None:
+        words = address // 2 | (_BEYOND_64K if address >= 1 << 16 else 0)
         self._ask(bytes([_ADDRESS, *words.to_bytes(4, "big")]))
 
     def _ask(self, body: bytes, timeout: float = _ANSWER) -> bytes:

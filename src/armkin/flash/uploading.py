@@ -66,9 +66,9 @@ def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> Fl
         try:
             avrdude.write(program, chip, port, baud, image.path, lambda share: tick(round(share * total), total))
         except LinkError as error:
-            raise _cut(str(error), "some") from None
+            raise _interrupted(str(error), "some") from None
         tick(total, total)
-    return Flashed(port, len(flash), "avrdude" if program else "armkin", _asked(image.kind, port))
+    return Flashed(port, len(flash), "avrdude" if program else "armkin", _answered_version(image.kind, port))
 
 
 def _loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
@@ -128,12 +128,12 @@ def _write(loader: Loader, flash: bytes, tick: Tick) -> None:
             tick(len(flash) + min(at + size, len(flash)), 2 * len(flash))
         loader.leave()
     except (LinkError, KeyboardInterrupt) as error:
-        raise _cut(str(error) or "stopped", f"{at}") from None
+        raise _interrupted(str(error) or "stopped", f"{at}") from None
 
 
-def _cut(reason: str, done: str) -> LinkError:
+def _interrupted(reason: str, progress: str) -> LinkError:
     return LinkError(
-        f"{reason.splitlines()[0]}: {done} bytes were written, so that the board has no whole program now\n"
+        f"{reason.splitlines()[0]}: {progress} bytes were written, so that the board has no whole program now\n"
         "its boot loader stays: the same command writes it again"
     )
 
@@ -150,12 +150,12 @@ def _to_boot_drive(image: Image, port: str, tick: Tick) -> Flashed:
     while time.monotonic() < end:
         new = [found.device for found in list_ports() if found.device == port or found.device not in before]
         if new:
-            return Flashed(new[0], len(image.data), "UF2", _asked(image.kind, new[0]))
+            return Flashed(new[0], len(image.data), "UF2", _answered_version(image.kind, new[0]))
         time.sleep(0.1)
     return Flashed(None, len(image.data), "UF2", None)
 
 
-def _asked(kind: str, port: str) -> str:
+def _answered_version(kind: str, port: str) -> str:
     """The firmware's version, of the board that was meant. Raises LinkError for another one, or none."""
     link = SerialPort(port)
     try:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 Columns = TypeVar("Columns")  # a named tuple of arrays
 
 
-def rows_of(columns: Columns, which: NDArray[Any] | slice) -> Columns:
+def rows_of(columns: Columns, rows: NDArray[Any] | slice) -> Columns:
     """Some rows: by indices, flags or as a slice."""
     each: Any = columns
-    out: Columns = each._make(column[which] for column in each)
+    out: Columns = each._make(column[rows] for column in each)
     return out
 
 

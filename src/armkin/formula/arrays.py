@@ -61,8 +61,8 @@ flip: Callable[[Entry, int], Entry] = _numpy.flip
 CHUNK = 8000  # poses worked on at once: long enough to hide the calls, short enough for a processor's cache
 
 
-def real(values: ArrayLike, what: str) -> Array:
-    """Values from outside as an array of floats; what: their name, for the message.
+def real(values: ArrayLike, name: str) -> Array:
+    """Values from outside as an array of floats; name: their name, for the message.
 
     Raises UsageError for text, dates, complex numbers and lists of unequal lengths. nan and infinity pass.
     """
@@ -75,7 +75,7 @@ def real(values: ArrayLike, what: str) -> Array:
         found = f"an array of {array.dtype}"
     except (TypeError, ValueError):
         found = type(values).__name__
-    raise UsageError(f"{what}: expected an array of real numbers, got {found}")
+    raise UsageError(f"{name}: expected an array of real numbers, got {found}")
 
 
 def is_single(values: ArrayLike) -> bool:

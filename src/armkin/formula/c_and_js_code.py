@@ -113,7 +113,7 @@ class _Writer:
     def __init__(self, language: Language) -> None:
         self.language = language
         self.lines: list[str] = []
-        self.known: dict[tuple[Any, ...], Value] = {}
+        self.values_by_key: dict[tuple[Any, ...], Value] = {}
 
     def constant(self, value: float) -> Value:
         """A number, its sign apart."""
@@ -169,13 +169,13 @@ class _Writer:
     def emit(self, op: str, args: list[Value]) -> Value:
         """A new variable for an operation, or the one that holds it."""
         key = (op, *args)
-        if key not in self.known:
+        if key not in self.values_by_key:
             name = f"t{len(self.lines)}"
             kind = self.language.boolean if op in BOOLEAN else self.language.real
             plain = [f"({x})" if x.minus and k else str(x) for k, x in enumerate(args)]
             self.lines.append(f"{kind} {name} = {self.language.operations[op].format(*plain)};")
-            self.known[key] = Value(name)
-        return self.known[key]
+            self.values_by_key[key] = Value(name)
+        return self.values_by_key[key]
 
 
 def _flipped(x: Value, minus: bool) -> Value:

@@ -30,7 +30,7 @@ class Buffer(NamedTuple):
 
     axes: tuple[int, ...]
     dtype: type
-    whole: int = -1
+    full_index: int = -1
     part: Place = ()
 
 
@@ -48,7 +48,7 @@ class _Buffers:
     def __init__(self, recording: Recording) -> None:
         self.names = {id(node): f"i{k}" for k, node in enumerate(recording.inputs)}
         self.constants: dict[str, Any] = {}
-        self.all: list[Buffer] = []
+        self.buffers: list[Buffer] = []
         self._kinds: dict[int, tuple[tuple[int, ...], type]] = {}
         self._free: dict[tuple[tuple[int, ...], type], list[str]] = {}
         self._parts: dict[tuple[str, str], str] = {}
@@ -69,8 +69,8 @@ class _Buffers:
         if all(isinstance(k, slice) for k in place):
             return whole
         if (whole, str(place)) not in self._parts:
-            self._parts[whole, str(place)] = f"b{len(self.all)}"
-            self.all.append(Buffer(*self._kinds[id(x)], int(whole[1:]), place))
+            self._parts[whole, str(place)] = f"b{len(self.buffers)}"
+            self.buffers.append(Buffer(*self._kinds[id(x)], int(whole[1:]), place))
         return self._parts[whole, str(place)]
 
     def take(self, node: Node) -> None:
@@ -79,8 +79,8 @@ class _Buffers:
         if self._free.get(kind):
             self.names[id(node)] = self._free[kind].pop()
         else:
-            self.names[id(node)] = f"b{len(self.all)}"
-            self.all.append(Buffer(*kind))
+            self.names[id(node)] = f"b{len(self.buffers)}"
+            self.buffers.append(Buffer(*kind))
 
     def release(self, nodes: list[Node]) -> None:
         """Those of these values are free again."""
@@ -115,14 +115,14 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
         arguments = [buffers.name(x) for x in node.args] if signed is None else []
         buffers.take_over(node, [x for x in reads[k] if x.op != "input" and last[id(x)] == k])
         lines += [_call(buffers, node, arguments)] if signed is None else _halves(buffers, node, signed)
-    parameters = [buffers.names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers.all))]
+    parameters = [buffers.names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers.buffers))]
     outputs = list(map(buffers.name, recording.outputs))
-    return function_of(parameters, lines, outputs, buffers.constants | _functions(recording, scalar)), buffers.all
+    return function_of(parameters, lines, outputs, buffers.constants | _functions(recording, scalar)), buffers.buffers
 
 
 def _functions(recording: Recording, scalar: bool) -> dict[str, Any]:
     """What the written lines call, by name; scalar: see `write`."""
-    found: dict[str, Any] = {"where": _where, "add": np.add, "subtract": np.subtract, "positive": np.positive}
+    found: dict[str, Any] = {"where": _where_into, "add": np.add, "subtract": np.subtract, "positive": np.positive}
     found |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
     if scalar:
         found |= {op: partial(_one_by_one, function) for op, function in _ROUNDED.items()}
@@ -181,7 +181,7 @@ def _flip(axis: int, a: Any, out: NDArray[Any]) -> None:
     np.copyto(out, np.flip(a, axis))
 
 
-def _where(mask: Any, a: Any, b: Any, out: NDArray[Any]) -> None:
+def _where_into(mask: Any, a: Any, b: Any, out: NDArray[Any]) -> None:
     """`numpy.where` into a buffer, which may be that of a or b."""
     np.copyto(out, np.where(mask, a, b))
 

@@ -68,7 +68,7 @@ class Trace:
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
-        self.known: dict[tuple[Any, ...], Node] = {}
+        self.nodes_by_key: dict[tuple[Any, ...], Node] = {}
 
     def simplify(self, op: str, inputs: Sequence[Any]) -> Any:
         """Record an operation, or what is equal to it and shorter: no zeros, no ones, signs moved outwards.
@@ -155,11 +155,11 @@ class Trace:
         if op in COMMUTING and _place(inputs[0]) > _place(inputs[1]):
             inputs = inputs[::-1]  # equal ones have equal keys: constants first, then what was recorded first
         key = (op, *[id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs])
-        found = self.known.get(key)
+        found = self.nodes_by_key.get(key)
         if found is None:
             shapes = {axes_of(x) for x in inputs} - {()}
             axes = np.broadcast_shapes(*shapes) if len(shapes) > 1 else next(iter(shapes), ())
-            found = self.known[key] = Node(self, op, tuple(inputs), axes, len(self.nodes))
+            found = self.nodes_by_key[key] = Node(self, op, tuple(inputs), axes, len(self.nodes))
             self.nodes.append(found)
         return found
 
@@ -233,10 +233,10 @@ def record(formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> Record
     trace = Trace()
     symbols = [Node(trace, "input", (), (), k - inputs) for k in range(inputs)]
     outputs = list(formula(list(symbols)))
-    return Recording(symbols, outputs, _needed(trace.nodes, outputs))
+    return Recording(symbols, outputs, _live_nodes(trace.nodes, outputs))
 
 
-def _needed(nodes: list[Node], outputs: Sequence[Any]) -> list[Node]:
+def _live_nodes(nodes: list[Node], outputs: Sequence[Any]) -> list[Node]:
     """The operations that the outputs depend on, in order."""
     needed = {id(x) for x in outputs if isinstance(x, Node)}
     for node in reversed(nodes):

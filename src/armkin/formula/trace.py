@@ -33,11 +33,11 @@ class StraightLineCode:
         self._batch: tuple[numpy_code.Run, list[numpy_code.Buffer]] | None = None
         self._exact: tuple[numpy_code.Run, list[numpy_code.Buffer]] | None = None
         self._run_single: Callable[..., tuple[Any, ...]] | None = None
-        self._kept = threading.local()
+        self._thread_buffers = threading.local()
 
     def at_once(self) -> int:
         """How many poses are worked on at once: fewer than `CHUNK` where buffers of so many would leave the cache."""
-        each = sum(math.prod(b.axes) * np.dtype(b.dtype).itemsize for b in self._written()[1] if b.whole < 0)
+        each = sum(math.prod(b.axes) * np.dtype(b.dtype).itemsize for b in self._written()[1] if b.full_index < 0)
         return min(arrays.CHUNK, max(CACHE // each, SMALL))
 
     def _written(self) -> tuple[numpy_code.Run, list[numpy_code.Buffer]]:
@@ -53,7 +53,7 @@ class StraightLineCode:
         from armkin.formula import numpy_code
 
         _, needed = self._written()
-        kept: dict[int, list[NDArray[Any]]] = self._kept.__dict__.setdefault("buffers", {})
+        kept: dict[int, list[NDArray[Any]]] = self._thread_buffers.__dict__.setdefault("buffers", {})
         if length in kept:
             return kept[length]
         buffers = numpy_code.workspace(needed, length)

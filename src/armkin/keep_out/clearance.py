@@ -66,11 +66,11 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
     return named(whole, mm, which, lead)
 
 
-def named(arm: Arm, mm: Array, which: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
+def named(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
     """Clearances (N,) of pairs (N,) with their names, in the shape of a batch."""
     held = _guard(arm)
     bodies, others = (np.array([held.pair_names(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
-    return Clearance(mm.reshape(lead)[()], bodies[which].reshape(lead)[()], others[which].reshape(lead)[()])
+    return Clearance(mm.reshape(lead)[()], bodies[pairs].reshape(lead)[()], others[pairs].reshape(lead)[()])
 
 
 def least(arm: Arm, q: Array) -> Array:

@@ -188,28 +188,28 @@ def from_links(
     n = len(prismatic)
     links = _frozen(link)
     span = np.broadcast_to([-math.inf, math.inf], (n, 2)) if limits is None else np.asarray(limits, dtype=float)
-    gain = _given(motor_gain, np.zeros((0, n)))
+    gain = _as_array(motor_gain, np.zeros((0, n)))
     sliding = np.abs(np.where(np.isfinite(span), span, 0.0)).max(axis=1)[np.asarray(prismatic, dtype=bool)]
     return Arm(
         name=name,
         joint_names=joint_names or tuple(f"q{i + 1}" for i in range(n)),
         prismatic=_frozen(prismatic, bool),
         link=links,
-        frame=_given(frame, np.broadcast_to(np.eye(4), (n, 4, 4))),
-        base=_given(base, np.eye(4)),
+        frame=_as_array(frame, np.broadcast_to(np.eye(4), (n, 4, 4))),
+        base=_as_array(base, np.eye(4)),
         lower=_frozen(span[:, 0]),
         upper=_frozen(span[:, 1]),
-        home=_given(home, np.zeros(n)),
-        max_speed=_given(max_speed, np.full(n, math.nan)),
-        max_accel=_given(max_accel, np.full(n, math.nan)),
-        max_jerk=_given(max_jerk, np.full(n, math.nan)),
-        dh_sign=_given(dh_sign, np.ones(n)),
-        dh_theta=_given(dh_theta, np.zeros(n)),
-        ratio=_given(ratio, np.ones(n)),
+        home=_as_array(home, np.zeros(n)),
+        max_speed=_as_array(max_speed, np.full(n, math.nan)),
+        max_accel=_as_array(max_accel, np.full(n, math.nan)),
+        max_jerk=_as_array(max_jerk, np.full(n, math.nan)),
+        dh_sign=_as_array(dh_sign, np.ones(n)),
+        dh_theta=_as_array(dh_theta, np.zeros(n)),
+        ratio=_as_array(ratio, np.ones(n)),
         pitch_offset=pitch_offset,
         task=task,
         motor_gain=gain,
-        motor_bias=_given(motor_bias, np.zeros(len(gain))),
+        motor_bias=_as_array(motor_bias, np.zeros(len(gain))),
         reach=float(np.linalg.norm(links[1:, :3, 3], axis=1).sum() + sliding.sum()) or 1.0,
         pose_names=tuple(poses or ()),
         pose_joints=_frozen(np.array(list((poses or {}).values()), dtype=float).reshape(-1, n)),
@@ -219,7 +219,7 @@ def from_links(
     )
 
 
-def _given(values: ArrayLike | None, default: Array) -> Array:
+def _as_array(values: ArrayLike | None, default: Array) -> Array:
     return _frozen(default if values is None else values)
 
 

@@ -120,7 +120,11 @@ def validated(data: dict[str, Any], name: str = "path") -> PathFile:
 def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:
     """Raise PathFileError if a path says that it is of another robot than this, by its name or its file."""
     said = file.robot
-    if said is None or said in (name, robot_file) or (robot_file is not None and _same(said, robot_file, file.folder)):
+    if (
+        said is None
+        or said in (name, robot_file)
+        or (robot_file is not None and _is_same_robot(said, robot_file, file.folder))
+    ):
         return
     raise PathFileError(
         f"{file.place('robot')}: this is a path of {said}, and the arm is {name}; plan it for {said}, "
@@ -129,9 +133,9 @@ def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:
     )
 
 
-def _same(said: str, robot_file: str, folder: str) -> bool:
+def _is_same_robot(stated: str, robot_file: str, folder: str) -> bool:
     """Whether a shipped robot's name, or a file's as seen from here or from the path's folder, is the robot file."""
-    for one in (said, os.path.join(folder, said)):
+    for one in (stated, os.path.join(folder, stated)):
         with suppress(OSError, ValueError, FileError):
             if os.path.samefile(catalogue.locate(one), catalogue.locate(robot_file)):
                 return True

@@ -42,7 +42,7 @@ def parse(raw: bytes, name: str) -> PathFile:
         )
     if not rows:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
-    moves = [_move(header, row, first=not k, where=(name, number)) for k, (number, row) in enumerate(rows)]
+    moves = [_move(header, row, first=not k, line=(name, number)) for k, (number, row) in enumerate(rows)]
     places: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}
     smooth = moves[0].point is not None and "blend" not in (header or ())
     return PathFile.model_construct(moves=moves, corners="tolerance" if smooth else None).read_from(
@@ -61,7 +61,7 @@ def _header_and_rows(rows: list[Row], name: str) -> tuple[list[str] | None, list
 
 def _header(cells: list[str], name: str) -> list[str]:
     """The columns' names: of targets or of joints, each once."""
-    header = [_bare(cell) for cell in cells]
+    header = [_cell_text(cell) for cell in cells]
     if doubled := sorted({key for key in header if header.count(key) > 1}):
         raise PathFileError(f"{name}:1: column {doubled[0]} stands twice in the header", file=name)
     strange = [key for key in header if key not in _TARGETS + _OPTIONS]
@@ -88,7 +88,7 @@ def _filled(text: str, name: str) -> list[Row]:
         raise PathFileError(f"{name}:{line}: no row of numbers: {error}", file=name, line=line) from None
 
 
-def _named(header: list[str] | None, row: list[str], where: tuple[str, int]) -> dict[str, float]:
+def _named(header: list[str] | None, row: list[str], line: tuple[str, int]) -> dict[str, float]:
     """A row's numbers by their columns, by their places without a header; an empty cell of an option is none."""
     values: dict[str, float] = {}
     for i, cell in enumerate(row):
@@ -97,33 +97,33 @@ def _named(header: list[str] | None, row: list[str], where: tuple[str, int]) -> 
             continue
         if value is None or abs(value) > LARGEST:
             what = "is no number" if value is None else f"is beyond {LARGEST:g}"
-            raise PathFileError(f"{where[0]}:{where[1]}: '{cell[:40]}' {what}", file=where[0], line=where[1])
+            raise PathFileError(f"{line[0]}:{line[1]}: '{cell[:40]}' {what}", file=line[0], line=line[1])
         values[key] = value
     if len(row) != len(header or row):
         what = f"{len(row)} cells, {len(header or [])} columns"
-        raise PathFileError(f"{where[0]}:{where[1]}: {what}", file=where[0], line=where[1])
+        raise PathFileError(f"{line[0]}:{line[1]}: {what}", file=line[0], line=line[1])
     return values
 
 
-def _move(header: list[str] | None, row: list[str], *, first: bool, where: tuple[str, int]) -> Move:
-    named = _named(header, row, where)
+def _move(header: list[str] | None, row: list[str], *, first: bool, line: tuple[str, int]) -> Move:
+    named = _named(header, row, line)
     extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
     if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < LEAST_TOOL_SPEED:
         raise PathFileError(
-            f"{where[0]}:{where[1]}: blend is at least 0, tool_speed at least {LEAST_TOOL_SPEED:g} mm/s", file=where[0]
+            f"{line[0]}:{line[1]}: blend is at least 0, tool_speed at least {LEAST_TOOL_SPEED:g} mm/s", file=line[0]
         )
     if header and not set(named) & set(_TARGETS):
         return Move.model_construct(None, joint=named, **extra)
     # The header's order is kept; the planner puts a target's labels in place.
-    target = [named[key] for key in sorted(named, key=_order)] if header else list(named.values())
+    target = [named[key] for key in sorted(named, key=_column_rank)] if header else list(named.values())
     return Move.model_construct(None, **{"point" if first else "line": target}, **extra)
 
 
-def _order(key: str) -> int:
+def _column_rank(key: str) -> int:
     return _TARGETS.index(key) if key in _TARGETS else len(_TARGETS)
 
 
-def _bare(cell: str) -> str:
+def _cell_text(cell: str) -> str:
     text = cell.strip()
     for unit in _UNITS:
         text = text.removesuffix(unit)

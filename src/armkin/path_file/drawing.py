@@ -23,7 +23,7 @@ class Placing:
 
     origin: Point  # [mm]
     axes: tuple[Point, Point, Point]  # rows of the rotation from the drawing's frame to the arm's
-    rest: tuple[float, ...] = ()  # [deg, 1] the tool's orientation, the same everywhere
+    orientation: tuple[float, ...] = ()  # [deg, 1] the tool's orientation, the same everywhere
     scale: float = 1.0
 
     def point(self, p: Sequence[float]) -> list[float]:
@@ -67,7 +67,7 @@ class Pen:
 
     def jump(self, p: Sequence[float], line: int) -> None:
         """A joint move to a point."""
-        self._add(Move.model_construct({"point"}, point=[*self.placing.point(p), *self.placing.rest]), line)
+        self._add(Move.model_construct({"point"}, point=[*self.placing.point(p), *self.placing.orientation]), line)
 
     def line(self, p: Sequence[float], speed: float | None, line: int) -> None:
         """A straight line; speed: [mm/s], None: as fast as the joints go."""

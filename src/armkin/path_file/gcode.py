@@ -56,7 +56,7 @@ class _Program:
 
     def __init__(self, name: str, pen: Pen, options: DrawingOptions) -> None:
         self.name, self.pen, self.options = name, pen, options
-        self.at = _ZERO  # [mm] in the machine's coordinates
+        self.position = _ZERO  # [mm] in the machine's coordinates
         self.drawn = False  # whether the pen is at the file's point
         self.motion: float | None = None
         self.plane, self.unit, self.absolute = 17.0, 1.0, True
@@ -75,13 +75,13 @@ class _Program:
             if self.pen.points > MOST_POINTS:
                 raise self._wrong(f"is behind {MOST_POINTS} points, and a path has no more: give the program in parts")
             plain = PLAIN.fullmatch(text)
-            if plain is not None and self._plain(*plain.groups()):
+            if plain is not None and self._plain_line(*plain.groups()):
                 continue
             self.words = words_of(text, self.name, self.line)
             if self._line():
                 return
 
-    def _plain(self, g: str | None, early: str | None, *rest: str | None) -> bool:
+    def _plain_line(self, g: str | None, early: str | None, *rest: str | None) -> bool:
         """Do a line of G0 or G1, F, X, Y, Z, E alone as `_line` does, sooner; False: `_line` has to."""
         *axes, e, late = rest
         motion = self.motion if g is None else float(g)
@@ -212,7 +212,7 @@ class _Program:
             for letter in AXES:
                 values.pop(letter, None)
             self.pen.home(self.line)
-            self.at, self.drawn = _ZERO, False
+            self.position, self.drawn = _ZERO, False
         elif 10.0 in codes:
             self._set_system(values)
         elif 52.0 in codes or 92.0 in codes:
@@ -238,7 +238,7 @@ class _Program:
         for k, letter in enumerate(AXES):
             if letter in values:
                 value = values.pop(letter) * self.unit
-                zero[k] = value if kind == 2.0 else self.at[k] - self.local[k] - self.shift[k] - value
+                zero[k] = value if kind == 2.0 else self.position[k] - self.local[k] - self.shift[k] - value
 
     def _set_shift(self, values: dict[str, float], local: bool) -> None:
         """G52 sets a local zero, G92 one so that the present point has these values."""
@@ -251,11 +251,11 @@ class _Program:
             if local:
                 self.local[k] = value
             else:
-                self.shift[k] = self.at[k] - zero[k] - self.local[k] - value
+                self.shift[k] = self.position[k] - zero[k] - self.local[k] - value
 
     def _goal(self, axes: list[float | None], machine: bool) -> Point:
         """Where the numbers of X, Y and Z lead to, in the machine's coordinates [mm]."""
-        zero, goal = self.systems[self.system], list(self.at)
+        zero, goal = self.systems[self.system], list(self.position)
         for k, number in enumerate(axes):
             if number is not None:
                 value = number * self.unit
@@ -276,23 +276,23 @@ class _Program:
             self._straight(goal, word)
             return
         try:
-            centre, normal, angle = gcode_arcs.arc(word, _PLANES[self.plane], values, self.unit, self.at, goal)
+            centre, normal, angle = gcode_arcs.arc(word, _PLANES[self.plane], values, self.unit, self.position, goal)
         except gcode_arcs.ArcError as error:
             raise self._wrong(str(error)) from None
         speed = self._speed(word)
         if not self.drawn:
-            self.pen.jump(self.at, self.line)
-        self.pen.arc(self.at, centre, goal, normal, angle, speed, self.line)
-        self.at, self.drawn = goal, True
+            self.pen.jump(self.position, self.line)
+        self.pen.arc(self.position, centre, goal, normal, angle, speed, self.line)
+        self.position, self.drawn = goal, True
 
     def _straight(self, goal: Point, word: str) -> None:
         """A line by G0 or G1; to the first point, a joint move."""
         speed = None if word == "G0" else self._speed(word)
         if not self.drawn:
             self.pen.jump(goal, self.line)
-        elif goal != self.at:
+        elif goal != self.position:
             self.pen.line(goal, speed, self.line)
-        self.at, self.drawn = goal, True
+        self.position, self.drawn = goal, True
 
     def _speed(self, word: str) -> float | None:
         """The tool's speed [mm/s]; None: as fast as the joints go."""

@@ -63,8 +63,8 @@ def _radius(plane: tuple[int, int, int], centre: Point, a: Point, b: Point) -> t
     return radius, abs(math.hypot(b[x] - centre[x], b[y] - centre[y]) - radius)
 
 
-def _evened(plane: tuple[int, int, int], centre: Point, a: Point, b: Point, off: float) -> Point:
-    """The centre as far from both ends: what arcs miss, one after another, would add up. off: see `_radius`."""
+def _evened(plane: tuple[int, int, int], centre: Point, a: Point, b: Point, miss: float) -> Point:
+    """The centre as far from both ends: what arcs miss, one after another, would add up. miss: see `_radius`."""
     x, y, _ = plane
     chord = b[x] - a[x], b[y] - a[y]
     size = math.hypot(*chord)
@@ -72,7 +72,7 @@ def _evened(plane: tuple[int, int, int], centre: Point, a: Point, b: Point, off:
         return centre
     u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
     along = ((u[0] + v[0]) * chord[0] + (u[1] + v[1]) * chord[1]) / (2 * size)
-    if abs(along) > 2 * off:
+    if abs(along) > 2 * miss:
         return centre
     moved = list(centre)
     moved[x] += along * chord[0] / size

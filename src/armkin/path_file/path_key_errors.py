@@ -33,7 +33,7 @@ def problems(error: ValidationError) -> Iterator[tuple[Place, str]]:
         if any(len(other) > len(at) and other[: len(at)] == at for other in best):
             del best[at]
     for at, one in best.items():
-        yield at, f"{_where(at)}{_text(at, one)}"
+        yield at, f"{_place_text(at)}{_text(at, one)}"
 
 
 def _place(loc: tuple[str | int, ...]) -> Place:
@@ -51,35 +51,35 @@ def _is_shape(part: str) -> bool:
     return any(sign in part for sign in "[]()") or part in ("float", "str", "int", "Start", "[key]")
 
 
-def _where(at: Place) -> str:
+def _place_text(place: Place) -> str:
     words = []
-    if at[:1] == ("moves",) and len(at) > 1 and isinstance(at[1], int):
-        words.append(f"move {at[1] + 1}")
-        at = at[2:]
-    while at and isinstance(at[-1], int):
-        at = at[:-1]
-    if at:
-        words.append(".".join(str(part) for part in at if not isinstance(part, int)))
+    if place[:1] == ("moves",) and len(place) > 1 and isinstance(place[1], int):
+        words.append(f"move {place[1] + 1}")
+        place = place[2:]
+    while place and isinstance(place[-1], int):
+        place = place[:-1]
+    if place:
+        words.append(".".join(str(part) for part in place if not isinstance(part, int)))
     return "".join(f"{word}: " for word in words)
 
 
-def _text(at: Place, one: Any) -> str:
-    names = [part for part in at if isinstance(part, str)]
-    words = _WORDS.get(one["type"])
+def _text(place: Place, error: Any) -> str:
+    names = [part for part in place if isinstance(part, str)]
+    words = _WORDS.get(error["type"])
     if words is not None:
-        return words(names, one)
+        return words(names, error)
     example = next((EXAMPLES[name] for name in reversed(names) if name in EXAMPLES), None)
-    return f"is {shown(one['input'])}" + (f"; for example {example}" if example else f": {one['msg'].lower()}")
+    return f"is {shown(error['input'])}" + (f"; for example {example}" if example else f": {error['msg'].lower()}")
 
 
-def _unknown(names: list[str], one: Any) -> str:
+def _unknown(names: list[str], error: Any) -> str:
     owner = _OWNERS.get(names[-2], PathFile) if len(names) > 1 else PathFile
     near = _nearest(names[-1] if names else "", list(owner.model_fields))
     hint = f"did you mean {near}?" if near else f"the keys here are {', '.join(owner.model_fields)}"
     return f"unknown key; {hint}"
 
 
-def _missing(names: list[str], one: Any) -> str:
+def _missing(names: list[str], error: Any) -> str:
     example = ": a list of moves, for example - line: [390, 160, 300]" if names[-1:] == ["moves"] else ""
     return f"is required{example}"
 
@@ -88,8 +88,8 @@ def _bound(sign: str, key: str) -> Words:
     return lambda names, one: f"must be {sign} {one['ctx'][key]:g}, not {shown(one['input'])}"
 
 
-def _length(names: list[str], one: Any) -> str:
-    context, count = one["ctx"], one["ctx"]["actual_length"]
+def _length(names: list[str], error: Any) -> str:
+    context, count = error["ctx"], error["ctx"]["actual_length"]
     bound = f"at least {context['min_length']}" if "min_length" in context else f"at most {context['max_length']}"
     return f"has {count} item{'s' * (count != 1)}, and must have {bound}"
 

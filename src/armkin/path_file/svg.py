@@ -55,7 +55,7 @@ def parse(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> P
     root = _tree(raw, name)
     if root.tag != "svg":
         raise PathFileError(f"{name}:{root.line}: is <{root.tag}>, and no <svg>", file=name, line=root.line)
-    named = {one.attributes["id"]: one for one in _all(root) if "id" in one.attributes}
+    named = {one.attributes["id"]: one for one in _elements(root) if "id" in one.attributes}
     pen = _Drawer(name, Pen(placing), options, options.lift / placing.scale)
     try:
         frame = _frame(root)
@@ -114,10 +114,10 @@ class _Reader:
         raise PathFileError(f"{self.name}:{line}: has entities, which are not read", file=self.name, line=line)
 
 
-def _all(element: _Element) -> Iterator[_Element]:
+def _elements(element: _Element) -> Iterator[_Element]:
     yield element
     for child in element.children:
-        yield from _all(child)
+        yield from _elements(child)
 
 
 def _frame(root: _Element) -> Matrix:
@@ -153,7 +153,7 @@ class _Drawer:
     pen: Pen
     options: DrawingOptions
     height: float  # [mm of the drawing] of the lifted pen
-    at: Point | None = None
+    position: Point | None = None
     points: int = 0
     elements: int = 0
     line: int = 0
@@ -215,25 +215,25 @@ class _Drawer:
         if not all(abs(x) <= LARGEST for p in stroke for x in p):
             raise self._wrong(element, f"is farther away than {LARGEST:g} mm")
         line, (x, y) = element.line, stroke[0]
-        if self.at is None:
+        if self.position is None:
             self.pen.jump((x, y, self.height), line)
-        elif abs(self.at[0] - x) + abs(self.at[1] - y) > _SAME:
+        elif abs(self.position[0] - x) + abs(self.position[1] - y) > _SAME:
             self.lift()
             self.pen.line((x, y, self.height), None, line)
-        if self.at is None or abs(self.at[0] - x) + abs(self.at[1] - y) > _SAME:
-            self._to((x, y, 0.0), line)
+        if self.position is None or abs(self.position[0] - x) + abs(self.position[1] - y) > _SAME:
+            self._move_to((x, y, 0.0), line)
         for x, y in stroke[1:]:
             self.pen.line((x, y, 0.0), self.options.feed, line)
-        self.at, self.line = stroke[-1], line
+        self.position, self.line = stroke[-1], line
 
-    def _to(self, p: tuple[float, float, float], line: int) -> None:
+    def _move_to(self, p: tuple[float, float, float], line: int) -> None:
         if self.height > 0:
             self.pen.line(p, self.options.feed, line)
 
     def lift(self) -> None:
         """Lift the pen where it is."""
-        if self.at is not None and self.height > 0:
-            self.pen.line((*self.at, self.height), None, self.line)
+        if self.position is not None and self.height > 0:
+            self.pen.line((*self.position, self.height), None, self.line)
 
     def _wrong(self, element: _Element, text: str) -> PathFileError:
         where = f"{self.name}:{element.line}: <{element.tag}>"

@@ -165,33 +165,33 @@ class _Outline:
     def __init__(self, m: Matrix) -> None:
         self.m = m
         self.strokes: list[list[Point]] = []
-        self.at: Point = (0.0, 0.0)
+        self.position: Point = (0.0, 0.0)
         self.begun: Point = (0.0, 0.0)
         self.scale = max(math.hypot(m[0], m[1]), math.hypot(m[2], m[3]), 1e-12)
         self.open = False
 
     def move(self, p: Point) -> None:
         """Lift the pen and go to p."""
-        self.at = self.begun = p
+        self.position = self.begun = p
         self.open = False
 
     def line(self, p: Point) -> None:
         """A straight line to p; a stroke begins with its first."""
         if not self.open:
-            self.strokes.append([self._placed(self.at)])
+            self.strokes.append([self._placed(self.position)])
             self.open = True
         self.strokes[-1].append(self._placed(p))
-        self.at = p
+        self.position = p
 
     def close(self) -> None:
         """A line back to where the outline began."""
         if self.open:
             self.line(self.begun)
-        self.at, self.open = self.begun, False
+        self.position, self.open = self.begun, False
 
     def bezier(self, a: Point, b: Point, p: Point) -> None:
         """A cubic to p."""
-        s = self.at
+        s = self.position
         bend = max(
             math.hypot(s[0] - 2 * a[0] + b[0], s[1] - 2 * a[1] + b[1]),
             math.hypot(a[0] - 2 * b[0] + p[0], a[1] - 2 * b[1] + p[1]),
@@ -238,8 +238,8 @@ def _path(pen: _Outline, d: str) -> None:
             return
         if d[at].isalpha():
             command, at = d[at], at + 1
-            if command.upper() not in _COMMANDS or (not pen.strokes and command.upper() != "M" and pen.at == (0, 0)
-                                                    and d.lstrip()[0] not in "Mm"):  # fmt: skip
+            begun = pen.strokes or command.upper() == "M" or pen.position != (0, 0) or d.lstrip()[0] in "Mm"
+            if command.upper() not in _COMMANDS or not begun:
                 raise ShapeError(f"path data: '{command}' is not known here; it begins with M")
             if command in "Zz":
                 pen.close()
@@ -253,36 +253,36 @@ def _path(pen: _Outline, d: str) -> None:
             command = "L" if command == "M" else "l"
 
 
-def _gap(d: str, at: int) -> int:
+def _gap(d: str, index: int) -> int:
     """Behind the space, and one comma, that may stand between numbers."""
-    found = _GAP.match(d, at)
-    return at if found is None else found.end()
+    found = _GAP.match(d, index)
+    return index if found is None else found.end()
 
 
-def _values(d: str, at: int, command: str) -> tuple[list[float], int]:
+def _values(d: str, index: int, command: str) -> tuple[list[float], int]:
     out: list[float] = []
     for k in range(_COMMANDS[command.upper()]):
-        at = _gap(d, at)
+        index = _gap(d, index)
         if command in "Aa" and k in (3, 4):  # flags need no space between them
-            if d[at : at + 1] not in ("0", "1"):
-                raise ShapeError(f"path data: an arc's flag is 0 or 1, not '{d[at : at + 6]}'")
-            out.append(float(d[at]))
-            at += 1
+            if d[index : index + 1] not in ("0", "1"):
+                raise ShapeError(f"path data: an arc's flag is 0 or 1, not '{d[index : index + 6]}'")
+            out.append(float(d[index]))
+            index += 1
             continue
-        found = _NUMBER.match(d, at)
+        found = _NUMBER.match(d, index)
         if found is None:
             raise ShapeError(
-                f"path data: {command} needs {_COMMANDS[command.upper()]} numbers, not '{d[at : at + 12]}'"
+                f"path data: {command} needs {_COMMANDS[command.upper()]} numbers, not '{d[index : index + 12]}'"
             )
         out.append(_bounded(float(found[0])))
-        at = found.end()
-    return out, at
+        index = found.end()
+    return out, index
 
 
 def _command(pen: _Outline, command: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point] | None:
     """Draw one command; returns what a smooth one after it mirrors."""
-    kind, (x, y) = command.upper(), pen.at
-    v = _absolute(command, v, pen.at)
+    kind, (x, y) = command.upper(), pen.position
+    v = _absolute(command, v, pen.position)
     if kind in "CSQT":
         return _curve(pen, kind, v, bent)
     if kind == "M":
@@ -294,19 +294,19 @@ def _command(pen: _Outline, command: str, v: list[float], bent: tuple[str, Point
     return None
 
 
-def _absolute(command: str, v: list[float], at: Point) -> list[float]:
+def _absolute(command: str, v: list[float], position: Point) -> list[float]:
     """A command's numbers from the drawing's zero: small letters count from where the pen is."""
     if command.isupper():
         return v
     if command == "a":
-        return [*v[:5], v[5] + at[0], v[6] + at[1]]
-    shift = {"h": at[:1], "v": at[1:]}.get(command, at)
+        return [*v[:5], v[5] + position[0], v[6] + position[1]]
+    shift = {"h": position[:1], "v": position[1:]}.get(command, position)
     return [value + shift[k % len(shift)] for k, value in enumerate(v)]
 
 
 def _curve(pen: _Outline, kind: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point]:
     """A cubic (C, S) or quadratic (Q, T) curve; S and T mirror the last control point of a curve before, `bent`."""
-    curve, at, first, end = "C" if kind in "CS" else "Q", pen.at, (v[0], v[1]), (v[-2], v[-1])
+    curve, at, first, end = "C" if kind in "CS" else "Q", pen.position, (v[0], v[1]), (v[-2], v[-1])
     if kind in "ST":
         before = bent[1] if bent is not None and bent[0] == curve else at
         first = (2 * at[0] - before[0], 2 * at[1] - before[1])
@@ -321,7 +321,7 @@ def _curve(pen: _Outline, kind: str, v: list[float], bent: tuple[str, Point] | N
 
 def _arc(pen: _Outline, v: list[float]) -> None:
     """An elliptical arc by its ends (SVG 1.1, appendix F.6.5)."""
-    (x1, y1), (x2, y2) = pen.at, (v[5], v[6])
+    (x1, y1), (x2, y2) = pen.position, (v[5], v[6])
     rx, ry, turned, large, sweep = abs(v[0]), abs(v[1]), math.radians(v[2]), v[3] == 1, v[4] == 1
     if (x1, y1) == (x2, y2):
         return

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from armkin.errors import MissingExtraError, UsageError
-from armkin.files import ending, whole
+from armkin.files import ending, write_whole
 from armkin.formula.arrays import Array
 
 INK, SOFT, FAINT = "#1b1f24", "#6a737d", "#d5dae0"
@@ -77,7 +77,7 @@ def picture(path: str | None, width: float, height: float) -> Iterator[Any]:
         yield figure
         # No date and no version of matplotlib in the file.
         blank = {"Date": None, "Creator": "armkin"} if kind == "svg" else {"Software": "armkin"}
-        with whole(path, "wb") as file:
+        with write_whole(path, "wb") as file:
             figure.savefig(file, format=kind, metadata=blank)
 
 
@@ -176,14 +176,14 @@ def _fill(axes: Any, size: Array) -> None:
     zoom, fits = 1.0, axes.figure.transFigure.inverted()
     for _ in range(5):  # the labels do not grow with the box, and perspective is only nearly proportional
         axes.set_box_aspect(size, zoom=zoom)
-        least, greatest = fits.transform(_seen(axes))
+        least, greatest = fits.transform(_visible_corners(axes))
         zoom *= float((room / (greatest - least)).min())
         place = axes.get_position(original=True)
         shift = middle - 0.5 * (least + greatest)
         axes.set_position([place.x0 + shift[0], place.y0 + shift[1], place.width, place.height])
 
 
-def _seen(axes: Any) -> Array:
+def _visible_corners(axes: Any) -> Array:
     """Corners of all that is seen of the axes in space, ticks and labels included: (2, 2) [pixels]."""
     drawer = renderer(axes.figure)
     axes.apply_aspect()

@@ -115,7 +115,7 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
         s, value, where = plan.nearest_singularity
         label = f"nearest to a singularity: {s:.0f} mm, condition {value:.3g}"
         poses.append((label, where, _SINGULAR, 1.6, (0, (3, 2))))
-    others = _others(plan)
+    others = _other_starts(plan)
     many = len(others) != 1
     label = f"{len(others)} other branch{'es' * many} that {'carry' if many else 'carries'} all, at the path's start"
     poses = [*(("_" * (k > 0) + label, pose, "#b0b0b0", 1.6, "-") for k, pose in enumerate(others)), *poses]
@@ -192,7 +192,7 @@ def _from_near(plan: PathPlan, figure: Any, way: Array) -> None:
     axes.tick_params(labelsize=7.5)
 
 
-def _others(plan: PathPlan) -> list[Array]:
+def _other_starts(plan: PathPlan) -> list[Array]:
     """Joint values at the path's start of the branches that would carry it as well."""
     taken = {run.names[0][1] for run in plan.runs[:1]}
     return [b.start_joints for b in plan.branches if b.carries >= plan.length - 0.01 and b.name not in taken]

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 TARGETS = "#e2572b"
 
 
-def plot_place(found: Sequence[Place], out: str) -> None:
+def plot_place(places: Sequence[Place], out: str) -> None:
     """One floor an arm: of each position the share of targets that its best yaw reaches."""
-    with picture(out, 5.6 * len(found), 5.4) as figure:
-        for number, one in enumerate(found):
-            width = 1.0 / len(found)
+    with picture(out, 5.6 * len(places), 5.4) as figure:
+        for number, one in enumerate(places):
+            width = 1.0 / len(places)
             axes = flat(figure, ((number + 0.14) * width, 0.12, 0.66 * width, 0.7), ("x / mm", "y / mm"))
             share = one.reached.max(axis=2).T / one.of
             half = 0.5 * float(one.x[1] - one.x[0] if len(one.x) > 1 else 50.0)

@@ -93,12 +93,14 @@ def _several(
     if in_turn:
         for k, bone in enumerate(bones):
             label = legend[0] if k == 0 else legend[1] if k == last else None
-            drawing.arm(bone, _HIT if hit[k] else _along(k / last), label, 2.6, dashed=not legal[k])
+            drawing.arm(bone, _HIT if hit[k] else _path_colour(k / last), label, 2.6, dashed=not legal[k])
         return
     # Branches may lie on each other: the first one, which is the best, comes last and is the thinnest.
     widths = 2.4 + np.minimum(0.5, 3.0 / len(bones)) * np.arange(len(bones)) + _twins(bones)
     for k in sorted(range(len(bones)), key=lambda k: -widths[k]):
-        drawing.arm(bones[k], _HIT if hit[k] else _apart(k, len(bones)), legend[k], widths[k], dashed=not legal[k])
+        drawing.arm(
+            bones[k], _HIT if hit[k] else _branch_colour(k, len(bones)), legend[k], widths[k], dashed=not legal[k]
+        )
 
 
 def _of_one(bone: Skeleton, legal: bool, hit: str) -> list[str]:
@@ -127,12 +129,12 @@ def _legend(names: Sequence[str], legal: Sequence[bool], hit: Sequence[str]) -> 
 
 def _hit_texts(arm: Arm, poses: Array) -> list[str]:
     """What each pose hits, in words: nothing where there are no keep-outs."""
-    return [_briefly(found) for _, found in hits(arm, poses)] if arm.keep_out else [""] * len(poses)
+    return [_hit_text(found) for _, found in hits(arm, poses)] if arm.keep_out else [""] * len(poses)
 
 
-def _briefly(found: list[Hit]) -> str:
+def _hit_text(hits: list[Hit]) -> str:
     """The deepest hit in words, and how many more there are."""
-    return hits_text(found[:1]) + (f" and {len(found) - 1} more" if len(found) > 1 else "")
+    return hits_text(hits[:1]) + (f" and {len(hits) - 1} more" if len(hits) > 1 else "")
 
 
 class _Drawing:
@@ -317,14 +319,14 @@ def _twins(bones: Sequence[Skeleton]) -> Array:
     return rank * min(3.2, 9.6 / max(float(rank.max()), 1.0))
 
 
-def _along(share: float) -> Any:
+def _path_colour(share: float) -> Any:
     """A colour from the start (dark) to the end (light) of a path."""
     import matplotlib as mpl
 
     return mpl.colormaps["viridis"](0.9 * share)
 
 
-def _apart(k: int, count: int) -> Any:
+def _branch_colour(k: int, count: int) -> Any:
     """A colour for one of several branches."""
     if count <= len(PALETTE):
         return PALETTE[k]

@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 _SHOWN = (("share", "share of orientations"), ("branches", "legal branches"), ("single", "share by one branch alone"))
 
 
-def plot_reach(found: Reach, out: str) -> None:
+def plot_reach(reach: Reach, out: str) -> None:
     """Draw share, branches and fragile places (one branch only): above the section, below the slice."""
-    if not found.columns:
+    if not reach.columns:
         raise UsageError("this map is in a file alone: too many cells for a picture")
-    grid = found.grid
-    share = found.columns["share"]
+    grid = reach.grid
+    share = reach.columns["share"]
     fullest = _fullest(grid.rings[:, 1], share.reshape(-1, grid.azimuths).sum(axis=1))
     side, slab = voxels.section(grid), voxels.level(grid, fullest)
     with picture(out, 11.4, 6.6) as figure:
         for column, (name, label) in enumerate(_SHOWN):
-            values = np.where(share > 0, found.columns[name], np.nan)
+            values = np.where(share > 0, reach.columns[name], np.nan)
             left = 0.075 + 0.32 * column
             above = flat(figure, (left, 0.53, 0.195, 0.34), ("x / mm", "z / mm"))
             below = flat(figure, (left, 0.09, 0.195, 0.34), ("x / mm", "y / mm"))
@@ -38,8 +38,8 @@ def plot_reach(found: Reach, out: str) -> None:
             bar = figure.colorbar(drawn, cax=place)
             bar.outline.set_visible(False)
             figure.text(left, 0.9, label, fontsize=10, color=INK)
-        each = f"{found.orientations:,} orientation{'s' * (found.orientations != 1)} each"
-        where = f"{found.reached:,} of {found.cells:,} cells, {each} ({found.method})"
+        each = f"{reach.orientations:,} orientation{'s' * (reach.orientations != 1)} each"
+        where = f"{reach.reached:,} of {reach.cells:,} cells, {each} ({reach.method})"
         figure.text(0.03, 0.985, grid.arm.name, fontsize=13, va="top", color=INK)
         figure.text(
             0.03,

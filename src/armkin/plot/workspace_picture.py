@@ -93,13 +93,13 @@ def _far_to_near(tips: Array, azimuth: float) -> Any:
     return np.argsort(tips @ toward)
 
 
-def _spots(axes: Any, x: Array, y: Array, values: Array, across: int) -> Any:
+def _spots(axes: Any, x: Array, y: Array, values: Array, columns: int) -> Any:
     """Mean value on a grid of hexagons of the same size along both axes."""
-    across = min(across, int(np.sqrt(len(x) / _EACH)))
-    if across < 50:
+    columns = min(columns, int(np.sqrt(len(x) / _EACH)))
+    if columns < 50:
         return axes.scatter(x, y, c=values, s=4.0, linewidths=0, cmap="viridis", rasterized=True)
     width, height = float(np.ptp(x)) or 1.0, float(np.ptp(y)) or 1.0
-    size = max(width, height) / across
+    size = max(width, height) / columns
     grid = (max(1, round(width / size)), max(1, round(height / size / np.sqrt(3))))
     drawn = axes.hexbin(x, y, C=values, gridsize=grid, cmap="viridis", linewidths=0.25, edgecolors="face")
     drawn.set_clim(float(values.min()), float(values.max()))

@@ -18,7 +18,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from armkin.files import ending, whole
+from armkin.files import ending, write_whole
 from armkin.formula.arrays import Array
 from armkin.model import units
 
@@ -42,7 +42,7 @@ def cloud(path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[
     count: samples in all. Raises FileError, after which there is no file.
     """
     writer = {".csv": _csv, ".npz": _npz, ".ply": _ply}[check(path)]
-    with whole(path, "wb") as file, writer(file, path, arm, count, measures) as write:
+    with write_whole(path, "wb") as file, writer(file, path, arm, count, measures) as write:
         yield write
 
 

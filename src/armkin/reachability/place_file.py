@@ -24,10 +24,10 @@ def write(found: Sequence[Place], out: str | os.PathLike[str]) -> None:
     path = os.fspath(out)
     format = format_of(path)
     table = columns(found)
-    with files.whole(path, "wb") as file:
+    with files.write_whole(path, "wb") as file:
         if format.name == "csv":
             file.write((csv_line(list(table)) + "\n").encode())
-        format.together(file, lambda: [io.BytesIO(format.encoded(table))])
+        format.write_parts(file, lambda: [io.BytesIO(format.encoded(table))])
     Parts(path, {}).remove()
 
 

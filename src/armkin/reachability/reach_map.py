@@ -19,7 +19,7 @@ from armkin.columns.parquet import require
 from armkin.columns.table import Table
 from armkin.engines.ordered_chunks import Engine
 from armkin.errors import UsageError
-from armkin.files import check, ending, whole
+from armkin.files import check, ending, write_whole
 from armkin.formula.arrays import Array
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import actual
@@ -239,10 +239,10 @@ class _Run:
                 data = parts.read(number) if parts.held else npz.encoded(kept[number])
                 yield io.BytesIO(data if format.name == "npz" else format.encoded(npz.decoded(data)))
 
-        with whole(self.out, "wb") as file:
+        with write_whole(self.out, "wb") as file:
             if format.name == "csv":
                 file.write((",".join(UNITS) + "\n").encode())
-            format.together(file, tables)
+            format.write_parts(file, tables)
         if parts.held:
             parts.remove()
 

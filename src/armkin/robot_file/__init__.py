@@ -82,7 +82,7 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
         from armkin.robot_file import robot_key_errors  # for invalid files only
 
         problems = [
-            (document.line(path), f"{_where(path, document.data)}{text}")
+            (document.line(path), f"{_place_text(path, document.data)}{text}")
             for path, text in robot_key_errors.problems(error.errors(include_url=False))
         ]
         problems.sort(key=lambda problem: problem[0])
@@ -128,7 +128,7 @@ def _invalid(name: str, problems: list[tuple[int, str]]) -> RobotFileError:
     return RobotFileError(message, file=name, line=problems[0][0] or None, problems=list(told))
 
 
-def _where(path: strict_yaml.Path, data: dict[str, Any]) -> str:
+def _place_text(path: strict_yaml.Path, data: dict[str, Any]) -> str:
     """The place in words: ``joint q2: dh.alpha: ``."""
     words: list[str] = []
     if len(path) > 1 and path[0] in ("joints", "motors") and isinstance(path[1], int):

@@ -79,15 +79,15 @@ def _near(robot: str) -> list[str]:
         beside = []
     for choices, where, cutoff in ((beside, folder, 0.75), (list(names()), "", 0.76)):  # arm is no xarm6
         # Case, dashes and the suffix are what people get wrong most: compare without them.
-        plain = {_plain(choice): choice for choice in choices}
-        close = get_close_matches(_plain(base), plain, n=1, cutoff=cutoff)
+        plain = {_comparable(choice): choice for choice in choices}
+        close = get_close_matches(_comparable(base), plain, n=1, cutoff=cutoff)
         if close:
             return [os.path.join(where, plain[close[0]])]
-    begun = [name for name in names() if len(stem) > 1 and name.startswith(_plain(base))]
+    begun = [name for name in names() if len(stem) > 1 and name.startswith(_comparable(base))]
     return begun[:4]
 
 
-def _plain(name: str) -> str:
+def _comparable(name: str) -> str:
     return os.path.splitext(name)[0].lower().replace("-", "_").replace(" ", "_")
 
 

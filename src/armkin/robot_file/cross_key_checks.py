@@ -65,11 +65,11 @@ def _poses(robot: RobotKeys) -> Iterator[Problem]:
                 yield ("poses", name), f"{joint.name} = {value:g} is outside its limits {low:g} to {high:g}"
 
 
-def _repeated(what: str, names: list[str], key: str) -> Iterator[Problem]:
+def _repeated(kind: str, names: list[str], key: str) -> Iterator[Problem]:
     seen: set[str] = set()
     for i, name in enumerate(names):
         if name in seen:
-            yield (key, i, "name"), f"a {what} named {name} is there already; {what} names are unique"
+            yield (key, i, "name"), f"a {kind} named {name} is there already; {kind} names are unique"
         seen.add(name)
 
 
@@ -164,7 +164,7 @@ def _homing(joint: Joint) -> Iterator[Problem]:
 def _motors(robot: RobotKeys) -> Iterator[Problem]:
     for i, joint in enumerate(robot.joints):
         if joint.drive is not None:
-            for path, message in _own_drive(joint, joint.drive, alone=robot.motors is None):
+            for path, message in _own_drive(joint, joint.drive, only_drive=robot.motors is None):
                 yield ("joints", i, *path), message
     if robot.motors is not None:
         yield from _repeated("motor", [motor.name for motor in robot.motors], "motors")
@@ -176,9 +176,9 @@ def _motors(robot: RobotKeys) -> Iterator[Problem]:
         yield from _gripper(robot)
 
 
-def _own_drive(joint: Joint, drive: Drive, *, alone: bool) -> Iterator[Problem]:
+def _own_drive(joint: Joint, drive: Drive, *, only_drive: bool) -> Iterator[Problem]:
     """A joint's own drive: all drives stand at joints or none, and it moves as the joint does."""
-    if not alone:
+    if not only_drive:
         yield ("drive",), "the file also has motors; put all drives there, or use drives only"
     for path, message in of_drive(drive):
         yield ("drive", *path), message

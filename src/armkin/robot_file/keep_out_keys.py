@@ -91,7 +91,7 @@ def read(values: Any) -> tuple[Entry, ...]:
     raise PydanticCustomError("problems", "{text}", {"text": found[0][1], "problems": found})
 
 
-def names(entries: Iterable[Entry], taken: Iterable[str] = ()) -> list[str]:
+def names(entries: Iterable[Entry], used: Iterable[str] = ()) -> list[str]:
     """What each entry is called; defaults count the nameless ones of a kind."""
     count: dict[str, int] = {}
     found = []
@@ -105,13 +105,13 @@ def names(entries: Iterable[Entry], taken: Iterable[str] = ()) -> list[str]:
 
 
 def problems(
-    entries: Iterable[Entry], bodies: Iterable[str] = (), before: Iterable[Entry] = ()
+    entries: Iterable[Entry], bodies: Iterable[str] = (), earlier: Iterable[Entry] = ()
 ) -> Iterator[tuple[Path, str]]:
     """What is wrong with entries whose keys and types are right.
 
-    bodies: names that the arm's own bodies have; before: the robot file's entries, where these are a scene's.
+    bodies: names that the arm's own bodies have; earlier: the robot file's entries, where these are a scene's.
     """
-    own, given = set(bodies), list(before)
+    own, given = set(bodies), list(earlier)
     entries = list(entries)
     called = names([*given, *entries])
     seen = set(called[: len(given)]) - {SELF}

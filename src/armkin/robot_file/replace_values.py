@@ -22,7 +22,7 @@ def replaced(text: str, values: Mapping[Path, float | int | str]) -> str:
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     edits: list[tuple[int, int, str]] = []
     for path, value in values.items():
-        mapping = _at(root, path[:-1])
+        mapping = _node_at(root, path[:-1])
         found = next((node for key, node in mapping.value if key.value == path[-1]), None)
         last = mapping.value[-1][1].end_mark.index
         if found is not None:
@@ -38,7 +38,7 @@ def replaced(text: str, values: Mapping[Path, float | int | str]) -> str:
     return text
 
 
-def _at(node: Any, path: Path) -> Any:
+def _node_at(node: Any, path: Path) -> Any:
     for step in path:
         if isinstance(step, int):
             node = node.value[step]

@@ -65,14 +65,14 @@ def parse(raw: bytes | str, name: str = "scene.yaml") -> Scene:
             if text.startswith("unknown key") and len(path) == 1:
                 text = "unknown key; a scene has clearance and keep_out"
             told.append((path, text))
-        _refuse(name, [(document.line(path), f"{_where(path)}{text}") for path, text in told])
+        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in told])
     scene._path, scene._sha256 = name, hashlib.sha256(data).hexdigest()
     if found := list(entries.problems(scene.keep_out)):
-        _refuse(name, [(document.line(path), f"{_where(path)}{text}") for path, text in found])
+        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in found])
     return scene
 
 
-def _where(path: strict_yaml.Path) -> str:
+def _place_text(path: strict_yaml.Path) -> str:
     """The place in words: ``keep_out 2: box.min: ``."""
     if not path:
         return ""

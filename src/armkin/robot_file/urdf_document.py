@@ -40,7 +40,7 @@ class _Reader:
         self.joint: Joint | None = None
         self.solids: Solids = {}
         self.visuals: Visuals = {}
-        self.within: list[str] = []
+        self.open_tags: list[str] = []
 
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
         """An element begins."""
@@ -52,13 +52,13 @@ class _Reader:
             self._named(tag, attributes)
         elif self.depth == 3 and self.joint is not None:
             self.joint.parts.setdefault(tag, dict(attributes))
-        elif self.within[1:] == ["link", "collision", "geometry"]:
+        elif self.open_tags[1:] == ["link", "collision", "geometry"]:
             self.solids[next(reversed(self.links))].append((tag, dict(attributes)))
-        elif self.within[1:] == ["link"] and tag == "visual":
+        elif self.open_tags[1:] == ["link"] and tag == "visual":
             self.visuals[next(reversed(self.links))].append({})
-        elif (self.within[1:], tag) in _SEEN:
+        elif (self.open_tags[1:], tag) in _SEEN:
             self.visuals[next(reversed(self.links))][-1][tag] = dict(attributes)
-        self.within.append(tag)
+        self.open_tags.append(tag)
 
     def _check(self, tag: str) -> None:
         if "xacro" in tag:
@@ -89,7 +89,7 @@ class _Reader:
         if self.depth == 2:
             self.joint = None
         self.depth -= 1
-        self.within.pop()
+        self.open_tags.pop()
 
     def data(self, text: str) -> None:
         """Text between elements means nothing in a URDF."""
@@ -176,10 +176,10 @@ class Tree:
             if len(seen) > 200:
                 raise RobotFileError(f"{self.name}: a chain of more than 200 links")
 
-    def base(self, wanted: str | None) -> str:
+    def base(self, base: str | None) -> str:
         """The link that the chain begins with."""
-        if wanted is not None:
-            return self._known(wanted, "base")
+        if base is not None:
+            return self._existing_link(base, "base")
         roots = [link for link in self.links if link not in self.parent and self.children[link]]
         if len(roots) != 1:
             what = f"several links have no parent: {in_words(roots)}" if roots else "no link carries another"
@@ -188,15 +188,15 @@ class Tree:
             raise UsageError(f"{self.name}: {what}; the base must be named")
         return roots[0]
 
-    def tip(self, base: str, wanted: str | None) -> str:
+    def tip(self, base: str, tip: str | None) -> str:
         """The link that the chain ends with: the only leaf that moves, or the one asked for."""
-        if wanted is not None:
-            link = self._known(wanted, "tip")
+        if tip is not None:
+            link = self._existing_link(tip, "tip")
             while link != base and link in self.parent:
                 link = str(self.parent[link].text("parent", "link"))
             if link != base:
-                raise UsageError(f"{self.name}: tip {wanted} does not hang on base {base}")
-            return wanted
+                raise UsageError(f"{self.name}: tip {tip} does not hang on base {base}")
+            return tip
         leaves = [(self.moving(base, link), link) for link in self.leaves(base)]
         moving = [link for count, link in leaves if count]
         if not moving:
@@ -250,10 +250,10 @@ class Tree:
             stack += [str(joint.text("child", "link")) for joint in self.children[link] if joint.kind == "fixed"]
         return found
 
-    def _known(self, link: str, what: str) -> str:
+    def _existing_link(self, link: str, role: str) -> str:
         if link not in self.children:
             raise UsageError(
-                f"{self.name}: there is no link {link} for the {what}; the links are {in_words(self.links)}"
+                f"{self.name}: there is no link {link} for the {role}; the links are {in_words(self.links)}"
             )
         return link
 

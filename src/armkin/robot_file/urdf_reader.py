@@ -154,20 +154,20 @@ def _check_chain(path: str, base: str, tip: str, joints: int, reach: float) -> N
         raise RobotFileError(f"{path}: {tip} is more than 10 km from {base}; a URDF is in metres")
 
 
-def _check_moving(joint: Joint, where: str) -> None:
+def _check_moving(joint: Joint, place: str) -> None:
     """Raise RobotFileError for a joint that moves as none of a robot file does."""
     if joint.kind not in _MOVING:
         kinds = "revolute, continuous, prismatic and fixed can be read"
-        raise RobotFileError(f"{where}: type {joint.kind or 'is missing'}; {kinds}")
+        raise RobotFileError(f"{place}: type {joint.kind or 'is missing'}; {kinds}")
     if "mimic" in joint.parts:
         leader = joint.text("mimic", "joint") or "another joint"
         raise RobotFileError(
-            f"{where}: mimics {leader}: two joints of the chain move as one, which a robot file cannot say; "
+            f"{place}: mimics {leader}: two joints of the chain move as one, which a robot file cannot say; "
             "choose another tip"
         )
 
 
-def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, where: str, notes: list[str]) -> dict[str, Any]:
+def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, place: str, notes: list[str]) -> dict[str, Any]:
     """A joint of the robot file: screw, limits, home and speed."""
     slides = joint.kind == "prismatic"
     unit, size = ("mm", METRE) if slides else ("deg", 180.0 / math.pi)
@@ -177,24 +177,24 @@ def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, where: str
         entry |= {"type": "prismatic", "screw": {"w": [0, 0, 0], "v": vector}}
     else:
         entry["screw"] = {"w": vector, "q": [tidy(x * METRE, 12) for x in point.tolist()]}
-    lower, upper = (_value(joint, key, where) for key in ("lower", "upper"))
+    lower, upper = (_value(joint, key, place) for key in ("lower", "upper"))
     if joint.kind != "continuous" and "limit" in joint.parts:
         low, high = (tidy((value or 0.0) * size, 9) for value in (lower, upper))
-        entry |= _limits(name, low, high, unit, where, notes)
+        entry |= _limits(name, low, high, unit, place, notes)
     elif joint.kind != "continuous":
         notes.append(f"joint {name} has no <limit>: read as no limits")
-    speed = _value(joint, "velocity", where) or 0.0
+    speed = _value(joint, "velocity", place) or 0.0
     if speed < 0:
-        raise RobotFileError(f"{where}: velocity {speed:g} is negative")
+        raise RobotFileError(f"{place}: velocity {speed:g} is negative")
     if 1e-6 <= speed * size <= 1e6:
         entry["max_speed"] = tidy(speed * size, 9)
     return entry
 
 
-def _limits(name: str, low: float, high: float, unit: str, where: str, notes: list[str]) -> dict[str, Any]:
+def _limits(name: str, low: float, high: float, unit: str, place: str, notes: list[str]) -> dict[str, Any]:
     """Limits [deg | mm] and home of a joint; none where the URDF means none."""
     if low > high:
-        raise RobotFileError(f"{where}: lower limit {low:g} {unit} is above upper limit {high:g} {unit}")
+        raise RobotFileError(f"{place}: lower limit {low:g} {unit} is above upper limit {high:g} {unit}")
     if max(-low, high) > ENDLESS:
         notes.append(f"joint {name} has limits beyond {ENDLESS:.0f} {unit}: read as no limits")
         return {}
@@ -202,7 +202,7 @@ def _limits(name: str, low: float, high: float, unit: str, where: str, notes: li
         notes.append(f"joint {name} has limits 0 and 0: read as no limits")
         return {}
     if low == high:
-        raise RobotFileError(f"{where}: both limits are {low:g} {unit}; a joint that never moves is fixed")
+        raise RobotFileError(f"{place}: both limits are {low:g} {unit}; a joint that never moves is fixed")
     entry: dict[str, Any] = {"limits": [low, high]}
     if unit == "deg" and max(-low, high) > math.degrees(TURNS):
         notes.append(f"joint {name} turns {low:g} to {high:g} deg: a URDF is in radians, are these degrees?")
@@ -227,17 +227,17 @@ def _names(joints: list[str], notes: list[str]) -> dict[str, str]:
     return taken
 
 
-def origin(joint: Joint, where: str, snap: bool = False) -> Matrix:
+def origin(joint: Joint, place: str, snap: bool = False) -> Matrix:
     """Where the joint stands in its parent link [m]."""
-    return placed(joint.parts.get("origin", {}), where, snap)
+    return origin_pose(joint.parts.get("origin", {}), place, snap)
 
 
-def placed(attributes: Mapping[str, str], where: str, snap: bool = False) -> Matrix:
+def origin_pose(attributes: Mapping[str, str], place: str, snap: bool = False) -> Matrix:
     """The pose that an <origin> says [m]."""
-    xyz = triple(attributes.get("xyz"), (0.0, 0.0, 0.0), f"{where}: origin xyz")
-    rpy = triple(attributes.get("rpy"), (0.0, 0.0, 0.0), f"{where}: origin rpy")
+    xyz = triple(attributes.get("xyz"), (0.0, 0.0, 0.0), f"{place}: origin xyz")
+    rpy = triple(attributes.get("rpy"), (0.0, 0.0, 0.0), f"{place}: origin rpy")
     if max(map(abs, xyz)) > FARTHEST:
-        raise RobotFileError(f"{where}: origin xyz is more than 10 km; a URDF is in metres")
+        raise RobotFileError(f"{place}: origin xyz is more than 10 km; a URDF is in metres")
     (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle, snap) for angle in rpy)
     return np.array(
         [
@@ -256,12 +256,12 @@ def _cos_sin(angle: float, snap: bool) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def axis(joint: Joint, where: str, snap: bool = False) -> Matrix:
+def axis(joint: Joint, place: str, snap: bool = False) -> Matrix:
     """The joint's direction in its own frame, of length 1; by default x, as the format says."""
-    way = np.array(triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{where}: axis xyz"))
+    way = np.array(triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{place}: axis xyz"))
     length = float(np.linalg.norm(way))
     if not 1e-12 < length < 1e12:
-        raise RobotFileError(f"{where}: axis {' '.join(f'{x:g}' for x in way)} has no direction")
+        raise RobotFileError(f"{place}: axis {' '.join(f'{x:g}' for x in way)} has no direction")
     way = way / length
     largest = int(np.argmax(np.abs(way)))
     if snap and np.abs(np.delete(way, largest)).max() <= SNAP:
@@ -269,23 +269,23 @@ def axis(joint: Joint, where: str, snap: bool = False) -> Matrix:
     return np.asarray(way)
 
 
-def _value(joint: Joint, key: str, where: str) -> float | None:
+def _value(joint: Joint, key: str, place: str) -> float | None:
     text = joint.text("limit", key)
-    return None if text is None else _floats(text, 1, f"{where}: limit {key}")[0]
+    return None if text is None else _floats(text, 1, f"{place}: limit {key}")[0]
 
 
-def triple(text: str | None, default: tuple[float, ...], where: str) -> tuple[float, ...]:
+def triple(text: str | None, default: tuple[float, ...], place: str) -> tuple[float, ...]:
     """Three numbers of an attribute."""
-    return default if text is None else _floats(text, 3, where)
+    return default if text is None else _floats(text, 3, place)
 
 
-def _floats(text: str, count: int, where: str) -> tuple[float, ...]:
+def _floats(text: str, count: int, place: str) -> tuple[float, ...]:
     """So many finite numbers, separated by blanks."""
     words = text.split()
     if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
         many = "a number" if count == 1 else f"{count} numbers"
-        raise RobotFileError(f"{where}: '{text[:60]}' is not {many}")
+        raise RobotFileError(f"{place}: '{text[:60]}' is not {many}")
     values = tuple(float(word) for word in words)
     if not all(math.isfinite(value) for value in values):
-        raise RobotFileError(f"{where}: '{text[:60]}' is not finite")
+        raise RobotFileError(f"{place}: '{text[:60]}' is not finite")
     return values

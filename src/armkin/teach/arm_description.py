@@ -48,7 +48,7 @@ def scene(arm: Arm) -> dict[str, Any]:
                 units.home_out(arm),
                 arm.prismatic,
                 arm.ratio,
-                form.at,
+                form.joint_offsets,
                 _steps(arm),
                 strict=True,
             )

@@ -125,25 +125,25 @@ def _corners(path: str, link: str, visual: dict[str, dict[str, str]]) -> Array:
     where = f"{path}: visual of {link}"
     name = visual["mesh"].get("filename", "")
     scale = urdf_reader.triple(visual["mesh"].get("scale"), (1.0, 1.0, 1.0), f"{where}: mesh scale")
-    T = urdf_reader.placed(visual.get("origin", {}), where)
+    T = urdf_reader.origin_pose(visual.get("origin", {}), where)
     return np.asarray(triangles(_file(path, name, where)) * scale @ T[:3, :3].T + T[:3, 3])
 
 
-def _file(path: str, name: str, where: str) -> Path:
+def _file(path: str, name: str, context: str) -> Path:
     """The local file that a URDF names: beside it, or package://NAME/..., in a folder NAME above it."""
     scheme, colon, rest = name.partition("://")
     if Path(name).suffix.lower() not in (".stl", ".dae"):
-        raise UsageError(f"{where}: mesh {name[:80] or 'without a filename'} is neither .stl nor .dae")
+        raise UsageError(f"{context}: mesh {name[:80] or 'without a filename'} is neither .stl nor .dae")
     folder = Path(path).resolve().parent
     if not colon:
         return folder / name
     if scheme == "file":
         return Path(rest)
     if scheme != "package":
-        raise UsageError(f"{where}: mesh {name[:80]} is no local file: package://, file:// or a path beside the URDF")
+        raise UsageError(f"{context}: mesh {name[:80]} is no local file: package://, file:// or a path beside the URDF")
     package, _, inside = rest.partition("/")
     for above in [folder, *folder.parents]:
         for place in (above / package / inside, above / inside):
             if place.is_file():
                 return place
-    raise UsageError(f"{where}: mesh {name[:80]} is not found in the URDF's folder or above it")
+    raise UsageError(f"{context}: mesh {name[:80]} is not found in the URDF's folder or above it")

@@ -27,7 +27,7 @@ class Shape:
     """An arm's bodies; lengths in mm."""
 
     bodies: tuple[Array, ...]  # n + 1 of (P, 3): corners of body i in the frame after joint i; body 0 in the world's
-    at: Array  # (n,) where on its own axis each joint sits
+    joint_offsets: Array  # (n,) where on its own axis each joint sits
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def skeleton(arm: Arm, q: ArrayLike) -> Skeleton:
     path, joints, axes, slides = [*form.bodies[0]], [], [], []
     for i, value in enumerate(values * arm.ratio):
         z = T[:3, 2]
-        joint = T[:3, 3] + form.at[i] * z
+        joint = T[:3, 3] + form.joint_offsets[i] * z
         joints.append(joint)
         axes.append(z)
         move = np.eye(4)

@@ -71,7 +71,7 @@ class _Session:
         self.path, self.scene, self.link, self.port = path, scene, link, link.port
         arguments.load(robot, scene)  # what is wrong with the files is told first
         self.text = _read(path)
-        self.told = False
+        self.assumptions_told = False
 
     def run(self, found: Found, person: Keys) -> None:
         """All steps, in their order."""
@@ -105,10 +105,10 @@ class _Session:
 
         file = parse(self.corrected(found), self.path)
         arm = checked(file, None if self.scene is None else read(self.scene))
-        if not self.told:
+        if not self.assumptions_told:
             keep_outs.marked(arm, ignore=False)
-        arm = board_link.rehearsed(arm, self.port, quiet=self.told)
-        self.told = True
+        arm = board_link.rehearsed(arm, self.port, quiet=self.assumptions_told)
+        self.assumptions_told = True
         return board_link.board_of(arm, rehearsal=self.port == board_link.SIM), arm
 
     def corrected(self, found: Found) -> str:
@@ -133,7 +133,7 @@ class _Session:
 
     def write(self, found: Found, out: str | None, person: Keys) -> None:
         """The corrected file, shown as a diff and asked for first."""
-        from armkin.files import whole
+        from armkin.files import write_whole
         from armkin.robot_file import parse
 
         made = self.corrected(found)
@@ -152,7 +152,7 @@ class _Session:
             return
         if _read(self.path) != self.text:
             raise FileError(f"{self.path} has changed meanwhile: nothing was written", file=self.path)
-        with whole(target, corrects=out is None) as file:
+        with write_whole(target, corrects=out is None) as file:
             file.write(made)
         output.note(f"wrote {target}")
 

@@ -104,14 +104,15 @@ def _fitted(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Calibration
         return armkin.calibrate(arm, q, tips, fix=kinds, tick=tick)
 
 
-def _file(found: Calibration, arm: Arm) -> str:
+def _file(calibration: Calibration, arm: Arm) -> str:
     from armkin.robot_file.robot_file_text import text
 
     return text(
-        found.data,
+        calibration.data,
         [
-            f"{arm.name}, calibrated from {len(found.before)} measured poses by armkin calibrate.",
-            f"On rows not used: {found.rms('before'):.3f} mm rms before, {found.rms('after'):.3f} mm after.",
+            f"{arm.name}, calibrated from {len(calibration.before)} measured poses by armkin calibrate.",
+            f"On rows not used: {calibration.rms('before'):.3f} mm rms before, "
+            f"{calibration.rms('after'):.3f} mm after.",
         ],
     )
 
@@ -130,33 +131,33 @@ def _suggest(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: b
             write("\n".join([csv_line(arm.joint_names), *map(csv_line, found), ""]))
 
 
-def _answer(arm: Arm, found: Calibration, numbers: list[int], out: str | None) -> dict[str, Any]:
+def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | None) -> dict[str, Any]:
     import numpy as np
 
-    kept = np.delete(np.arange(len(found.before)), found.flagged)
+    kept = np.delete(np.arange(len(calibration.before)), calibration.flagged)
     corrections = []
-    for name, value, doubt, unit in found.corrections:
+    for name, value, doubt, unit in calibration.corrections:
         shown, size = _UNITS[unit]
         stated = None if np.isnan(doubt) else doubt * size
         corrections.append({"name": name, "value": value * size, "deviation": stated, "unit": shown})
     return {
         **render.head(arm),
-        "rows": len(found.before),
-        "level": found.level,
-        "corrected": found.kinds,
+        "rows": len(calibration.before),
+        "level": calibration.level,
+        "corrected": calibration.kinds,
         **{
             key: {
                 "median_mm": float(np.median(errors[kept])),
                 "rms_mm": float(np.sqrt(np.mean(errors[kept] ** 2))),
                 "max_mm": float(errors[kept].max()),
             }
-            for key, errors in (("before", found.before), ("after", found.after))
+            for key, errors in (("before", calibration.before), ("after", calibration.after))
         },
-        "noise_mm": found.noise,
-        "flagged": [{"row": numbers[k], "off_mm": float(found.after[k])} for k in found.flagged],
+        "noise_mm": calibration.noise,
+        "flagged": [{"row": numbers[k], "off_mm": float(calibration.after[k])} for k in calibration.flagged],
         "corrections": corrections,
-        "unseen": found.unseen,
-        "held": found.held,
+        "unseen": calibration.unseen,
+        "held": calibration.held,
         "out": out,
     }
 

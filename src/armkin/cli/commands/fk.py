@@ -120,7 +120,7 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
     rpy = units.angles_out(rotation.rpy(T[:, :3, :3])).tolist()
     quaternion = rotation.quaternion(T[:, :3, :3]).tolist()
     violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
-    in_scene = render.given(arm)
+    in_scene = render.scene_and_tool(arm)
     joints = chunk.values.tolist()
     joint_units, head = units.names(arm), render.head(arm)
     for i, pose in enumerate(T):
@@ -156,7 +156,7 @@ def _text(arm: Arm, answer: Fk) -> str:
     for i, row in enumerate(R):
         numbers = [word for value in row for word in ("", fixed(value, 6))]
         rows.append(["" if i else "rotation", *numbers, ""])
-    text = f"{render.pose_line(arm, answer['joints'])}\n\n{render.table(rows, left=(0, 1, 3, 5, 7))}\n"
+    text = f"{render.pose_line(arm, answer['joints'])}\n\n{render.table(rows, left_aligned=(0, 1, 3, 5, 7))}\n"
     if "frames" in answer:
         table = [["frame", "x/mm", "y/mm", "z/mm"]]
         table += [[frame["name"], *map(fixed, frame["position_mm"])] for frame in answer["frames"]]

@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import arguments, completion, output, render
 from armkin.cli.board_link import SIM
-from armkin.cli.default_port import only, port_option
+from armkin.cli.default_port import only_port, port_option
 from armkin.cli.options import Json
 from armkin.errors import UsageError
 
@@ -54,10 +54,10 @@ def flash(
         write(render.to_json(found) + "\n" if json else _text(found))
 
 
-def _text(found: dict[str, object]) -> str:
-    if found["port"] is None:
-        return f"{found['board']}: {found['bytes']} bytes copied; armkin ports shows the Pico when it has restarted\n"
-    return f"{found['board']} on {found['port']}: firmware {found['firmware']}, {found['bytes']} bytes\n"
+def _text(answer: dict[str, object]) -> str:
+    if answer["port"] is None:
+        return f"{answer['board']}: {answer['bytes']} bytes copied; armkin ports shows the Pico when it has restarted\n"
+    return f"{answer['board']} on {answer['port']}: firmware {answer['firmware']}, {answer['bytes']} bytes\n"
 
 
 def _kind(robot: str | None, board: str | None) -> str:
@@ -85,4 +85,4 @@ def _only_port(kind: str) -> str:
 
     found = [port.device for port in list_ports() if port.board]
     hint = "armkin ports lists them, a Pico's may be the folder of its boot drive"
-    return only(found, f"a board for {kind}", hint, asked=False)
+    return only_port(found, f"a board for {kind}", hint, asked=False)

@@ -55,10 +55,10 @@ def grip(
     else:
         found["counts"] = done.counts
     with output.destination(None) as write:
-        write(render.to_json(found) + "\n" if json else f"gripper: {_said(done)}\n")
+        write(render.to_json(found) + "\n" if json else f"gripper: {_rest_text(done)}\n")
 
 
-def _said(done: Gripped) -> str:
+def _rest_text(done: Gripped) -> str:
     """Where a gripper has come to rest, in words: ``29.97 deg (833 us)``."""
     text = f"{render.short(done.position)} {done.unit}"
     if done.counts is not None:

@@ -60,7 +60,7 @@ def home(
         keep_outs.check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
         lost = board.home(joints or (), lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
         if lost is not None:
-            told["lost_steps"] = _told(arm, lost)
+            told["lost_steps"] = _lost_steps(arm, lost)
         if not stay:
             output.note("moving to the home pose")
             board.go_home()
@@ -69,10 +69,10 @@ def home(
         write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))
 
 
-def _told(arm: Arm, found: Sequence[LostSteps]) -> list[dict[str, Any]]:
+def _lost_steps(arm: Arm, lost: Sequence[LostSteps]) -> list[dict[str, Any]]:
     """What the switches tell of the counts, as JSON; a warning where more than a step is missing."""
     told = []
-    for one in found:
+    for one in lost:
         slides = arm.prismatic[arm.joint_names.index(one.joint)]
         difference = None if one.difference is None else one.difference / (1.0 if slides else units.DEGREE)
         told.append({"joint": one.joint, "steps": one.steps, "difference": difference})

@@ -119,7 +119,7 @@ def ik(
         values, words = arguments.target(arm, what, target), [[decimals(word) for word in target or ()]]
     else:
         values, words = reached[0], None
-    _one(questions, one_row(values).values, words, out, json=json)
+    _single_target(questions, one_row(values).values, words, out, json=json)
 
 
 def _request_with_solver(request: choose_branch.Request, task: str, *, compiled: bool) -> choose_branch.Request:
@@ -147,7 +147,9 @@ def _check_together(
         raise UsageError("--continuous belongs to --batch: it compares each row with the row before")
 
 
-def _one(questions: Questions, values: Array, words: list[list[int]] | None, out: str | None, *, json: bool) -> None:
+def _single_target(
+    questions: Questions, values: Array, words: list[list[int]] | None, out: str | None, *, json: bool
+) -> None:
     """Print the answer of one target (1, m) [mm, deg], then raise why it has no branch, if it has none.
 
     words: the decimals that each of its numbers was written with.
@@ -176,11 +178,11 @@ def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float
     return targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
 
 
-def _rounding(arm: Arm, task: Task, values: Array, shown: list[list[int]] | None = None) -> Array:
-    """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with; shown: how many."""
+def _rounding(arm: Arm, task: Task, values: Array, decimals: list[list[int]] | None = None) -> Array:
+    """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with; decimals: how many."""
     from armkin.inverse.answers import rounding as target_rounding
 
-    return target_rounding.printed(label_units(task.labels), values, arm.reach, shown)
+    return target_rounding.printed(label_units(task.labels), values, arm.reach, decimals)
 
 
 @dataclass

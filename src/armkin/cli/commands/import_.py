@@ -44,7 +44,7 @@ def import_(
 
     if file.endswith((".yaml", ".yml")) or (catalogue.shipped(file) and not os.path.exists(file)):
         raise UsageError(f"{file} is a robot, and import reads URDFs: armkin info {file} says what it is")
-    files.keep(file)
+    files.protect_input(file)
     try:
         raw = urdf_reader.load(file)  # once: a pipe can be read no second time
         found = urdf_reader.parse(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
@@ -64,7 +64,7 @@ def import_(
         output.note(gain)
 
 
-def _gain(raw: bytes, found: Imported, arm: Arm) -> str | None:
+def _gain(raw: bytes, imported: Imported, arm: Arm) -> str | None:
     """What --snap would buy: another solver class, and how far the tip would move for it."""
     import numpy as np
 
@@ -73,7 +73,9 @@ def _gain(raw: bytes, found: Imported, arm: Arm) -> str | None:
     from armkin.robot_file import urdf_reader
     from armkin.robot_file.robot_file_text import text
 
-    snapped = build(robot_file.parse(text(urdf_reader.parse(raw, base=found.base, tip=found.tip, snap=True).data)))
+    snapped = build(
+        robot_file.parse(text(urdf_reader.parse(raw, base=imported.base, tip=imported.tip, snap=True).data))
+    )
     try:
         before, after = armkin.method(arm)[0], armkin.method(snapped)[0]
     except UsageError:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armkin.cli import arguments, output
-from armkin.cli.number_parsing import number, of_pi, whole
+from armkin.cli.number_parsing import number, of_pi, whole_number
 from armkin.cli.options import RobotOut
 from armkin.errors import FileError, RobotFileError, UsageError
 
@@ -71,7 +71,7 @@ def new(
 
     path = _path(name, out)
     asks = not dh and batch is None and sys.stdin is not None and sys.stdin.isatty()
-    convention, table = _asked(convention) if asks else _table_of_options(dh, batch, convention)
+    convention, table = _table_by_questions(convention) if asks else _table_of_options(dh, batch, convention)
     if convention not in ("standard", "modified"):
         raise UsageError(f"--convention {convention}: must be standard or modified")
     rows = [_row(entries, i) for i, entries in enumerate(table, 1)]
@@ -87,12 +87,12 @@ def new(
         output.note(f"wrote {path}; armkin info {word} prints it as papers do, armkin fk {word} home where it stands")
 
 
-def _check(made: str, path: str) -> None:
+def _check(text: str, path: str) -> None:
     """Raise RobotFileError for a file that is not valid, or whose floor is hit in every posture."""
     from armkin.keep_out.load_with_scene import checked
     from armkin.robot_file import parse
 
-    checked(parse(made, path))
+    checked(parse(text, path))
 
 
 def _table_of_options(
@@ -197,7 +197,7 @@ def _floor(check: Callable[[float | None], object]) -> float | None:
     return height(_ask("floor: z that nothing goes below [mm], or none", "none", lambda word: check(height(word))))
 
 
-def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
+def _table_by_questions(convention: str | None) -> tuple[str, list[dict[str, str]]]:
     """The table by questions on the terminal."""
 
     def known(answer: str) -> None:
@@ -209,7 +209,7 @@ def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
             _limits(dict(zip(("lower", "upper"), answer.split(","), strict=False)), "limits")
 
     convention = convention or _ask("convention, standard or modified", "standard", known)
-    count = whole(_ask("how many joints", "3", lambda n: whole(n, "joints", 1, 12)), "joints", 1, 12)
+    count = whole_number(_ask("how many joints", "3", lambda n: whole_number(n, "joints", 1, 12)), "joints", 1, 12)
     table = []
     for i in range(1, count + 1):
         row = {
@@ -225,11 +225,11 @@ def _asked(convention: str | None) -> tuple[str, list[dict[str, str]]]:
     return convention, table
 
 
-def _slides(cells: Mapping[str, str], where: str, *, d_varies: bool) -> bool:
+def _slides(cells: Mapping[str, str], row: str, *, d_varies: bool) -> bool:
     """Whether a row's joint is prismatic, by its type or, without one, by its variable."""
     kind = (cells.get("type") or "").lower()
     if kind not in ("", "revolute", "prismatic", "r", "p"):
-        raise UsageError(f"{where}type: '{cells['type']}' must be revolute or prismatic")
+        raise UsageError(f"{row}type: '{cells['type']}' must be revolute or prismatic")
     return kind in ("prismatic", "p") or (not kind and d_varies)
 
 
@@ -253,13 +253,13 @@ def _row(cells: Mapping[str, str], i: int) -> Row:
     return Row(cells.get("name") or f"q{i}", **numbers, prismatic=slides, limits=limits, home=home)
 
 
-def _limits(cells: Mapping[str, str], where: str) -> tuple[float, float] | None:
+def _limits(cells: Mapping[str, str], row: str) -> tuple[float, float] | None:
     lower, upper = cells.get("lower") or "", cells.get("upper") or ""
     if not lower and not upper:
         return None
     if not (lower and upper):
-        raise UsageError(f"{where}: give both lower and upper, or neither")
-    return number(lower, f"{where}lower"), number(upper, f"{where}upper")
+        raise UsageError(f"{row}: give both lower and upper, or neither")
+    return number(lower, f"{row}lower"), number(upper, f"{row}upper")
 
 
 def _entry(word: str, name: str) -> tuple[float, bool]:

@@ -13,7 +13,7 @@ from armkin.cli import arguments, board_link, drawing_path, keep_outs, lock_and_
 from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.drawing_path import At, Feed, GripBy, Lift, Scale
 from armkin.cli.keep_outs import Ignore, NoScene
-from armkin.cli.number_parsing import comma_separated, number, whole
+from armkin.cli.number_parsing import comma_separated, number, whole_number
 from armkin.cli.options import BranchName, Json, Lock, Near, Picture, Robot, Scene, Speed, TaskName, Tool
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -136,15 +136,15 @@ def path(
         "jerk": None if jerk is None else units.joints_in(arm, [_positive(jerk, "--jerk", 1e-3)] * arm.n),
         "near": None if near is None else units.joints_in(arm, arguments.joint_list(arm, near, "--near")),
         "split": split,
-        "samples": None if samples is None else whole(samples, "--samples", 10, 1_000_000),
+        "samples": None if samples is None else whole_number(samples, "--samples", 10, 1_000_000),
     }
     if resume:
         board_link.can_resume(
             {"a plan": port is None, "--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM}
         )
     if port is None or dry_run:
-        plan = _from(start, "--start", arm, moves, locked, options, json=json)
-        found = _found(plan, _rehearsed(plan, rehearsal=dry_run))
+        plan = _start_of(start, "--start", arm, moves, locked, options, json=json)
+        found = _answer(plan, _rehearsed(plan, rehearsal=dry_run))
         _files(plan, out, plot)
         _print(plan, found, json=json, out=out)
         return
@@ -170,13 +170,13 @@ def sent(
     if not dry_run:
         _carried_out(arm, moves, {}, options, link, trace, None, json=json)
         return
-    plan = _from(start, "--from", arm, moves, {}, options, json=json)
-    found = {**_found(plan, _rehearsed(plan)), "dry_run": True}
+    plan = _start_of(start, "--from", arm, moves, {}, options, json=json)
+    found = {**_answer(plan, _rehearsed(plan)), "dry_run": True}
     _files(plan, trace, None)
     _print(plan, found, json=json, out=trace)
 
 
-def _from(
+def _start_of(
     start: str | None,
     option: str,
     arm: Arm,
@@ -228,12 +228,12 @@ def _carried_out(
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
         with board.under_way(laid, held) as (left, first, note), board_link.progress(left, note) as tell:
             path_run.follow(board, plan, left, tell, first, ask=_until_enter)
-        found = {**_found(plan, laid), "port": machine.port.name, **where_arm_stands(machine)}
+        found = {**_answer(plan, laid), "port": machine.port.name, **where_arm_stands(machine)}
         if held is not None:
             found.pop("approach", None)  # where it began, that motion is over
     _print(plan, found, json=json, out=out)
     if not json:
-        with output.beside(out) as write:
+        with output.answer_stream(out) as write:
             write(board_link.where_text(arm, found))
 
 
@@ -257,7 +257,7 @@ def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) 
     assert file is not None
     if file == "-":
         return path_file.parse(arguments.standard_input(path_file.LARGEST), "standard input")
-    files.keep(file)
+    files.protect_input(file)
     return path_file.read(file)
 
 
@@ -286,7 +286,7 @@ def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, 
             plan = armkin.path(arm, moves, **options)
     except NoSolutionError as error:
         if error.plan is not None:
-            _print(error.plan, _found(error.plan, None), json=json)
+            _print(error.plan, _answer(error.plan, None), json=json)
         raise
     keep_outs.tell_ignored([plan.motion] if plan.approach is None else [plan.approach, plan.motion])
     return plan
@@ -309,7 +309,7 @@ def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | Non
     return path_run.parts(plan, pulses(plan.arm, (plan.approach or plan.motion).start).tolist(), board.lay)
 
 
-def _found(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
+def _answer(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
     """The answer as data."""
     from armkin.motion.branch_report import answer
 
@@ -345,7 +345,7 @@ def _write(plan: PathPlan, name: str) -> None:
             write("".join(csv_line(row) + "\n" for row in (rows + 0.0).tolist()))
 
 
-def _print(plan: PathPlan, found: dict[str, Any], *, json: bool, out: str | None = None) -> None:
+def _print(plan: PathPlan, answer: dict[str, Any], *, json: bool, out: str | None = None) -> None:
     """The answer, on stderr while the samples of `--out -` have stdout."""
-    with output.beside(out) as write:
-        write(render.to_json(found) + "\n" if json else path_text.text(plan, found))
+    with output.answer_stream(out) as write:
+        write(render.to_json(answer) + "\n" if json else path_text.text(plan, answer))

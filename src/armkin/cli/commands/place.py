@@ -113,11 +113,11 @@ def _settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, Any]:
     return {"step": size, "z": height, "area": bounds, "yaw": turn * DEGREE}
 
 
-def _no_place(found: Sequence[Place], what: str) -> NoSolutionError:
+def _no_place(places: Sequence[Place], targets: str) -> NoSolutionError:
     """How many of the targets are reached where no place reaches all."""
-    most = max(found, key=lambda one: int(one.reached.max()))
+    most = max(places, key=lambda one: int(one.reached.max()))
     return NoSolutionError(
-        f"no place reaches all {most.of} {what}; {most.arm.name} reaches {int(most.reached.max())} at best"
+        f"no place reaches all {most.of} {targets}; {most.arm.name} reaches {int(most.reached.max())} at best"
     )
 
 
@@ -138,49 +138,49 @@ def _targets(arm: Arm, source: str) -> Array:
     return targets_in(task.labels, np.concatenate(rows))
 
 
-def _answer(found: Place) -> PlacedRobot:
+def _answer(place: Place) -> PlacedRobot:
     from armkin.model.units import DEGREE
 
-    i, j, k = found.best
+    i, j, k = place.best
     best: BestPlace = {
-        "xyz": found.xyz.tolist(),
-        "yaw_deg": round(float(found.yaw[k] / DEGREE), 9),
-        "reached": int(found.reached[i, j, k]),
-        "of": found.of,
-        "margin_mm": float(found.margin[i, j, k]),
+        "xyz": place.xyz.tolist(),
+        "yaw_deg": round(float(place.yaw[k] / DEGREE), 9),
+        "reached": int(place.reached[i, j, k]),
+        "of": place.of,
+        "margin_mm": float(place.margin[i, j, k]),
     }
-    if found.held:
-        best["held"] = _held(found)
-    counts = {"places": found.reached.size, "reach_all": found.reach_all}
-    answer = cast("PlacedRobot", {**render.head(found.arm), "best": best, **counts})
-    if found.planned:
-        answer["planned"] = [_planned(found, one) for one in found.planned]
+    if place.held:
+        best["held"] = _held(place)
+    counts = {"places": place.reached.size, "reach_all": place.reach_all}
+    answer = cast("PlacedRobot", {**render.head(place.arm), "best": best, **counts})
+    if place.planned:
+        answer["planned"] = [_planned(place, one) for one in place.planned]
     return answer
 
 
-def _held(found: Place) -> dict[str, float]:
+def _held(place: Place) -> dict[str, float]:
     """Where the redundant joint is held at the best place [deg]."""
     from armkin.model.units import DEGREE
 
-    return {name: round(float(value / DEGREE), 9) for name, value in found.held.items()}
+    return {name: round(float(value / DEGREE), 9) for name, value in place.held.items()}
 
 
-def _planned(found: Place, one: Planned) -> PlannedPlace:
+def _planned(place: Place, plan: Planned) -> PlannedPlace:
     from armkin.model.units import DEGREE
 
-    i, j, k = one.index
+    i, j, k = plan.index
     return {
-        "xyz": [float(found.x[i]), float(found.y[j]), found.z],
-        "yaw_deg": round(float(found.yaw[k] / DEGREE), 9),
-        "margin_mm": float(found.margin[i, j, k]),
-        "duration_s": None if one.plan is None else one.plan.duration,
-        "refused": one.refused or None,
+        "xyz": [float(place.x[i]), float(place.y[j]), place.z],
+        "yaw_deg": round(float(place.yaw[k] / DEGREE), 9),
+        "margin_mm": float(place.margin[i, j, k]),
+        "duration_s": None if plan.plan is None else plan.plan.duration,
+        "refused": plan.refused or None,
     }
 
 
-def _text(found: Sequence[Place]) -> str:
+def _text(places: Sequence[Place]) -> str:
     rows = [["robot", "x/mm", "y/mm", "z/mm", "yaw/deg", "reached", "margin/mm", "places that reach all"]]
-    for one in found:
+    for one in places:
         i, j, k = one.best
         reached = f"{one.reached[i, j, k]} of {one.of}"
         numbers = [*map(render.short, one.xyz.tolist()), render.short(float(one.yaw[k]) * 57.29577951308232)]
@@ -194,16 +194,16 @@ def _text(found: Sequence[Place]) -> str:
             ]
         )
     text = render.table(rows, indent="") + "\n"
-    for one in found:
+    for one in places:
         if one.held:
             joints = ", ".join(f"{name} at {value:.4g}" for name, value in _held(one).items())
             text += f"{one.arm.name}, held there: {joints}\n"
-    if any(one.planned for one in found):
+    if any(one.planned for one in places):
         rows = [["planned from", "x/mm", "y/mm", "yaw/deg", "margin/mm", "s", ""]]
-        for one in found:
+        for one in places:
             for each in map(_planned, [one] * len(one.planned), one.planned):
                 seconds = "" if each["duration_s"] is None else f"{each['duration_s']:.2f}"
                 numbers = [render.short(x) for x in (*each["xyz"][:2], each["yaw_deg"], each["margin_mm"])]
                 rows.append([one.arm.name, *numbers, seconds, each["refused"] or ""])
-        text += "\n" + render.table(rows, left=(0, 6), indent="") + "\n"
+        text += "\n" + render.table(rows, left_aligned=(0, 6), indent="") + "\n"
     return text

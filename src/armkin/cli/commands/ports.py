@@ -18,6 +18,6 @@ def ports(json: Json = False) -> None:
             write(render.to_json({"ports": [asdict(port) for port in found]}) + "\n")
             return
         rows = [[port.device, port.board or port.adapter, port.description] for port in found]
-        write(render.table(rows, left=(0, 1, 2), indent="") + "\n" if rows else "")
+        write(render.table(rows, left_aligned=(0, 1, 2), indent="") + "\n" if rows else "")
     if not rows:
         output.warn("no serial port found: is the board plugged in, with a cable that carries data?")

@@ -100,7 +100,7 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     moves = (r.pulses - armkin.pulses(arm, units.joints_in(arm, origin))).tolist()
     actual = units.joints_out(arm, r.actual_joints).tolist()
     violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
-    in_scene = render.given(arm)
+    in_scene = render.scene_and_tool(arm)
     too_far = outside_travel(arm, r.pulses)
     names = motor_names(arm)
     head, kinds, joint_units = render.head(arm), pulse_units(arm), units.names(arm)

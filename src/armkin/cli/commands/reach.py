@@ -8,7 +8,7 @@ import typer
 
 import armkin
 from armkin.cli import arguments, output, render
-from armkin.cli.number_parsing import number, whole
+from armkin.cli.number_parsing import number, whole_number
 from armkin.cli.options import Cluster, Json, Picture, Robot, Scene, Workers
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ def reach(
     from armkin.reachability.cells import MOST, Grid
 
     arm = arguments.load(robot, scene)
-    step, ring = number(grid, "--grid"), whole(azimuths, "--azimuths", 1, MOST)
-    many, turns = whole(directions, "--directions", 1, MOST), whole(rolls, "--rolls", 1, MOST)
+    step, ring = number(grid, "--grid"), whole_number(azimuths, "--azimuths", 1, MOST)
+    many, turns = whole_number(directions, "--directions", 1, MOST), whole_number(rolls, "--rolls", 1, MOST)
     cells = len(Grid(arm, step, ring, many, turns, tool_down).rings) * ring
     with output.progress("cells", cells) as tick:
         found = armkin.reach(
@@ -68,18 +68,18 @@ def reach(
         write(f"{render.to_json(answer)}\n" if json else _text(answer))
 
 
-def _answer(found: Reach) -> Answer:
+def _answer(reach: Reach) -> Answer:
     return {
-        **render.head(found.grid.arm),
-        "task": found.grid.task.name,
-        "cells": found.cells,
-        "orientations": found.orientations,
-        "answers": found.answers,
-        "solves": found.solves,
-        "method": "arcs" if found.method == "arcs" else "poses",
-        "reached": found.reached,
-        "volume_mm3": found.volume_mm3,
-        "seconds": found.seconds,
+        **render.head(reach.grid.arm),
+        "task": reach.grid.task.name,
+        "cells": reach.cells,
+        "orientations": reach.orientations,
+        "answers": reach.answers,
+        "solves": reach.solves,
+        "method": "arcs" if reach.method == "arcs" else "poses",
+        "reached": reach.reached,
+        "volume_mm3": reach.volume_mm3,
+        "seconds": reach.seconds,
     }
 
 

@@ -61,13 +61,13 @@ def _task(arm: Any) -> tuple[str | None, list[str], list[str]]:
     return task.name, list(task.labels), [f"hold {free} joints with --lock"] if free > 1 else []
 
 
-def _text(found: list[ShippedRobot]) -> str:
+def _text(robots: list[ShippedRobot]) -> str:
     rows = [["robot", "joints", "task", "target", *_CAN, "compared"]]
-    for entry in found:
+    for entry in robots:
         kinds = "".join("P" if kind == "prismatic" else "R" for kind in entry["joint_types"])
         marks = ["yes" if entry["can"][what] else "-" for what in _CAN]
         if entry["task"] is not None and not entry["can"]["ik"]:
             marks[0] = "--lock"
         compared = "URDF only" if entry["compared"].startswith("only its own URDF") else "yes"
         rows.append([entry["robot"], kinds, entry["task"] or "-", " ".join(entry["target_labels"]), *marks, compared])
-    return render.table(rows, left=range(10), indent="") + "\n"
+    return render.table(rows, left_aligned=range(10), indent="") + "\n"

@@ -158,9 +158,9 @@ def _check_rows_are_kept(batch: str | None) -> None:
         )
 
 
-def _of_a_path(robot: str | None, others: Mapping[str, object]) -> str:
-    """The robot of --path. Raises UsageError without one, and where one of the `others` is given, too."""
-    given = [name for name, what in others.items() if what]
+def _of_a_path(robot: str | None, options: Mapping[str, object]) -> str:
+    """The robot of --path. Raises UsageError without one, and where one of the `options` is given, too."""
+    given = [name for name, what in options.items() if what]
     if given:
         raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
     if robot is None:
@@ -179,7 +179,7 @@ def _board(arm: Arm, *, rehearsal: bool) -> Board:
 
 
 def _move(
-    planner: Planner, goals: Goals | Stream, link: Link, stands: Array | None, trace: str | None, *, json: bool
+    planner: Planner, goals: Goals | Stream, link: Link, start: Array | None, trace: str | None, *, json: bool
 ) -> None:
     """Plan from where the arm stands, or from where the motion that is resumed began; move; tell where it stands."""
     from armkin.board.planner import Stream, where_arm_stands
@@ -187,7 +187,7 @@ def _move(
 
     arm, board, simulated = planner.arm, planner.board, board_link.simulated(link.assume)
     with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
-        board_link.prepare(arm, machine, link.assume, stands)
+        board_link.prepare(arm, machine, link.assume, start)
         keep_outs.check_start(machine, arm, link.no_scene)
         held = board_link.held(board, link.resume)
         began = machine.counts() if held is None else held.start
@@ -196,33 +196,33 @@ def _move(
                 machine.run(planner.noted(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
         else:
             with planning():
-                plans = _all(planner, goals, began)  # every refusal before anything moves
+                plans = _all_plans(planner, goals, began)  # every refusal before anything moves
                 _write_trace(arm, plans, trace)
             began = machine.counts()
             _carry_out(planner, plans, held)
         planned = planner.total_sent.summary(began)
         found: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
-    _tell(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
+    _report_end(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
 
 
-def _tell(
+def _report_end(
     arm: Arm,
     planned: Mapping[str, Any],
-    found: Mapping[str, Any],
+    answer: Mapping[str, Any],
     problem: ArmkinError | None,
     trace: str | None,
     *,
     json: bool,
 ) -> None:
     """Print where the arm stands after a motion; then raise what ended it, if anything did."""
-    answer = {**render.head(arm), **found}
+    answer = {**render.head(arm), **answer}
     if problem is not None and not planned["waypoints"]:
         raise problem  # nothing has moved: there is nothing to tell
     if problem is not None and json and not isinstance(problem, NoSolutionError):
         problem.fields["sent"] = answer  # of exit codes, 0 and 3 alone have something on stdout
         raise problem
-    with output.beside(trace) as write:
-        write(render.to_json(answer) + "\n" if json else _arrived(arm, planned, found))
+    with output.answer_stream(trace) as write:
+        write(render.to_json(answer) + "\n" if json else _arrived(arm, planned, answer))
     if problem is not None:
         raise problem
 
@@ -233,10 +233,10 @@ def _dry_run(planner: Planner, goals: Goals | Stream, start: str | None, trace: 
 
     arm = planner.arm
     begin = arm.home if start is None else board_link.standing(arm, start, "--from")
-    plans = _all(planner, goals, planner.counts(begin))
+    plans = _all_plans(planner, goals, planner.counts(begin))
     _write_trace(arm, plans, trace)
     summed = Total(arm, plans).summary()
-    with output.beside(trace) as write:
+    with output.answer_stream(trace) as write:
         write(render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed))
 
 
@@ -274,7 +274,7 @@ def _blend(text: str | None, batch: str | None) -> float:
     return radius
 
 
-def _all(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Planned]:
+def _all_plans(planner: Planner, goals: Goals | Stream, start: Sequence[int]) -> list[Planned]:
     """All plans at once, from counts; a stream is read to its end."""
     from armkin.board.planner import Stream
 
@@ -307,42 +307,42 @@ def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
             began += plan.duration
 
 
-def _arrived(arm: Arm, planned: Mapping[str, Any], found: Mapping[str, Any]) -> str:
+def _arrived(arm: Arm, planned: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
     """Where the arm stands, and whether that is where the plan ends."""
-    text = board_link.where_text(arm, found)
-    if found["pulses"] is None:
+    text = board_link.where_text(arm, answer)
+    if answer["pulses"] is None:
         return text
     off = [
         f"{name} {there - here:+d} {unit}"
         for name, unit, here, there in zip(
-            found["motors"], found["pulse_units"], planned["pulses"], found["pulses"], strict=True
+            answer["motors"], answer["pulse_units"], planned["pulses"], answer["pulses"], strict=True
         )
         if there != here
     ]
     differs = f"not as planned: {', '.join(off)}" if off else "as planned"
-    return f"{text}read back: {differs}, {found['duration_s']:.3f} s\n"
+    return f"{text}read back: {differs}, {answer['duration_s']:.3f} s\n"
 
 
-def _text(arm: Arm, found: Mapping[str, Any]) -> str:
+def _text(arm: Arm, answer: Mapping[str, Any]) -> str:
     """A dry run for people."""
     headings = render.joint_headings(arm)
     speeds = [f"{name}/s" for name in headings]
-    motors = [f"{name}/{unit}" for name, unit in zip(found["motors"], found["pulse_units"], strict=True)]
+    motors = [f"{name}/{unit}" for name, unit in zip(answer["motors"], answer["pulse_units"], strict=True)]
     joints = [
         ["", *headings],
-        ["from", *map(render.fixed, found["start_joints"])],
-        ["to", *map(render.fixed, found["joints"])],
+        ["from", *map(render.fixed, answer["start_joints"])],
+        ["to", *map(render.fixed, answer["joints"])],
     ]
     pulses = [
         ["", *motors],
-        ["from", *map(str, found["start_pulses"])],
-        ["to", *map(str, found["pulses"])],
-        ["moves", *(f"{move:+d}" for move in found["moves"])],
-        ["top rate /s", *(f"{rate:.0f}" for rate in found["top_rate"])],
+        ["from", *map(str, answer["start_pulses"])],
+        ["to", *map(str, answer["pulses"])],
+        ["moves", *(f"{move:+d}" for move in answer["moves"])],
+        ["top rate /s", *(f"{rate:.0f}" for rate in answer["top_rate"])],
     ]
-    top = [["", *speeds], ["top speed", *(render.fixed(value, 2) for value in found["top_speed"])]]
+    top = [["", *speeds], ["top speed", *(render.fixed(value, 2) for value in answer["top_speed"])]]
     head = (
-        f"{arm.name}: {found['waypoints']} waypoint{'s' * (found['waypoints'] != 1)}, "
-        f"{found['duration_s']:.3f} s, {found['segments']} segments (dry run: nothing moves)"
+        f"{arm.name}: {answer['waypoints']} waypoint{'s' * (answer['waypoints'] != 1)}, "
+        f"{answer['duration_s']:.3f} s, {answer['segments']} segments (dry run: nothing moves)"
     )
     return "\n\n".join([head, *(render.table(part) for part in (joints, pulses, top))]) + "\n"

@@ -53,22 +53,24 @@ def setup(
         put(render.to_json(answer) + "\n" if json else text)
 
 
-def _differing(found: list[dict[str, Any]] | None) -> str:
+def _differing(differences: list[dict[str, Any]] | None) -> str:
     """What differs, as comments below the sections."""
-    if found is None:
+    if differences is None:
         return "# not compared: --port names the socket of Klipper's API server\n"
-    if not found:
+    if not differences:
         return "# Klipper's settings fit the robot file; pins are not compared\n"
-    rows = (f"# {d['setting']} is {d['found'] or 'not there'}: the robot file wants {d['wanted']}\n" for d in found)
+    rows = (
+        f"# {d['setting']} is {d['found'] or 'not there'}: the robot file wants {d['wanted']}\n" for d in differences
+    )
     return "".join(rows)
 
 
-def _text(found: list[dict[str, Any]], written: bool) -> str:
-    if not found:
+def _text(differences: list[dict[str, Any]], written: bool) -> str:
+    if not differences:
         return "the settings fit the robot file\n"
     rows = [["setting", "what", "board", "robot file", ""]]
-    for d in found:
+    for d in differences:
         there = "-" if d["found"] is None else f"{d['found']:g}"
         rows.append([f"${d['setting']}", d["what"], there, f"{d['wanted']:g}", "" if d["serious"] else "no harm"])
     end = "written, and read back" if written else "--write writes them; the arm's position is lost with that"
-    return f"{render.table(rows, left=(0, 1, 4))}\n{end}\n"
+    return f"{render.table(rows, left_aligned=(0, 1, 4))}\n{end}\n"

@@ -48,14 +48,14 @@ def status(
             return render.to_json(found) + "\n" if json else board_link.where_text(arm, found) + words(found)
 
         if watch:
-            _watch(text(found()) for _ in _asked(machine.refresh, board.stop))
+            _watch(text(found()) for _ in _until_signal(machine.refresh, board.stop))
             return
         answer = text(found())
     with output.destination(None) as write:
         write(answer)
 
 
-def _asked(refresh: Callable[[], None], stop: Callable[[], bool]) -> Iterator[None]:
+def _until_signal(refresh: Callable[[], None], stop: Callable[[], bool]) -> Iterator[None]:
     """Now and then, until a signal comes: nothing moves that would have to be stopped."""
     while not stop():
         yield
@@ -85,24 +85,24 @@ def _watch(texts: Iterator[str]) -> None:
             before = text
 
 
-def _servos(found: dict[str, Any]) -> str:
+def _servos(answer: dict[str, Any]) -> str:
     rows = [["servo", "id", "torque", "load", "voltage", "temperature", "errors"]]
-    for servo in found["servos"]:
+    for servo in answer["servos"]:
         figures = (f"{servo['load_percent']:.1f} %", f"{servo['voltage']:.1f} V", f"{servo['temperature']} C")
         torque = "on" if servo["torque"] else "off"
         rows.append([servo["name"], str(servo["id"]), torque, *figures, ", ".join(servo["errors"]) or "none"])
     return render.table(rows) + "\n"
 
 
-def _grbl(found: dict[str, Any]) -> str:
-    wrong = found["settings"]
+def _grbl(answer: dict[str, Any]) -> str:
+    wrong = answer["settings"]
     rows = [
-        ["board", f"{found['board']} on {found['port']}, {found['firmware']}"],
-        ["state", found["state"]],
-        ["active inputs", found["inputs"] or "none"],
+        ["board", f"{answer['board']} on {answer['port']}, {answer['firmware']}"],
+        ["state", answer["state"]],
+        ["active inputs", answer["inputs"] or "none"],
         ["settings", f"{len(wrong)} differ from the robot file: armkin setup tells" if wrong else "fit the robot file"],
     ]
-    return render.table(rows, left=(0, 1)) + "\n"
+    return render.table(rows, left_aligned=(0, 1)) + "\n"
 
 
 _POWER = {
@@ -112,20 +112,20 @@ _POWER = {
 }
 
 
-def _text(found: dict[str, Any]) -> str:
-    high = [name for name, level in found["switches"].items() if level]
-    low = [name for name, level in found["switches"].items() if not level]
+def _text(answer: dict[str, Any]) -> str:
+    high = [name for name, level in answer["switches"].items() if level]
+    low = [name for name, level in answer["switches"].items() if not level]
     on = {True: "on", False: "off"}
-    power = _POWER[found["motor_power"]]
-    if found["motor_power"] is None and found["joints"] is not None:
+    power = _POWER[answer["motor_power"]]
+    if answer["motor_power"] is None and answer["joints"] is not None:
         power += ": after a cut the position above is wrong; armkin stop --power-cut declares it lost"
     rows = [
-        ["board", f"{found['board']} on {found['port']}, firmware {found['firmware']}"],
-        ["configured", "for this robot file" if found["configured"] else "not for this robot file"],
-        ["state", found["state"]],
-        ["drivers", f"{on[found['drivers_on']]}, servo pulses {on[found['servo_pulses_on']]}"],
+        ["board", f"{answer['board']} on {answer['port']}, firmware {answer['firmware']}"],
+        ["configured", "for this robot file" if answer["configured"] else "not for this robot file"],
+        ["state", answer["state"]],
+        ["drivers", f"{on[answer['drivers_on']]}, servo pulses {on[answer['servo_pulses_on']]}"],
         ["switches", f"high: {', '.join(high) or 'none'}; low: {', '.join(low) or 'none'}"],
-        ["abort input", "active" if found["abort_input"] else "not active"],
+        ["abort input", "active" if answer["abort_input"] else "not active"],
         ["motor power", power],
     ]
-    return render.table(rows, left=(0, 1)) + "\n"
+    return render.table(rows, left_aligned=(0, 1)) + "\n"

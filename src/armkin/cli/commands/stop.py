@@ -8,7 +8,7 @@ import typer
 
 from armkin.cli import board_link, output
 from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName, only
+from armkin.cli.default_port import PortName, only_port
 from armkin.errors import LinkError, UsageError
 
 _PATIENCE = 15.0  # [s] for an arm to come to rest
@@ -61,19 +61,19 @@ def stop(
     output.note("the arm stands" + ("; its position is lost: home it, or say --assume-home" if power_cut else ""))
 
 
-def _port(given: str | None, baud: int, reset: bool) -> str:
+def _port(port: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
     from armkin.board.firmware.wire.find_boards import answering, likely
     from armkin.board.ports import holder
     from armkin.board.stop_signals import stoppable
 
-    if given is None:
+    if port is None:
         held = [name for name in likely() if holder(name) is not None]
         if len(held) == 1:
             return held[0]
         with stoppable() as stop:
-            return only(answering(None, baud, stop, reset=reset), "a board")
-    return given
+            return only_port(answering(None, baud, stop, reset=reset), "a board")
+    return port
 
 
 def _end(process: int, port: str) -> None:

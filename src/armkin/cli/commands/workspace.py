@@ -11,7 +11,7 @@ import typer
 
 import armkin
 from armkin.cli import arguments, output, render
-from armkin.cli.number_parsing import is_number, whole
+from armkin.cli.number_parsing import is_number, whole_number
 from armkin.cli.options import Cluster, Compiled, Json, Picture, Robot, Scene, Tool, Workers
 from armkin.errors import UsageError
 
@@ -83,7 +83,7 @@ def workspace(
         raise UsageError("--color is for the picture; add --plot FILE")
     shade = color or "manipulability"
     measures, keep = _measures(measure, None if plot is None else shade)
-    count = None if samples is None else whole(samples, "--samples", 1, MOST)
+    count = None if samples is None else whole_number(samples, "--samples", 1, MOST)
     points = None if grid is None else _points(grid)
     total = count or 100_000 if points is None else math.prod(points * arm.n if len(points) == 1 else points)
     with output.progress("samples", total) as tick:
@@ -91,7 +91,7 @@ def workspace(
             arm,
             count,
             grid_points=points,
-            seed=whole(seed, "--seed", 0, 2**53),
+            seed=whole_number(seed, "--seed", 0, 2**53),
             position=partial(_compiled, arm) if compiled else None,
             measures=measures,
             out=out,
@@ -109,9 +109,9 @@ def workspace(
         write(f"{render.to_json(answer)}\n" if json else _text(answer))
 
 
-def _measures(asked: list[str] | None, shade: str | None) -> tuple[list[str], int]:
+def _measures(names: list[str] | None, shade: str | None) -> tuple[list[str], int]:
     """What is measured of each sample, and how many samples a picture by the colour `shade` keeps."""
-    measures = list(dict.fromkeys(asked or ()))
+    measures = list(dict.fromkeys(names or ()))
     if shade is None:
         return measures, 0
     from armkin.plot.workspace_picture import KEEP
@@ -132,29 +132,29 @@ def _points(grid: str) -> list[int]:
     words = grid.split(",")
     if len(words) == 1 and (parts := grid.lower().replace("*", "x").split("x"))[1:] and all(map(is_number, parts)):
         raise UsageError(f"--grid {grid}: separate the counts with commas: {','.join(part.strip() for part in parts)}")
-    return [whole(word, "--grid", 1, MOST) for word in words]
+    return [whole_number(word, "--grid", 1, MOST) for word in words]
 
 
-def _answer(found: Workspace) -> Answer:
-    x, y, z = ([low, high] for low, high in zip((found.low + 0.0).tolist(), (found.high + 0.0).tolist(), strict=True))
-    head = render.head(found.arm)
+def _answer(survey: Workspace) -> Answer:
+    x, y, z = ([low, high] for low, high in zip((survey.low + 0.0).tolist(), (survey.high + 0.0).tolist(), strict=True))
+    head = render.head(survey.arm)
     answer: Answer = {
         "robot": head["robot"],
         "robot_file": head["robot_file"],
         "robot_sha256": head["robot_sha256"],
-        "samples": found.samples,
+        "samples": survey.samples,
         "x_mm": x,
         "y_mm": y,
         "z_mm": z,
-        "reach_mm": list(found.reach),
-        "measures": {name: list(ends) for name, ends in found.measures.items()},
-        "seconds": found.seconds,
+        "reach_mm": list(survey.reach),
+        "measures": {name: list(ends) for name, ends in survey.measures.items()},
+        "seconds": survey.seconds,
     }
-    answer.update(render.given(found.arm))
-    if found.free is not None:
-        answer["free_share"] = found.free / found.samples
-    if found.extent is not None:
-        size = found.extent
+    answer.update(render.scene_and_tool(survey.arm))
+    if survey.free is not None:
+        answer["free_share"] = survey.free / survey.samples
+    if survey.extent is not None:
+        size = survey.extent
         answer["method"] = size.method
         if size.dimensions == 3:
             answer["volume_mm3"], answer["volume_error_mm3"] = size.value, size.error
@@ -174,7 +174,7 @@ def _text(answer: Mapping[str, Any]) -> str:
     if "free_share" in answer:
         rows.append(["free", "", f"{100 * answer['free_share']:.1f}", "% of the samples hit nothing"])
     count = answer["samples"]
-    text = f"{answer['robot']}: {count:,} sample{'s' * (count != 1)}\n\n{render.table(rows, left=(0, 3))}\n\n"
+    text = f"{answer['robot']}: {count:,} sample{'s' * (count != 1)}\n\n{render.table(rows, left_aligned=(0, 3))}\n\n"
     what, unit = ("volume", "mm3") if "volume_mm3" in answer else ("area", "mm2")
     value, error = answer[f"{what}_{unit}"], answer[f"{what}_error_{unit}"]
     off = f" +- {100 * error / value:.2g} %" if value else ""

@@ -37,7 +37,7 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     values, miss = outputs[:n], outputs[n]
     stores = [f"q[{b * n + j} * ARM_LANES + i] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
     stores += [f"miss[{b} * ARM_LANES + i] = {miss[b]};" for b in range(len(miss))]
-    edge, *free = map(_any, code.outputs[n + 1 :])
+    edge, *free = map(_any_true, code.outputs[n + 1 :])
     stores.append(f"doubt[i] = {edge or 0};" if not free or not free[0] else f"doubt[i] = ({edge}) | ({free[0]}) * 2;")
     head = (
         "static void arm_candidates(const arm_real *ARM_RESTRICT goal, const arm_real *ARM_RESTRICT near,\n"
@@ -57,7 +57,7 @@ def _preferred(arm: Arm) -> list[tuple[str, str]]:
     return declared
 
 
-def _any(texts: Sequence[str]) -> str:
+def _any_true(texts: Sequence[str]) -> str:
     """Whether one of these is true; those that never are are left out."""
     return " | ".join(dict.fromkeys(text for text in texts if not text.startswith("0.0")))
 

@@ -34,9 +34,9 @@ class Box:
         lead = a.shape[1:]
         start, way = (self._in_box_axes(part.reshape(3, -1)) for part in (a, b - a))
         start -= (self.axes.T @ self.centre)[:, None]
-        out = np.sqrt(_outside(start, way, self.half))
+        out = np.sqrt(_outer_distance(start, way, self.half))
         if (inside := np.flatnonzero(out == 0.0)).size:
-            out[inside] = _inside(start[:, inside], way[:, inside], self.half)
+            out[inside] = _inner_distance(start[:, inside], way[:, inside], self.half)
         return out.reshape(lead)
 
     def of_points(self, p: Array) -> Array:
@@ -78,7 +78,7 @@ def read(entry: Entry) -> Box:
     return Box((low + high) / 2, np.eye(3), (high - low) / 2)
 
 
-def _outside(start: Array, way: Array, half: Array) -> Array:
+def _outer_distance(start: Array, way: Array, half: Array) -> Array:
     """Least squared distance over segments from `start` by `way` (3, M) to the box: (M,), 0 where one enters it."""
     h = half[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -108,7 +108,7 @@ def _slope(t: Array, start: Array, way: Array, h: Array) -> Array:
     return slope
 
 
-def _inside(start: Array, way: Array, half: Array) -> Array:
+def _inner_distance(start: Array, way: Array, half: Array) -> Array:
     """Least signed distance over segments that touch the box: (M,), not positive."""
     signs = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])[:, None]
     at, by = signs * np.tile(start, (2, 1)) - np.tile(half, 2)[:, None], signs * np.tile(way, (2, 1))
