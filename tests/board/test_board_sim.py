@@ -10,7 +10,17 @@ import pytest
 
 from armkin.board.firmware.segments.straight_lines import line
 from armkin.board.firmware.wire import motion_frame, protocol
-from armkin.board.firmware.wire.protocol import AxisImage, Error, Flag, GuardImage, Image, Segment, State, Status, whole
+from armkin.board.firmware.wire.protocol import (
+    AxisImage,
+    Error,
+    Flag,
+    GuardImage,
+    Image,
+    Segment,
+    State,
+    Status,
+    whole_steps,
+)
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board_catalogue import BOARDS
 
@@ -115,7 +125,7 @@ def ready(switch=None, image: Image | None = None) -> Host:  # type: ignore[no-u
     return host
 
 
-CRUISE = [whole(500, 1600, 0, (250, -500))] * 8  # 0.4 s at 5 and 10 kHz
+CRUISE = [whole_steps(500, 1600, 0, (250, -500))] * 8  # 0.4 s at 5 and 10 kHz
 
 
 @pytest.mark.parametrize("brake", [1.0, 0.625])
@@ -145,7 +155,7 @@ def test_a_limit_switch_stops_within_the_ramp_however_gentle_the_motion() -> Non
     unused = AxisImage()
     image = Image((AXIS, AXIS, AXIS, unused, unused), (), (GuardImage(False, (1, 0, 0, 0, 0)), *(GuardImage(),) * 2))
     host = ready(lambda number, net: number != 0 or net[0] < 300, image)  # pressed is low
-    assert host.move([0], [0], [whole(5000, 1600, 0, (5000,))], at_rest=True, brake=0.25) == Error.OK
+    assert host.move([0], [0], [whole_steps(5000, 1600, 0, (5000,))], at_rest=True, brake=0.25) == Error.OK
     host.board.advance(0.3)
     status = host.status()
     assert (status.error, status.state, status.known) == (Error.LIMIT_SWITCH, State.IDLE, 7)
@@ -166,7 +176,7 @@ def test_a_queue_that_runs_dry_stops_in_time(brake: float) -> None:
 
 def test_a_slow_arm_stands_where_its_queue_ends() -> None:
     host = ready()
-    assert host.move([0, 1], [0, 0], [whole(640, 8000, 0, (640, -320))], at_rest=False) == Error.OK  # u = 10 ms
+    assert host.move([0, 1], [0, 0], [whole_steps(640, 8000, 0, (640, -320))], at_rest=False) == Error.OK  # u = 10 ms
     host.board.advance(0.4)
     status = host.status()
     assert (status.error, status.state, status.known) == (Error.DRY, State.IDLE, 7)
@@ -185,7 +195,7 @@ def test_a_queue_that_ends_abruptly_is_lost() -> None:
 
 def test_silence_is_a_hold() -> None:
     host = ready()
-    assert host.move([0], [0], [whole(1000, 16000, 0, (100,))], at_rest=True) == Error.OK
+    assert host.move([0], [0], [whole_steps(1000, 16000, 0, (100,))], at_rest=True) == Error.OK
     host.board.advance(0.4)
     assert host.status().state == State.MOVING
     host.board.advance(0.6)
@@ -227,7 +237,7 @@ def test_the_abort_input_stops_and_blocks() -> None:
     assert host.status().state == State.IDLE
     host.hello()
     at = host.status().counts
-    assert host.move([0], at[:1], [whole(10, 1600, 0, (1,))], at_rest=True) == Error.ABORT
+    assert host.move([0], at[:1], [whole_steps(10, 1600, 0, (1,))], at_rest=True) == Error.ABORT
 
 
 def test_homing_finds_the_edge() -> None:
@@ -322,7 +332,7 @@ def test_mutated_frames_move_nothing_that_was_not_sent() -> None:
                 [0, 1],
                 base[:2],
                 [base[0] + 10, base[1] - 5],
-                [whole(40, 1600, 0, (10, -5))],
+                [whole_steps(40, 1600, 0, (10, -5))],
                 at_rest=True,
             )
         )

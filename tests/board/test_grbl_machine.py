@@ -223,11 +223,11 @@ def test_a_lost_answer_ends_the_wait_and_tells_where_the_arm_stands() -> None:
     class Deaf(Grbl):
         lose = 0
 
-        def _say(self, text: str) -> None:
+        def _send(self, text: str) -> None:
             if text == "ok" and self.lose and self._blocks:
                 self.lose -= 1
             else:
-                super()._say(text)
+                super()._send(text)
 
     port = Deaf(axes=4, settings=FITS)
     port.simulated = False

@@ -100,7 +100,7 @@ def test_a_port_without_grbl_is_named() -> None:
 def test_errors_that_nobody_asked_for_keep_no_board_from_answering() -> None:
     """A new grblHAL board says error:7 of its empty memory; another program may have left a line to be refused."""
     board = Grbl(hal=True)
-    board._say("error:7")
+    board._send("error:7")
     board.write(b"G999\n")
     assert opened(board).hal
 

@@ -285,8 +285,8 @@ def test_an_api_that_lies_is_believed_in_nothing_that_cannot_be(seed: int) -> No
     class Liar(Klipper):
         lies = False
 
-        def _say(self, message: dict[str, object]) -> None:
-            super()._say(spoilt(message, rng.randrange(6)) if self.lies and rng.random() < 0.5 else message)  # type: ignore[arg-type]
+        def _send(self, message: dict[str, object]) -> None:
+            super()._send(spoilt(message, rng.randrange(6)) if self.lies and rng.random() < 0.5 else message)  # type: ignore[arg-type]
 
     port = Liar(settings_of(AXES))
     port.simulated = False

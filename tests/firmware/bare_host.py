@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from emulator import EmulatedBoard
 
 from armkin.board.firmware.wire import motion_frame, protocol
-from armkin.board.firmware.wire.protocol import HALF, STEP, Ack, GuardImage, Info, Segment, State, Status, whole
+from armkin.board.firmware.wire.protocol import HALF, STEP, Ack, GuardImage, Info, Segment, State, Status, whole_steps
 
 CLOCK = 16_000_000
 R = TypeVar("R", Ack, Info, Status)
@@ -241,7 +241,7 @@ def cruise(rate: float, seconds: float, share: Sequence[float]) -> list[Segment]
         slope = min(1.0, time / RAMP + 0.02, (seconds - time) / RAMP + 0.02)
         interval = round(CLOCK / (rate * slope))
         ticks = max(10, round(LENGTH * CLOCK / interval))
-        segments.append(whole(ticks, interval, 0, tuple(round(s * ticks) for s in share)))
+        segments.append(whole_steps(ticks, interval, 0, tuple(round(s * ticks) for s in share)))
         time += ticks * interval / CLOCK
     return segments
 
@@ -251,4 +251,4 @@ def run_up(rate: float, seconds: float, share: Sequence[float]) -> list[Segment]
     parts = round(seconds / LENGTH)
     speeds = [rate * (k + 0.5) / parts for k in range(parts)]
     counts = [(round(CLOCK / v), round(LENGTH * v)) for v in speeds]
-    return [whole(n, interval, 0, tuple(round(s * n) for s in share)) for interval, n in counts if n]
+    return [whole_steps(n, interval, 0, tuple(round(s * n) for s in share)) for interval, n in counts if n]

@@ -17,7 +17,7 @@ import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.segments.trajectory_to_counts import plan
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.protocol import Segment, whole
+from armkin.board.firmware.wire.protocol import Segment, whole_steps
 from armkin.motion.timing.profile import Profile
 
 NAMES = "XYZABCUV"  # the emulator's axes, in order
@@ -117,7 +117,7 @@ def segments_per_second(baud: int, rate: float, board: str = "uno_cnc_shield") -
 
     def changing(number: int, counts: tuple[int, ...]) -> Segment:
         """One cycle a tick longer or shorter."""
-        return whole(ticks, ends[number % 2], 256 * (1 - 2 * (number % 2)), counts)
+        return whole_steps(ticks, ends[number % 2], 256 * (1 - 2 * (number % 2)), counts)
 
     elf = slow_elf(board) if baud == 115_200 else None
     with EmulatedBoard(board, speed="step", elf=elf) as emulated:
@@ -128,7 +128,7 @@ def segments_per_second(baud: int, rate: float, board: str = "uno_cnc_shield") -
         steps = [(3 + i % 2, -3, 2 - i % 2, -1) for i in range(count)]
         steps += [(3, -2, 2, -1), (2, -1, 1, -1), (1, -1, 1, -1)]
         # a pause in front, so that the queue is full when it matters
-        work = [whole(100, 9600, 0, (0, 0, 0, 0))] + [changing(i, counts) for i, counts in enumerate(steps)]
+        work = [whole_steps(100, 9600, 0, (0, 0, 0, 0))] + [changing(i, counts) for i, counts in enumerate(steps)]
         plan = batches((0, 1, 2, 3), (0, 0, 0, 0), work, batch)
         status = host.stream(plan, slice_s=0.25e-3, bytes_ahead=300)  # more than it promises, but it keeps up
         x = emulated.stats()["axes"]["X"]
@@ -144,7 +144,7 @@ def first_step_ms(batch: int = 6) -> float:
         host.run(0.02)
         image = image_for("uno_cnc_shield", replace(WIDE, max_accel=15_000_000))
         host.setup(image, counts_at_home("uno_cnc_shield"))
-        work = [whole(50, 1600, 0, (50, -50, 25, 25))] * batch
+        work = [whole_steps(50, 1600, 0, (50, -50, 25, 25))] * batch
         host.order(Batch((0, 1, 2, 3), (0, 0, 0, 0), tuple(work), at_rest=True).payload(0))
         trace = emulated.trace()
         arrived, _ = trace.edges("uart.in")
@@ -171,7 +171,7 @@ def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold
         image = image_for("uno_cnc_shield", replace(WIDE, max_accel=accel))
         host.setup(image, counts_at_home("uno_cnc_shield"))
         interval = round(CLOCK / rate)
-        long = [whole(15_000, interval, 0, (15_000, -7_500))] * 2
+        long = [whole_steps(15_000, interval, 0, (15_000, -7_500))] * 2
         ramp = run_up(rate, rate / accel, (1.0, -0.5))
         for batch in batches((0, 1), (0, 0), ramp + long + ramp[::-1][:4], 6, at_rest=False):
             host.order(batch.payload(0))
@@ -214,7 +214,7 @@ def reversing(board: str, interval: int, high: int = 10) -> tuple[float, float, 
         image = replace(image_for(board, fast), step_high=high, step_low=19, dir_setup=7, wake=2)
         host.setup(image, counts_at_home(board))
         emulated.control("clear")
-        work = [whole(20, interval, 0, ((-1) ** n * 20,) * steppers) for n in range(8)]
+        work = [whole_steps(20, interval, 0, ((-1) ** n * 20,) * steppers) for n in range(8)]
         host.order(Batch(axes, (0,) * steppers, tuple(work), at_rest=True).payload(0))
         host.run(0.1)
         figures = list(emulated.stats()["axes"].values())[:steppers]
@@ -251,8 +251,8 @@ def turning(board: str, interval: int, ticks: int = 100, count: int = 200) -> Tu
         host.setup(image, counts_at_home(board))
         host.run(0.1)
         emulated.control("clear")
-        work = [whole(100, 16_000, 0, (0,) * steppers)]  # a pause in front, while the queue fills
-        work += [whole(ticks, interval, 0, ((-1) ** n * ticks,) * steppers) for n in range(count)]
+        work = [whole_steps(100, 16_000, 0, (0,) * steppers)]  # a pause in front, while the queue fills
+        work += [whole_steps(ticks, interval, 0, ((-1) ** n * ticks,) * steppers) for n in range(count)]
         plan = batches(tuple(range(steppers)), (0,) * steppers, work, 6)
         status = host.stream(plan, poll=0.01, slice_s=0.25e-3)
         stats = emulated.stats()
@@ -296,11 +296,11 @@ def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
             sessions += 1
             host.hello(1000 * (seed + 1) + sessions)
             left = (end[0] - at[0]) // share[0]
-            work = [whole(12, 16_000, 0, share)] * left
+            work = [whole_steps(12, 16_000, 0, share)] * left
             # first what a hold in mid-segment, and the rounding of rates, left over of the one step ratio
             rest = tuple(e - a - left * s for e, a, s in zip(end, at, share, strict=True))
             if any(rest):
-                work.insert(0, whole(20, 16_000, 0, rest))
+                work.insert(0, whole_steps(20, 16_000, 0, rest))
             status = host.stream(batches((0, 1, 2), at, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05)
             at = (status.counts[0], status.counts[1], status.counts[2])
         emulated.control("restore")

@@ -11,7 +11,7 @@ from emulator import PICO, EmulatedBoard
 from numpy.typing import NDArray
 
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.protocol import HALF, STEP, Segment, whole
+from armkin.board.firmware.wire.protocol import HALF, STEP, Segment, whole_steps
 
 CLOCK = 25_000_000
 CYCLES = 5  # of the emulator's cycle counter, one of the board's clock
@@ -71,7 +71,7 @@ def stepping(interval: int, ticks: int = 2000, held_off_us: float = 0.0) -> Step
     """Up to one tick in `interval` cycles, there and back; every interrupt comes `held_off_us` later."""
     ramp = [i for i in (1000, 500, 333) if i > 1.1 * interval]
     pairs = [(100, i) for i in ramp] + [(ticks, interval)] + [(100, i) for i in reversed(ramp)]
-    there = [whole(n, i, 0, tuple((-1) ** k * n for k in SIX)) for n, i in pairs]
+    there = [whole_steps(n, i, 0, tuple((-1) ** k * n for k in SIX)) for n, i in pairs]
     back = [replace(s, rates=tuple(-r for r in s.rates)) for s in there]
     with EmulatedBoard(PICO, speed="step", trace=True, driver="drv8825") as board:
         host = ready(board)
@@ -109,8 +109,8 @@ def asleep_at(interval: int, held_off_us: float) -> float:
         host = ready(board)
         board.control(f"hold-off {held_off_us}us")
         work = (
-            whole(200, 1000, 0, tuple(200 * s for s in step)),
-            whole(ticks, interval, 0, tuple(ticks * s for s in step)),
+            whole_steps(200, 1000, 0, tuple(200 * s for s in step)),
+            whole_steps(ticks, interval, 0, tuple(ticks * s for s in step)),
         )
         host.order(Batch(SIX, (0,) * 6, work, at_rest=True).payload(0))  # takes 20 ms
         board.control("clear")
@@ -127,8 +127,8 @@ def segments_per_second(
         board.control("clear")
         interval = round(CLOCK / rate / ticks)
         # a pause in front, so that the queue is full when it matters
-        work = [whole(100, 60_000 if by == "uart" else 6000, 0, (0,) * len(axes))]
-        one = whole(ticks, interval, 0, tuple((-1) ** k for k in range(len(axes))))
+        work = [whole_steps(100, 60_000 if by == "uart" else 6000, 0, (0,) * len(axes))]
+        one = whole_steps(ticks, interval, 0, tuple((-1) ** k for k in range(len(axes))))
         plan = batches(axes, (0,) * len(axes), work + [one] * count, batch)
         status = host.stream(plan, slice_s=0.25e-3)
         x = board.stats()["axes"]["X"]
@@ -141,7 +141,7 @@ def first_step_ms(by: Literal["uart", "usb"]) -> float:
     """From the end of the first batch's last byte to the first edge, at rest."""
     with EmulatedBoard(PICO, speed="step", trace=True, by=by) as board:
         host = ready(board)
-        work = (whole(50, 2500, 0, (50,) * 6),)
+        work = (whole_steps(50, 2500, 0, (50,) * 6),)
         before = int(board.control("cycles")["cycle"])
         payload = Batch(SIX, (0,) * 6, work, at_rest=True).payload(0)
         host.order(payload)

@@ -16,7 +16,7 @@ from measure import counts_at_home
 from measure_pico import ready
 from numpy.typing import NDArray
 
-from armkin.board.firmware.wire.protocol import Segment, whole
+from armkin.board.firmware.wire.protocol import Segment, whole_steps
 
 SEEN = "XYZA"
 SAMPLES = 125  # a microsecond
@@ -27,7 +27,7 @@ def there_and_back(axes: tuple[int, ...], slow: int, fast: int, ticks: int) -> l
     """A few ticks at a slow interval, `ticks` at a fast one, and a few back; a step with every tick."""
 
     def part(n: int, interval: int, way: int) -> Segment:
-        return whole(n, interval, 0, tuple(way * (-1) ** k * n for k in range(len(axes))))
+        return whole_steps(n, interval, 0, tuple(way * (-1) ** k * n for k in range(len(axes))))
 
     work = [part(8, slow, 1), part(ticks, fast, 1), part(8, slow, 1), part(8, slow, -1)]
     return batches(axes, (0,) * len(axes), work, 4)

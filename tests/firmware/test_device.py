@@ -11,7 +11,7 @@ from bare_host import CLOCK, WIDE, BareHost, Batch, image_for
 from emulator import EmulatedBoard
 
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.protocol import Error, Flag, State, whole
+from armkin.board.firmware.wire.protocol import Error, Flag, State, whole_steps
 
 MODERATE = replace(WIDE, lower=-50_000, upper=50_000, max_rate=8000, max_accel=160_000)
 KNOWN = {0: 0, 1: 0, 2: 0, 3: 0, 4: 1500}
@@ -32,7 +32,7 @@ def ready(board: EmulatedBoard) -> BareHost:
 
 def move(host: BareHost, start: int, steps: int) -> None:
     """X by `steps`, one a tick, as one segment: at 8,000 steps/s if it is long enough to begin so fast."""
-    segment = whole(abs(steps), 2000 if abs(steps) > 600 else 8000, 0, (steps,))
+    segment = whole_steps(abs(steps), 2000 if abs(steps) > 600 else 8000, 0, (steps,))
     host.order(Batch((0,), (start,), (segment,), at_rest=True).payload(0))
 
 
@@ -205,7 +205,7 @@ def test_a_servo_is_silent_until_consent_then_ramps() -> None:
             assert abs(servo["width_min_us"] - 1500) < 1
             assert abs(servo["width_max_us"] - 1500) < 1
             assert abs(servo["period_min_us"] - 20_000) < 300
-        work = (whole(400, 16_000, 0, (400, -400)), whole(400, 8000, 0, (100, 0)))
+        work = (whole_steps(400, 16_000, 0, (400, -400)), whole_steps(400, 8000, 0, (100, 0)))
         host.order(Batch((0, 1), (1500, 1500), work, at_rest=True).payload(0))
         host.run(0.4)
         host.status()  # or half a second of silence would be a hold

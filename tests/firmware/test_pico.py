@@ -15,7 +15,7 @@ from golden import talks
 from measure_pico import CLOCK, KNOWN, SIX, net, ready, segments_per_second, stepping
 
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.protocol import Error, Flag, State, whole
+from armkin.board.firmware.wire.protocol import Error, Flag, State, whole_steps
 
 MODERATE = replace(WIDE, lower=-50_000, upper=50_000, max_rate=8000, max_accel=160_000)
 TMC2209 = {"step_high": 1, "step_low": 1, "dir_setup": 1, "wake": 1}
@@ -30,7 +30,7 @@ def board() -> Iterator[EmulatedBoard]:
 
 def move(host: BareHost, start: int, steps: int) -> None:
     """X by `steps`, at 8,000 steps/s."""
-    segment = whole(abs(steps), CLOCK // 8000, 0, (steps,))
+    segment = whole_steps(abs(steps), CLOCK // 8000, 0, (steps,))
     host.order(Batch((0,), (start,), (segment,), at_rest=True).payload(0))
 
 
@@ -106,7 +106,7 @@ def test_interrupts_that_come_later_than_there_is_room_for_are_told() -> None:
 def test_the_shortest_interval_leaves_the_driver_its_times(board: EmulatedBoard) -> None:
     """Every segment turns every axis round, 100 cycles a tick (250 kHz), with the times of a DRV8825."""
     host = ready(board, replace(WIDE, max_rate=250_000, max_accel=(1 << 24) - 1))
-    work = tuple(whole(10, 100, 0, ((-1) ** n * 10,) * 6) for n in range(6))
+    work = tuple(whole_steps(10, 100, 0, ((-1) ** n * 10,) * 6) for n in range(6))
     host.order(Batch(SIX, (0,) * 6, work, at_rest=True).payload(0))
     host.run(0.01)
     assert host.rest().overruns == 0
@@ -123,7 +123,7 @@ def test_a_limit_switch_stops_within_a_ramp_and_lets_the_axis_leave(board: Emula
     board.control("set-switch C at 3000 above")
     guards = (*[protocol.GuardImage()] * 5, protocol.GuardImage(False, (0, 0, 0, 0, 0, 1, 0, 0)))
     host = ready(board, MODERATE, guards=guards)
-    segment = whole(20_000, CLOCK // 8000, 0, (20_000,))
+    segment = whole_steps(20_000, CLOCK // 8000, 0, (20_000,))
     host.order(Batch((5,), (0,), (segment,), at_rest=True).payload(0))
     host.run(0.3)
     host.status()
@@ -136,7 +136,7 @@ def test_a_limit_switch_stops_within_a_ramp_and_lets_the_axis_leave(board: Emula
     refused = host.ask(Batch((5,), (status.counts[5],), (segment,), at_rest=True).payload(0), protocol.Ack)
     assert refused.error == Error.LIMIT_SWITCH
     host.hello(3)
-    away = whole(500, CLOCK // 8000, 0, (-500,))
+    away = whole_steps(500, CLOCK // 8000, 0, (-500,))
     host.order(Batch((5,), (status.counts[5],), (away,), at_rest=True).payload(0))
     assert host.rest().counts[5] == status.counts[5] - 500 == net(board)[5]
 
@@ -225,7 +225,7 @@ def test_servos_are_silent_until_consent_then_exact(board: EmulatedBoard) -> Non
     host.order(protocol.enable(0, 2))
     host.run(0.1)
     board.control("clear")
-    work = (whole(400, CLOCK // 1000, 0, (400, -400)),)
+    work = (whole_steps(400, CLOCK // 1000, 0, (400, -400)),)
     host.order(Batch((6, 7), (1500, 1500), work, at_rest=True).payload(0))
     host.run(0.4)
     assert host.rest().counts[6:] == (1900, 1100)
@@ -250,9 +250,9 @@ def test_noise_moves_nothing_that_was_not_sent(board: EmulatedBoard) -> None:
         sessions += 1
         host.hello(1000 + sessions)
         left = (end[0] - at[0]) // share[0]
-        work = [whole(12, 25_000, 0, share)] * left
+        work = [whole_steps(12, 25_000, 0, share)] * left
         rest = tuple(e - a - left * s for e, a, s in zip(end, at, share, strict=True))
-        work += [whole(20, 25_000, 0, rest)] if any(rest) else []
+        work += [whole_steps(20, 25_000, 0, rest)] if any(rest) else []
         status = host.stream(batches(SIX, at, work, 3), resend=0.012, slice_s=2e-3, window=3, poll=0.05)
         at = status.counts[:6]
     board.control("restore")

@@ -132,7 +132,7 @@ def test_the_first_hit_is_where_the_clearance_runs_out(table: Path) -> None:
     way = plan(arm, np.deg2rad([0, 90, -90]), np.deg2rad([[30, 90, -90], [30, 0, -45]]))
     found = proved(way)
     assert found is not None
-    assert (found.free, found.stretch, found.body, found.other) == (False, 1, "q3", "table")
+    assert (found.free, found.stretch, found.body, found.keep_out) == (False, 1, "q3", "table")
     at = seconds(way, found)
     assert way.q(at) == pytest.approx(found.joints, abs=1e-6)
     assert abs(float(armkin.clearance(arm, found.joints).mm)) < 0.02

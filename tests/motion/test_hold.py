@@ -26,7 +26,7 @@ def asked(plan: armkin.PathPlan) -> float:
         for t in np.linspace(0.02, curve.duration - 0.02, 200):
             v = curve.place(np.array([t]))[2][0]
             q = curve.evaluate(np.array([t - 1e-4, t, t + 1e-4]))
-            s = curve.way(np.array([t - 1e-4, t, t + 1e-4]))
+            s = curve.lengths(np.array([t - 1e-4, t, t + 1e-4]))
             first = (q[2] - q[0]) / (s[2] - s[0])
             second = 2 * ((q[2] - q[1]) / (s[2] - s[1]) - (q[1] - q[0]) / (s[1] - s[0])) / (s[2] - s[0])
             rate, bend = arm.motor_gain @ first, arm.motor_gain @ second

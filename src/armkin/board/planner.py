@@ -151,7 +151,7 @@ class Stream:
         if empty:
             self.problem = UsageError("there are no rows: nothing was moved")
 
-    def whole(self, planner: Planner, start: Sequence[int]) -> list[Planned]:
+    def all_plans(self, planner: Planner, start: Sequence[int]) -> list[Planned]:
         """All plans, once the last row has come. Raises what is wrong with one."""
         plans = []
         for made in self.plans(planner, start):

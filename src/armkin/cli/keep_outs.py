@@ -52,7 +52,7 @@ def check_port(port: str, arm: Arm, no_scene: bool, *, simulated: bool = False) 
     if simulated:
         return
     if arm.scene:
-        scene_note.keep(port, arm.scene)
+        scene_note.write_scene(port, arm.scene)
     elif no_scene:
         scene_note.forget(port)
     elif last := scene_note.last(port):

@@ -92,14 +92,14 @@ def _break(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Recon
     )
 
 
-def words(arm: Arm, where: Reconfiguration) -> str:
+def words(arm: Arm, reconfiguration: Reconfiguration) -> str:
     """Why a branch carries no farther."""
-    if where.hit:
-        return where.hit
-    if where.index is None or where.value is None:
-        return _WHY[where.why]
-    size, unit = (1.0, "mm") if arm.prismatic[where.index] else (units.DEGREE, "deg")
-    return f"{where.joint} meets its limit {where.value / size:.6g} {unit}"
+    if reconfiguration.hit:
+        return reconfiguration.hit
+    if reconfiguration.index is None or reconfiguration.value is None:
+        return _WHY[reconfiguration.why]
+    size, unit = (1.0, "mm") if arm.prismatic[reconfiguration.index] else (units.DEGREE, "deg")
+    return f"{reconfiguration.joint} meets its limit {reconfiguration.value / size:.6g} {unit}"
 
 
 def closeness(plan: PathPlan) -> str:
@@ -171,7 +171,7 @@ def _optional_fields(plan: PathPlan) -> dict[str, Any]:
     if plan.turned is not None:
         said["turned_deg"] = float(np.rad2deg(plan.turned))
     if plan.passed:
-        said["wrists_passed"] = [_passed(one) for one in plan.passed]
+        said["wrists_passed"] = [_singularity_fields(one) for one in plan.passed]
     if plan.approach is not None:
         said["approach"] = _approach(plan.approach)
     if plan.clearance is not None:
@@ -188,13 +188,13 @@ def _run(arm: Arm, run: PathRun) -> dict[str, Any]:
     }
 
 
-def _reconfiguration(arm: Arm, one: Reconfiguration) -> dict[str, Any]:
+def _reconfiguration(arm: Arm, change: Reconfiguration) -> dict[str, Any]:
     return {
-        "s_mm": one.s,
-        "why": one.why,
-        "joint": one.joint,
-        "value": None if one.value is None or one.index is None else _shown(arm, one.index, one.value),
-        "status_beyond": one.beyond,
+        "s_mm": change.s,
+        "why": change.why,
+        "joint": change.joint,
+        "value": None if change.value is None or change.index is None else _in_units(arm, change.index, change.value),
+        "status_beyond": change.beyond,
     }
 
 
@@ -207,20 +207,24 @@ def _branch(arm: Arm, branch: Branch) -> dict[str, Any]:
     }
 
 
-def _passed(one: Passed) -> dict[str, Any]:
-    return {"s_mm": [one.begin, one.end], "turned_deg": one.turned / units.DEGREE, "aside_mm": one.aside}
+def _singularity_fields(singularity: Passed) -> dict[str, Any]:
+    return {
+        "s_mm": [singularity.begin, singularity.end],
+        "turned_deg": singularity.turned / units.DEGREE,
+        "aside_mm": singularity.aside,
+    }
 
 
 def held(plan: PathPlan) -> dict[str, float]:
     """Joints that are held along a path, and where [deg | mm]."""
-    return {name: _shown(plan.arm, plan.arm.joint_names.index(name), value) for name, value in plan.held.items()}
+    return {name: _in_units(plan.arm, plan.arm.joint_names.index(name), value) for name, value in plan.held.items()}
 
 
 def _approach(move: Trajectory) -> dict[str, Any]:
     return {"from_joints": units.joints_out(move.arm, move.start).tolist(), "duration_s": move.duration}
 
 
-def _shown(arm: Arm, joint: int, value: float) -> float:
+def _in_units(arm: Arm, joint: int, value: float) -> float:
     """One joint's value in degrees, or mm."""
     return value if arm.prismatic[joint] else value / units.DEGREE
 

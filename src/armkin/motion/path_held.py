@@ -27,34 +27,34 @@ if TYPE_CHECKING:
 
 
 def path_held(
-    arm: Arm, moves: Any, held: Mapping[str, float], asked: PathRequest, begin: Array | None = None
+    arm: Arm, moves: Any, held: Mapping[str, float], request: PathRequest, begin: Array | None = None
 ) -> PathPlan:
     """`armkin.path` with joints held: joint name -> value [rad | mm]. The plan is one of the whole arm.
 
-    asked: its start, near and jerk are those of all joints. The held joints go to their values in the plan's approach;
+    request: its start, near and jerk are those of all joints. Held joints go to their values in the plan's approach;
     begin: (n,) where the motion begins instead, with a joint move to its first posture. Raises as
     `armkin.path` does, NoSolutionError also for a value outside its joint's limits.
     """
     check_rates(arm)
     free = lock(arm, held)
     kept = [k for k, name in enumerate(arm.joint_names) if name not in held]
-    here = asked.start_joints(arm)
+    here = request.start_joints(arm)
     ready = unlock(arm, held, here[kept])
     check_limits(arm, ready[None])
     near, jerk = (
         None if value is None else np.broadcast_to(np.asarray(value, dtype=float), arm.n)[kept]
-        for value in (asked.near, asked.jerk)
+        for value in (request.near, request.jerk)
     )
-    of_free = replace(asked, start=here[kept], near=near, jerk=jerk)
+    of_free = replace(request, start=here[kept], near=near, jerk=jerk)
     try:
-        plan = planned(free, path_numbers.moves(free, moves, asked.task), of_free)
+        plan = planned(free, path_numbers.moves(free, moves, request.task), of_free)
     except NoSolutionError as error:
         if error.plan is not None:
             error.plan = _of_all(error.plan, arm, held)
         raise
     whole, begun = _of_all(plan, arm, held), unlock(arm, held, plan.motion.start)
     made = [_widened(one, arm, held) for one in plan.motion.stretches]
-    pace = plan.speed, asked.accel, check_jerk(arm, asked.jerk)
+    pace = plan.speed, request.accel, check_jerk(arm, request.jerk)
     if begin is not None and (first := straight(arm, begin, begun, *pace)).duration > 0:
         made, begun, shift = [first, *made], begin, 1
     else:

@@ -51,40 +51,40 @@ class PathRequest:
         return arm.home if self.start is None else np.asarray(self.start, dtype=float)
 
 
-def planned(arm: Arm, file: PathFile, asked: PathRequest) -> PathPlan:
+def planned(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
     """`armkin.path` of an arm none of whose joints is redundant, and whose rates are checked: as that says."""
     from armkin.path_file import check_robot
 
     check_robot(file, arm.name, arm.path)
-    pace = _pace(arm, file, asked)
+    pace = _pace(arm, file, request)
     if pace.turn:
         wrist_turn.check(arm)
-    here = asked.start_joints(arm)
+    here = request.start_joints(arm)
     if arm.motors and not undriven(arm):
         here = legal_with_same_pulses(arm, here)
-    near = None if asked.near is None else np.asarray(asked.near, dtype=float)
-    wish = corners_wished(file, asked.corners, asked.blend)
-    options = PathOptions(asked.task, wish, near, asked.branch, asked.split, asked.samples)
+    near = None if request.near is None else np.asarray(request.near, dtype=float)
+    wish = corners_wished(file, request.corners, request.blend)
+    options = PathOptions(request.task, wish, near, request.branch, request.split, request.samples)
     return checked(Walk(arm, file, pace, here, options).walked(MOVES))
 
 
-def _pace(arm: Arm, file: PathFile, asked: PathRequest) -> Pace:
+def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:
     """How fast and how exactly a path is moved along. Raises UsageError for what is out of range."""
     from armkin.path_file.path_keys import LEAST_TOLERANCE, LEAST_TOOL_SPEED
 
-    check_share("speed", asked.speed)
-    check_share("accel", asked.accel)
+    check_share("speed", request.speed)
+    check_share("accel", request.accel)
     for name, least, unit in (("tool_speed", LEAST_TOOL_SPEED, "mm/s"), ("tolerance", LEAST_TOLERANCE, "mm")):
-        given = getattr(asked, name)
+        given = getattr(request, name)
         if given is not None and not least <= given < np.inf:
             raise UsageError(f"{name} {given:g} is not possible; it is at least {least:g} {unit}")
     return Pace(
-        (file.speed or 100.0) / 100 * asked.speed,
-        asked.accel,
-        asked.tool_speed if asked.tool_speed is not None else file.tool_speed,
-        check_jerk(arm, asked.jerk),
-        asked.hold,
-        asked.tolerance or file.tolerance or TOLERANCE,
+        (file.speed or 100.0) / 100 * request.speed,
+        request.accel,
+        request.tool_speed if request.tool_speed is not None else file.tool_speed,
+        check_jerk(arm, request.jerk),
+        request.hold,
+        request.tolerance or file.tolerance or TOLERANCE,
         np.deg2rad(file.turn_tolerance or 0.0),
     )
 

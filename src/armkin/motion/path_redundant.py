@@ -37,24 +37,24 @@ MOST = 6  # values that are planned for
 SAME = 1e-9  # [rad] values of joint moves that are one
 
 
-def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, asked: PathRequest) -> PathPlan:
+def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, request: PathRequest) -> PathPlan:
     """`armkin.path` of an arm with a redundant joint, whose plan says in `held` where that is held.
 
     The file's joint moves say where; else it is where `near` has it, by default where it stands when the path begins,
     if that carries the path, or the nearest value that does. Raises as `armkin.path` does, UsageError also for joint
     moves that want the joint at different values.
     """
-    name, here = arm.joint_names[spare.joint], asked.start_joints(arm)
+    name, here = arm.joint_names[spare.joint], request.start_joints(arm)
     begin = _begin(arm, file, here)
-    said = _said(arm, file, spare.joint, here)
+    said = _redundant_start(arm, file, spare.joint, here)
     stands = here if begin is None else begin
-    close = stands if asked.near is None else np.asarray(asked.near, dtype=float)
+    close = stands if request.near is None else np.asarray(request.near, dtype=float)
     others = _of_others(arm, file, spare.joint)
     refused: NoSolutionError | None = None
     near = float(close[spare.joint]), float(stands[spare.joint])
-    for value in _values(arm, file, asked.task, *near) if said is None else [said]:
+    for value in _values(arm, file, request.task, *near) if said is None else [said]:
         try:
-            return path_held(arm, others, {name: value}, asked, begin)
+            return path_held(arm, others, {name: value}, request, begin)
         except NoSolutionError as error:
             refused = refused or error
     assert refused is not None
@@ -63,7 +63,7 @@ def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, asked: PathReque
 
 def values_to_hold(arm: Arm, file: PathFile, spare: Redundancy) -> tuple[float, ...]:
     """Values of the redundant joint at which a path from home may be carried [rad]: the nearest to its start first."""
-    if (said := _said(arm, file, spare.joint, arm.home)) is not None:
+    if (said := _redundant_start(arm, file, spare.joint, arm.home)) is not None:
         return (said,)
     begin = _begin(arm, file, arm.home)
     close = float((arm.home if begin is None else begin)[spare.joint])
@@ -78,27 +78,27 @@ def _over_range(arm: Arm, joint: int, close: float) -> Array:
     return np.append(np.linspace(low, high, VALUES), close if low <= close <= high else low)
 
 
-def _begin(arm: Arm, file: PathFile, here: Array) -> Array | None:
+def _begin(arm: Arm, file: PathFile, standing: Array) -> Array | None:
     """The posture (n,) that the file's start fixes, if it does."""
     value = file.start if file.start is None or isinstance(file.start, str) else file.start.joints
-    return None if value is None else _joints(arm, here, value, file.place("start"))
+    return None if value is None else _joints(arm, standing, value, file.place("start"))
 
 
-def _joints(arm: Arm, here: Array, value: Any, place: str) -> Array:
+def _joints(arm: Arm, standing: Array, value: Any, place: str) -> Array:
     try:
-        return path_numbers.joints(arm, here, value)
+        return path_numbers.joints(arm, standing, value)
     except UsageError as error:
         raise error.within(place) from None
 
 
-def _said(arm: Arm, file: PathFile, joint: int, here: Array) -> float | None:
+def _redundant_start(arm: Arm, file: PathFile, joint: int, standing: Array) -> float | None:
     """Where joint moves want the redundant joint [rad]; None: there are none that say so."""
     name, first = arm.joint_names[joint], None
     for k, move in enumerate(file.moves):
         if move.joint is None:
             continue
         place = file.place_of(k, k)
-        value = float(_joints(arm, here, move.joint, place)[joint])
+        value = float(_joints(arm, standing, move.joint, place)[joint])
         if isinstance(move.joint, Mapping) and name not in move.joint:
             continue
         if first is None:
@@ -129,7 +129,7 @@ def _of_others(arm: Arm, file: PathFile, joint: int) -> PathFile:
     return file.model_copy(update={"start": start, "moves": [move(one) for one in file.moves]})
 
 
-def _values(arm: Arm, file: PathFile, task: str | None, close: float, stands: float) -> Iterator[float]:
+def _values(arm: Arm, file: PathFile, task: str | None, close: float, start: float) -> Iterator[float]:
     """Values of the redundant joint to plan for [rad]: those at which targets along all ways have a branch.
 
     Those at which it hits nothing come first, and of these those that keep `AWAY`; then the nearest to `close`. Where
@@ -142,7 +142,7 @@ def _values(arm: Arm, file: PathFile, task: str | None, close: float, stands: fl
     try:
         _, ways = routes(arm, file.model_copy(update={"task": task or file.task}), STEP * arm.reach)
     except UsageError:  # what is wrong with it, if anything, is said by its plan
-        yield stands
+        yield start
         return
     t = _over_range(arm, j, close)
     at = t * arm.ratio[j]

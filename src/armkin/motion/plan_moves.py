@@ -108,17 +108,17 @@ class Walk:
         number = 0
         while number <= len(self.file.moves):
             try:
-                self._do(kinds, number)
+                self._carry_out_move(kinds, number)
                 number += 1
             except NoSolutionError as error:
                 self.refused = self.refused or error
                 if not self.untried_postures:
                     raise self.refused from None
-                number = self._back()
+                number = self._restore()
         self.plan.approach = approach(self.arm, here, self.begun, self.pace.speed, self.pace.accel, self.pace.jerk)
         return self.plan.finished(self.begun, self.stretches, self.markers)
 
-    def _do(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]], number: int) -> None:
+    def _carry_out_move(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]], number: int) -> None:
         """Do a move; behind the last one, what has gathered."""
         if number == len(self.file.moves):
             with _of_moves(self):
@@ -144,7 +144,7 @@ class Walk:
             self.emit_event(kind, value)
         self.goal = None
 
-    def _back(self) -> int:
+    def _restore(self) -> int:
         """Be again where a posture was taken, with the others left; the number of that move."""
         others, refused, (state, plan) = self.untried_postures, self.refused, self.saved_state
         vars(self).update(
@@ -275,9 +275,13 @@ class Walk:
             raise branch_report.refused(self.plan, carried, branch)
         return carried.columns.s, carried.moving
 
-    def append_curves(self, route: Route, curves: list[Curve | Smoothed], order: dict[int, int], given: Missed) -> None:
-        """Put a run's curves into the plan, with the pauses where they begin; given: what they miss of given points."""
-        at = {round(float(route.ends[order[k]]), 6): self.pauses[k] for k in self.pauses if k in order}
+    def append_curves(
+        self, route: Route, curves: list[Curve | Smoothed], number_of_curve: dict[int, int], misses: Missed
+    ) -> None:
+        """Put a run's curves into the plan, with the pauses where they begin; misses: of the given points."""
+        at = {
+            round(float(route.ends[number_of_curve[k]]), 6): self.pauses[k] for k in self.pauses if k in number_of_curve
+        }
         for curve in curves:
             path_ = way_of(curve)
             for kind, value in at.pop(round(float(path_.s[0]), 6), ()):
@@ -285,7 +289,7 @@ class Walk:
             self.plan.along(len(self.stretches), curve, self.plan.length)
             self.stretches.append(curve)
             self.q = curve.end
-        _measure(self.plan, route, ways_of(curves), given)
+        _measure(self.plan, route, ways_of(curves), misses)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
@@ -305,7 +309,7 @@ def _curves(
     arm: Arm, pace: Pace, route: Route, s: Array, run: Run, near: Array, fixed: Array | None
 ) -> tuple[list[Curve | Smoothed], Missed]:
     """A run in time, and what it misses of given points: a route fitted to them leaves it little tolerance."""
-    if not len(route.given[0]):
+    if not len(route.given_points[0]):
         return stretches(arm, route, s, run, near, pace, fixed=fixed), None
     for share in PLAN:
         tight = replace(pace, tolerance=share * pace.tolerance)
@@ -322,11 +326,11 @@ def _curves(
     )
 
 
-def _measure(plan: PathPlan, route: Route, path: Knots, given: Missed) -> None:
+def _measure(plan: PathPlan, route: Route, path: Knots, misses: Missed) -> None:
     """Note how far a curve leaves the route, or given points, and how near it comes to a singularity."""
-    off = route.largest_detour + deviation(plan.arm, route, path) if given is None else given[0]
-    if given is not None and off > plan.deviation:
-        plan.rounded_most = plan.length + given[1]
+    off = route.largest_detour + deviation(plan.arm, route, path) if misses is None else misses[0]
+    if misses is not None and off > plan.deviation:
+        plan.rounded_most = plan.length + misses[1]
     plan.deviation = max(plan.deviation, off)
     plan.nearer_singularity(path.q, path.s)
 

@@ -116,9 +116,9 @@ class _Edges(NamedTuple):
 class _Answers:
     """The answers of S solves, each for M azimuths and W words of rolls (both 1 where they are no arcs)."""
 
-    def __init__(self, question: Question, target: Array, at: Array, direction: NDArray[np.intp]) -> None:
+    def __init__(self, question: Question, target: Array, azimuth: Array, direction: NDArray[np.intp]) -> None:
         self.question, self.grid, self.arm = question, question.grid, question.grid.arm
-        self.at, self.direction = at, direction
+        self.azimuth, self.direction = azimuth, direction
         s = ik(self.arm, target)
         self.s, self.valid = s, s.valid
         self.count = self.grid.rolls_count if question.roll_arcs else 1
@@ -128,7 +128,7 @@ class _Answers:
         self.length: NDArray[Any] = legal.astype(np.intp)
         if question.arcs:
             last = self.arm.n - 1 if question.roll_arcs else self.arm.n
-            inner = s.valid & inside(self.arm, s.q, range(1, last))
+            inner = s.valid & cells_inside(self.arm, s.q, range(1, last))
             self.first, length = arc(self.arm, s.q[:, :, 0], 0, question.turns, 1)
             self.length = np.where(inner, length, 0)
             if question.roll_arcs:
@@ -206,13 +206,13 @@ class _Answers:
             rows = np.flatnonzero((self.s.status == Status.BOUNDARY) | (self.s.status == Status.SINGULAR))
         counts = {name: np.zeros((len(rows), M)) for name in ("reached", "single", "legal", "anywhere")}
         for k, row in enumerate(rows.tolist()):
-            s = self._asked(row)
+            s = self._all_solutions(row)
             legal = s.within_limits.sum(axis=1)
             for name, found in zip(counts, (legal > 0, legal == 1, legal, s.valid.any(axis=1)), strict=True):
                 counts[name][k] = found.reshape(M, self.count).sum(axis=1)
         return _Edges(rows, counts)
 
-    def _asked(self, row: int) -> Solutions:
+    def _all_solutions(self, row: int) -> Solutions:
         """All poses of one solve, azimuth by azimuth."""
         M, L = self.grid.azimuths, self.count
         azimuth, turn = np.divmod(np.arange(M * L), L)
@@ -222,7 +222,7 @@ class _Answers:
             roll = np.full(
                 M * L, (row % self.question.solves_a_ring % self.grid.rolls_count) * (TURN / self.grid.rolls_count)
             )
-        return ik(self.arm, self.grid.targets(self.at[each], azimuth * (TURN / M), self.direction[each], roll))
+        return ik(self.arm, self.grid.targets(self.azimuth[each], azimuth * (TURN / M), self.direction[each], roll))
 
     def _measures(self, orientations: int, M: int) -> dict[str, Array]:
         """Best manipulability and limit margin, least step error over legal answers; nan where there is none."""
@@ -275,15 +275,15 @@ def limit_margin(arm: Arm, q: Array) -> Array:
     return margin
 
 
-def inside(arm: Arm, q: Array, joints: range) -> Bool:
+def cells_inside(arm: Arm, q: Array, joints: range) -> Bool:
     """Whether some copies of these joints are within limits: (..., n) -> (...)."""
     inside = np.ones(q.shape[:-1], bool)
     for j in joints:
-        inside &= within(arm, q[..., j], j)
+        inside &= some_copy_legal(arm, q[..., j], j)
     return inside
 
 
-def within(arm: Arm, value: Array, joint: int) -> Bool:
+def some_copy_legal(arm: Arm, value: Array, joint: int) -> Bool:
     """Whether some copy of a joint's values is within limits."""
     low, high = arm.lower[joint] - SLACK, arm.upper[joint] + SLACK
     if not arm.prismatic[joint]:

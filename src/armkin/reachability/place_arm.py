@@ -52,12 +52,12 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
     return replace(arm, keep_out=mine, clearance=clearance, of_scene=0), Around(still, clearance, sha256)
 
 
-def free(arm: Arm, around: Around, at: tuple[float, float, float], turn: float, q: Array) -> NDArray[np.bool_]:
+def free(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float, q: Array) -> NDArray[np.bool_]:
     """Which postures (..., n) of an arm at a place hit nothing of what stands there; nan: none.
 
     None does where the base's axis goes into an obstacle: a base may stand on one, but not in it.
     """
-    stands = _standing(arm, around, at, turn)
+    stands = _standing(arm, obstacles, position, turn)
     held = guard(stands)
     base = held.bodies.owner == 0
     begin, end = held.bodies.begin[base].T, held.bodies.end[base].T
@@ -67,21 +67,21 @@ def free(arm: Arm, around: Around, at: tuple[float, float, float], turn: float, 
 
 
 @lru_cache(maxsize=4)
-def _standing(arm: Arm, around: Around, at: tuple[float, float, float], turn: float) -> Arm:
+def _standing(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, among what stands with the targets."""
-    return replace(_put(arm, at, turn), keep_out=around.keep_out, clearance=around.clearance)
+    return replace(_moved_arm(arm, position, turn), keep_out=obstacles.keep_out, clearance=obstacles.clearance)
 
 
-def standing(arm: Arm, around: Around, at: tuple[float, float, float], turn: float) -> Arm:
+def standing(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, with its own keep-outs, which move with it, and what stands there."""
-    mine = tuple(_moved(entry, at, turn) for entry in arm.keep_out)
-    clearance = max(arm.clearance, around.clearance)
-    return replace(_put(arm, at, turn), keep_out=mine + around.keep_out, clearance=clearance)
+    mine = tuple(_moved_entry(entry, position, turn) for entry in arm.keep_out)
+    clearance = max(arm.clearance, obstacles.clearance)
+    return replace(_moved_arm(arm, position, turn), keep_out=mine + obstacles.keep_out, clearance=clearance)
 
 
-def _put(arm: Arm, at: tuple[float, float, float], turn: float) -> Arm:
+def _moved_arm(arm: Arm, position: tuple[float, float, float], turn: float) -> Arm:
     P = np.eye(4)
-    P[:3, :3], P[:3, 3] = rotation_about(2, turn), at
+    P[:3, :3], P[:3, 3] = rotation_about(2, turn), position
     link, base = arm.link.copy(), P @ arm.base
     link[0] = P @ link[0]
     for moved in (link, base):
@@ -89,15 +89,15 @@ def _put(arm: Arm, at: tuple[float, float, float], turn: float) -> Arm:
     return replace(arm, link=link, base=base)
 
 
-def _moved(entry: Entry, at: tuple[float, float, float], turn: float) -> Entry:
+def _moved_entry(entry: Entry, position: tuple[float, float, float], turn: float) -> Entry:
     """A keep-out that stands with an arm, where the arm stands at a place."""
 
     def there(point: Sequence[float]) -> tuple[float, float, float]:
-        x, y, z = (rotation_about(2, turn) @ np.array(point) + at).tolist()
+        x, y, z = (rotation_about(2, turn) @ np.array(point) + position).tolist()
         return x, y, z
 
     if entry.floor is not None:
-        return entry.model_copy(update={"floor": entry.floor + at[2]})
+        return entry.model_copy(update={"floor": entry.floor + position[2]})
     if entry.capsule is not None:
         ends = {"begin": there(entry.capsule.begin), "end": there(entry.capsule.end)}
         return entry.model_copy(update={"capsule": entry.capsule.model_copy(update=ends)})

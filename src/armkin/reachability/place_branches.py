@@ -46,7 +46,7 @@ def ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
     return whole, along.min(axis=0), along.max(axis=0)
 
 
-def within(arm: Arm, low: Array, high: Array, joints: range) -> Bool:
+def some_copy_legal(arm: Arm, low: Array, high: Array, joints: range) -> Bool:
     """Whether some copies of the ways of these joints, from low to high (..., n), are within limits: (...)."""
     inside = np.ones(low.shape[:-1], bool)
     for j in joints:

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from armkin.reachability.place_search import Place
 
 
-def write(found: Sequence[Place], out: str | os.PathLike[str]) -> None:
+def write(places: Sequence[Place], out: str | os.PathLike[str]) -> None:
     """All places as a file of columns: .npz, .parquet, .jsonl or .csv; parts of an unfinished run go."""
     path = os.fspath(out)
     format = format_of(path)
-    table = columns(found)
+    table = columns(places)
     with files.write_whole(path, "wb") as file:
         if format.name == "csv":
             file.write((csv_line(list(table)) + "\n").encode())
@@ -31,11 +31,11 @@ def write(found: Sequence[Place], out: str | os.PathLike[str]) -> None:
     Parts(path, {}).remove()
 
 
-def columns(found: Sequence[Place]) -> Table:
+def columns(places: Sequence[Place]) -> Table:
     """One row a place: robot, x, y, z [mm], yaw [deg], targets reached, of how many, margin [mm]."""
-    names = tuple(dict.fromkeys(one.arm.name for one in found))
+    names = tuple(dict.fromkeys(one.arm.name for one in places))
     rows = []
-    for one in found:
+    for one in places:
         x, y, yaw = (axis.ravel() for axis in np.meshgrid(one.x, one.y, np.degrees(one.yaw).round(9), indexing="ij"))
         z, of = np.full(x.shape, one.z), np.full(x.shape, one.of)
         which = np.full(x.shape, names.index(one.arm.name))

@@ -33,17 +33,17 @@ class Planned:
     refused: str = ""
 
 
-def path_of(given: Any) -> PathFile | None:
+def path_of(targets: Any) -> PathFile | None:
     """A path by its file's name, its model or its data; None: these are targets."""
-    if isinstance(given, str | os.PathLike):
-        name = os.fspath(given)
+    if isinstance(targets, str | os.PathLike):
+        name = os.fspath(targets)
         if Path(name).suffix.lower() not in (".yaml", ".yml"):
             raise UsageError(f"{name}: a path to place an arm for is a .yaml file; targets are given as an array")
 
         return path_file.read(name)
-    if isinstance(given, Mapping):
-        return path_file.validated(dict(given))
-    return given if hasattr(given, "moves") else None
+    if isinstance(targets, Mapping):
+        return path_file.validated(dict(targets))
+    return targets if hasattr(targets, "moves") else None
 
 
 def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
@@ -76,9 +76,9 @@ def unplanned(arm: Arm) -> str:
 
 def plan(
     arm: Arm,
-    around: Around,
+    obstacles: Around,
     index: tuple[int, int, int],
-    at: tuple[float, float, float],
+    position: tuple[float, float, float],
     turn: float,
     file: PathFile,
 ) -> Planned:
@@ -87,6 +87,6 @@ def plan(
 
     anyones = file.model_copy(update={"robot": None})  # another robot may stand in for the one that it was made for
     try:
-        return Planned(index, path(standing(arm, around, at, turn), anyones))
+        return Planned(index, path(standing(arm, obstacles, position, turn), anyones))
     except NoSolutionError as error:
         return Planned(index, None, str(error).splitlines()[0])

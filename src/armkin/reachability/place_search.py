@@ -113,8 +113,8 @@ class Chunk(NamedTuple):
     """Some positions (P, 2) [mm] of one arm."""
 
     number: int
-    which: int  # of the questions
-    at: Array
+    question: int  # of the questions
+    positions: Array
 
 
 def place(
@@ -169,10 +169,12 @@ def place(
     several = [arms] if not isinstance(arms, Sequence) else list(arms)
     settings = {"area": area, "step": step, "yaw": yaw, "z": z}
     told = None if progress is None else lambda done, total: progress(done)
-    return each(several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), told, solve or ik)
+    return place_several(
+        several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), told, solve or ik
+    )
 
 
-def each(
+def place_several(
     arms: Sequence[Arm],
     targets: Sequence[ArrayLike | str | os.PathLike[str] | PathFile],
     settings: dict[str, Any],
@@ -191,17 +193,17 @@ def each(
     asked = [one._replace(solve=solve) for one in asked]
     grids = [_axes(one, settings["area"], settings["step"]) for one in asked]
     work_list = _chunks(asked, [axes for axes, _ in grids])
-    parts, done, total = _parts(asked, settings, out), 0, sum(len(chunk.at) for chunk in work_list)
+    parts, done, total = _parts(asked, settings, out), 0, sum(len(chunk.positions) for chunk in work_list)
     counts: dict[int, NDArray[np.int64]] = {}
     with kept_chunks.holding(parts, len(work_list)):
         for number, columns in kept_chunks.tables(engine, work, asked, work_list, parts):
             counts[number] = np.asarray(columns["reached"])
-            done += len(work_list[number].at)
+            done += len(work_list[number].positions)
             if progress is not None:
                 progress(done, total)
     found = []
     for i, (one, grid, file) in enumerate(zip(asked, grids, paths, strict=True)):
-        mine = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.which == i])
+        mine = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.question == i])
         found.append(_result(one, *grid, mine, settings, file))
     return found
 
@@ -244,9 +246,9 @@ def _with_postures(question: Question, place: Place) -> Place:
     s, legal = free_from(one, at, turn)
     row = np.flatnonzero(legal.any(axis=1))
     q = s.q[row, np.where(legal, s.motion, np.inf)[row].argmin(axis=1)] if len(row) else place.postures
-    if one.whole is None:
+    if one.full_arm is None:
         return replace(place, postures=np.asarray(q))
-    held = one.whole.joints
+    held = one.full_arm.joints
     return replace(place, postures=unlock(question.arm, held, q) if len(row) else place.postures, held=held)
 
 
@@ -259,7 +261,7 @@ def _planned(question: Question, place: Place, file: PathFile, room: Room) -> Pl
     while left.max() == place.of and len(tried) < TRIES and sum(one.plan is not None for one in tried) < FEW:
         i, j, k = _best(room, left, place.margin)
         at = (float(place.x[i]), float(place.y[j]), place.z)
-        tried.append(place_path.plan(question.arm, question.around, (i, j, k), at, float(place.yaw[k]), file))
+        tried.append(place_path.plan(question.arm, question.obstacles, (i, j, k), at, float(place.yaw[k]), file))
         left[i, j, k] = -1
         if tried[-1].plan is None:
             place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
@@ -294,7 +296,8 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
     files.ending(out, "places are", ENDINGS)
     files.check(os.fspath(out))
     robots = [
-        [one.arm.sha256, one.around.sha256, digest(one.targets.tobytes()), *one.ways, *one.values] for one in questions
+        [one.arm.sha256, one.obstacles.sha256, digest(one.targets.tobytes()), *one.ways, *one.values]
+        for one in questions
     ]
     asked = {"command": "place", "armkin": __version__, "robots, scene and targets": robots, **settings}
     asked["solve"] = [f"{one.solve.__module__}.{one.solve.__qualname__}" for one in questions]
@@ -325,17 +328,17 @@ def _axes(
     return (axes[0], axes[1]), (inner[0], inner[1])
 
 
-def _blocks(question: Question, at: Array) -> Iterator[Array]:
+def _blocks(question: Question, positions: Array) -> Iterator[Array]:
     one = next(each_value(question))
     solves = len(one.targets) * (1 if one.arcs else one.yaws) * max(len(question.values), 1)
-    count = max((ANSWERS // len(one.targets) // one.yaws if one.beside else SOLVES // solves), 1)
-    for start in range(0, len(at), count):
-        yield at[start : start + count]
+    count = max((ANSWERS // len(one.targets) // one.yaws if one.by_distance_alone else SOLVES // solves), 1)
+    for start in range(0, len(positions), count):
+        yield positions[start : start + count]
 
 
 def work(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
     """How many targets are reached from each position and yaw: (P K,)."""
-    return chunk.number, {"reached": reached_counts(questions[chunk.which], chunk.at).ravel()}
+    return chunk.number, {"reached": reached_counts(questions[chunk.question], chunk.positions).ravel()}
 
 
 def _margins(good: NDArray[np.bool_], step: float) -> Array:
@@ -347,12 +350,12 @@ def _margins(good: NDArray[np.bool_], step: float) -> Array:
         if not good[:, :, k].any():
             continue
         # along y, then across x: the lower envelope of parabolas, here tried row by row
-        rows = _along(good[:, :, k])
+        rows = _depth_along_y(good[:, :, k])
         out[:, :, k] = np.sqrt(np.min((columns - columns.T)[:, :, None] ** 2 + rows[None] ** 2, axis=1)) * step
     return out
 
 
-def _along(good: NDArray[np.bool_]) -> Array:
+def _depth_along_y(good: NDArray[np.bool_]) -> Array:
     """How many places along y it is to the nearest one that is not good: (X, Y)."""
     index = np.where(good, np.inf, np.arange(good.shape[1]))
     ahead = np.minimum.accumulate(index[:, ::-1], axis=1)[:, ::-1] - np.arange(good.shape[1])
@@ -381,10 +384,10 @@ def _rooms(question: Question, x: Array, y: Array, yaws: Array) -> Room:
     return room
 
 
-def _room(question: Question, at: Array, turn: float) -> float:
+def _room(question: Question, position: Array, turn: float) -> float:
     """The least, over the targets reached, of the best branch's distance to a limit, as a share of the range."""
-    question = at_value(question, at, turn)
-    s, legal = free_from(question, at, turn)
+    question = at_value(question, position, turn)
+    s, legal = free_from(question, position, turn)
     margins = np.where(legal, limit_margin(question.arm, s.q), -np.inf).max(axis=1, initial=-np.inf)
     there = margins[np.isfinite(margins)]
     return float(there.min()) if len(there) else 0.0

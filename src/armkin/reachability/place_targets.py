@@ -17,7 +17,7 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.lock import lock, unlock
 from armkin.model.rotation import rotation_about
 from armkin.reachability import place_branches
-from armkin.reachability.cell_answers import TURN, arc, packed, within
+from armkin.reachability.cell_answers import TURN, arc, packed, some_copy_legal
 from armkin.reachability.cells import STRAIGHT
 from armkin.reachability.place_arm import Around, free
 from armkin.reachability.place_upright import RADII, by_radius
@@ -49,11 +49,11 @@ class Question(NamedTuple):
     yaws: int
     step: float  # [rad] of the yaw
     z: float
-    around: Around = Around()
+    obstacles: Around = Around()
     ways: tuple[int, ...] = ()  # of a path: how many targets each way has that one branch is to carry
     spare: str = ""  # the redundant joint, which a path's plan holds,
     values: tuple[float, ...] = ()  # and where it may [rad], the best first
-    whole: Held | None = None  # where one of the values is chosen
+    full_arm: Held | None = None  # where one of the values is chosen
     solve: Solve = ik  # a function of a module, as it travels
 
     @property
@@ -63,7 +63,7 @@ class Question(NamedTuple):
         return self._upright and bool(on_axis) and abs(self.yaws * self.step - TURN) < STRAIGHT
 
     @property
-    def beside(self) -> bool:
+    def by_distance_alone(self) -> bool:
         """Whether what joints behind joint 1 are asked depends on the target's distance from that alone."""
         turning = self.task.orientation != "none" or self.task.name in TURNING
         return self._upright and not turning and not self.arcs
@@ -72,7 +72,7 @@ class Question(NamedTuple):
     def _upright(self) -> bool:
         """Whether joint 1 turns about a line upright, as it is commanded, and nothing is kept out."""
         arm = self.arm
-        free = not arm.keep_out and not self.around.keep_out
+        free = not arm.keep_out and not self.obstacles.keep_out
         plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and arm.n == self.task.constraints
         return plain and free and bool(np.abs(arm.link[0][:2, 2]).max() <= STRAIGHT)
 
@@ -87,29 +87,30 @@ def positions_of(task: Task, targets: Array) -> Array:
     return targets[:, :3, 3] if task.orientation == "full" else targets[:, : task.position]
 
 
-def reached_counts(question: Question, at: Array) -> NDArray[np.int64]:
+def reached_counts(question: Question, positions: Array) -> NDArray[np.int64]:
     """How many targets are reached from positions (P, 2) at each yaw: (P, K); of values to hold, at the best one."""
     if question.values:
-        return _most(question, at)
-    at_once = len(at) if question.beside else max(BLOCK // len(question.targets), 1)
-    blocks = [at[start : start + at_once] for start in range(0, len(at), at_once)]
-    return np.concatenate([_counted(question, block, _legal_yaws(question, block)) for block in blocks])
+        return _most_of_values(question, positions)
+    at_once = len(positions) if question.by_distance_alone else max(BLOCK // len(question.targets), 1)
+    blocks = [positions[start : start + at_once] for start in range(0, len(positions), at_once)]
+    return np.concatenate([_counted_targets(question, block, _legal_yaws(question, block)) for block in blocks])
 
 
-def _most(question: Question, at: Array) -> NDArray[np.int64]:
+def _most_of_values(question: Question, positions: Array) -> NDArray[np.int64]:
     """The same of a redundant joint's values: the most of what is reached with it held at each of its values.
 
     Keep-outs only take away: a place is asked among them where more is reached without them than is known.
     """
-    counts, blocked = np.zeros((len(at), question.yaws), np.int64), question.arm.keep_out or question.around.keep_out
-    bare = question._replace(arm=_bare(question.arm), around=Around())
-    left = np.arange(len(at))
+    counts = np.zeros((len(positions), question.yaws), np.int64)
+    blocked = question.arm.keep_out or question.obstacles.keep_out
+    bare = question._replace(arm=_without_keep_outs(question.arm), obstacles=Around())
+    left = np.arange(len(positions))
     for one, without in zip(each_value(question), each_value(bare), strict=True):
-        some, found = left, reached_counts(without, at[left])
+        some, found = left, reached_counts(without, positions[left])
         if blocked:
             some = left[(found > counts[left]).any(axis=1)]
         if len(some):
-            counts[some] = np.maximum(counts[some], reached_counts(one, at[some]) if blocked else found)
+            counts[some] = np.maximum(counts[some], reached_counts(one, positions[some]) if blocked else found)
         left = left[(counts[left] < len(question.targets)).any(axis=1)]
         if not len(left):
             break
@@ -122,17 +123,17 @@ def each_value(question: Question) -> Iterator[Question]:
         yield question
     for value in question.values:
         whole = Held(question.arm, {question.spare: value})
-        rest = _rest(question.arm, question.spare, value)  # one of many arms: not worth being compiled
-        yield question._replace(arm=rest, values=(), whole=whole, solve=ik)
+        rest = _with_held_joint(question.arm, question.spare, value)  # one of many arms: not worth being compiled
+        yield question._replace(arm=rest, values=(), full_arm=whole, solve=ik)
 
 
-def at_value(question: Question, at: Array, turn: float) -> Question:
+def at_value(question: Question, position: Array, turn: float) -> Question:
     """The question with the redundant joint held at the first value at which most is reached from one place."""
     if not question.values:
         return question
     k, most, best = round(turn / question.step), -1, question
     for one in each_value(question):
-        if (count := int(reached_counts(one, at[None])[0, k])) > most:
+        if (count := int(reached_counts(one, position[None])[0, k])) > most:
             most, best = count, one
         if most == len(question.targets):
             break
@@ -140,59 +141,63 @@ def at_value(question: Question, at: Array, turn: float) -> Question:
 
 
 @lru_cache(maxsize=4)
-def _bare(arm: Arm) -> Arm:
+def _without_keep_outs(arm: Arm) -> Arm:
     """The arm without its keep-outs."""
     return replace(arm, keep_out=()) if arm.keep_out else arm
 
 
 @lru_cache(maxsize=256)
-def _rest(arm: Arm, joint: str, value: float) -> Arm:
+def _with_held_joint(arm: Arm, joint: str, value: float) -> Arm:
     """The arm with a joint held: one and the same for each value, so that its solver is prepared once."""
     return lock(arm, {joint: value})
 
 
-def _counted(question: Question, at: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _counted_targets(question: Question, positions: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
     """The same of what is legal (P, N, K); of ways that one branch does not carry, less than all."""
     if not question.ways:
         return np.asarray(legal.sum(axis=1, dtype=np.int64))
-    counts, begin = np.zeros((len(at), question.yaws), np.int64), 0
+    counts, begin = np.zeros((len(positions), question.yaws), np.int64), 0
     for length in question.ways:
         here = slice(begin, begin + length)
         count = legal[:, here].sum(axis=1, dtype=np.int64)
         whole = count == length
         for p in np.flatnonzero(whole.any(axis=1)) if length > 1 else ():
-            whole[p] = _on_one_branch(question._replace(targets=question.targets[here]), at[p], whole[p])
+            whole[p] = _on_one_branch(question._replace(targets=question.targets[here]), positions[p], whole[p])
         counts += np.where(whole, length, np.minimum(count, length - 1))
         begin += length
     return counts
 
 
-def _legal_yaws(question: Question, at: Array) -> NDArray[np.bool_]:
+def _legal_yaws(question: Question, positions: Array) -> NDArray[np.bool_]:
     """Which targets are reached from positions (P, 2) at each yaw: (P, N, K)."""
     N, K = len(question.targets), question.yaws
-    if question.arm.keep_out or question.around.keep_out:
+    if question.arm.keep_out or question.obstacles.keep_out:
         turns = (np.arange(K) * question.step).tolist()
-        return np.stack([np.stack([legal_from(question, one, turn) for turn in turns], axis=1) for one in at])
-    target, place = np.tile(np.arange(N), len(at)), np.repeat(at, N, axis=0)
-    if question.beside and len(at) * K > 4 * RADII and (read := _by_radius(question, at)) is not None:
+        return np.stack([np.stack([legal_from(question, one, turn) for turn in turns], axis=1) for one in positions])
+    target, place = np.tile(np.arange(N), len(positions)), np.repeat(positions, N, axis=0)
+    if (
+        question.by_distance_alone
+        and len(positions) * K > 4 * RADII
+        and (read := _by_radius(question, positions)) is not None
+    ):
         return read
     legal = (_by_arcs if question.arcs else _yaw_by_yaw)(question, target, place)
-    return legal.reshape(len(at), N, K)
+    return legal.reshape(len(positions), N, K)
 
 
-def _by_radius(question: Question, at: Array) -> NDArray[np.bool_] | None:
+def _by_radius(question: Question, positions: Array) -> NDArray[np.bool_] | None:
     """The same by what the joints behind joint 1 do at a target's distance from it; None without a closed form."""
     high = question.targets.copy()
     if question.task.position > 2:
         high[:, 2] -= question.z
     turns: Array = np.asarray(np.arange(question.yaws) * question.step, float)
-    if (found := by_radius(question.arm, question.task.name, high, at, turns)) is None:
+    if (found := by_radius(question.arm, question.task.name, high, positions, turns)) is None:
         return None
     legal, asked = found
     p, i, k = np.nonzero(asked)
     for start in range(0, len(p), BLOCK):
         some = slice(start, start + BLOCK)
-        beside = _beside(question._replace(targets=question.targets[i[some]]), at[p[some]])
+        beside = _unturned_targets(question._replace(targets=question.targets[i[some]]), positions[p[some]])
         turn = turns[k[some]]
         goals = _turned(question.task, beside, turn, np.cos(turn), np.sin(turn))
         legal[p[some], i[some], k[some]] = _any_legal(question, goals)
@@ -203,7 +208,7 @@ def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDAr
     """At which yaws targets (M,) are reached from places (M, 2), by one solve each: (M, K)."""
     legal = np.zeros((len(target), question.yaws), bool)
     some = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
-    goals = _beside(question._replace(targets=question.targets[target[some]]), place[some])
+    goals = _unturned_targets(question._replace(targets=question.targets[target[some]]), place[some])
     left = np.arange(len(some))
     if (parts := columns(question.arm, goals, question.task.name)) is not None:
         edges = [left[:0]]
@@ -224,9 +229,9 @@ def _turned_legal(question: Question, values: list[Array], valid: NDArray[np.boo
     arm, K = question.arm, question.yaws
     allowed = valid
     for j in range(1, arm.n):
-        allowed = allowed & within(arm, values[j], j)
+        allowed = allowed & some_copy_legal(arm, values[j], j)
     first, length = arc(arm, values[0], 0, K, question.sense)
-    return _covered(first, np.where(allowed, length, 0), K)
+    return _covered_arcs(first, np.where(allowed, length, 0), K)
 
 
 def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
@@ -238,7 +243,7 @@ def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> N
     for start in range(0, len(target), at_once):
         some = slice(start, start + at_once)
         m, k = np.nonzero(_within_reach(question, target[some], place[some], turns))
-        beside = _beside(question._replace(targets=question.targets[target[some]]), place[some])
+        beside = _unturned_targets(question._replace(targets=question.targets[target[some]]), place[some])
         goals = _turned(question.task, beside[m], turns[k], cosine[k], sine[k])
         legal[start + m, k] = _any_legal(question, goals)
     return legal
@@ -253,7 +258,7 @@ def _any_legal(question: Question, goals: Array) -> NDArray[np.bool_]:
         for part in parts:
             allowed = part.valid
             for j in range(arm.n):
-                allowed = allowed & within(arm, part.values[j], j)
+                allowed = allowed & some_copy_legal(arm, part.values[j], j)
             legal[part.rows] = allowed.any(axis=0)
             edges.append(part.rows.start + part.left)
         left = np.concatenate(edges)
@@ -276,7 +281,7 @@ def _within_reach(question: Question, target: NDArray[np.intp], place: Array, tu
     return np.asarray(away <= (arm.reach * (1.0 + BEYOND)) ** 2)
 
 
-def _covered(first: NDArray[np.intp], length: NDArray[np.intp], count: int) -> NDArray[np.bool_]:
+def _covered_arcs(first: NDArray[np.intp], length: NDArray[np.intp], count: int) -> NDArray[np.bool_]:
     """Which places of circles of `count` lie on one of their arcs at least: (B, M), (B, M) -> (M, count)."""
     until = _until(count)
     words = np.zeros((first.shape[1], until.shape[1]), np.uint64)
@@ -296,55 +301,57 @@ def _until(count: int) -> NDArray[np.uint64]:
     return np.concatenate([once, once[-1] ^ once[1:]])
 
 
-def _on_one_branch(question: Question, at: Array, which: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _on_one_branch(question: Question, position: Array, yaws: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """At which of some yaws (K,) one branch carries all targets."""
     arm, K = question.arm, question.yaws
     if question.arcs:
-        s = isolated(arm, seen_from(question, at, 0.0), question.task.name)
+        s = isolated(arm, targets_from(question, position, 0.0), question.task.name)
         whole, low, high = place_branches.ranges(s, s.valid)
-        allowed = whole & place_branches.within(arm, low, high, range(1, arm.n))
+        allowed = whole & place_branches.some_copy_legal(arm, low, high, range(1, arm.n))
         first, length = place_branches.arc(arm, low[:, 0], high[:, 0], K, question.sense)
         places = (np.arange(K) - first[:, None]) % K < np.where(allowed, length, 0)[:, None]
-        return np.asarray(which & places.any(axis=0))
+        return np.asarray(yaws & places.any(axis=0))
     out = np.zeros(K, bool)
-    for k in np.flatnonzero(which).tolist():
-        s, free = free_from(question, at, k * question.step, within=False)
+    for k in np.flatnonzero(yaws).tolist():
+        s, free = free_from(question, position, k * question.step, legal_only=False)
         whole, low, high = place_branches.ranges(s, free)
-        out[k] = (whole & place_branches.within(arm, low, high, range(arm.n))).any()
+        out[k] = (whole & place_branches.some_copy_legal(arm, low, high, range(arm.n))).any()
     return out
 
 
-def legal_from(question: Question, at: Array, turn: float) -> NDArray[np.bool_]:
+def legal_from(question: Question, position: Array, turn: float) -> NDArray[np.bool_]:
     """Which targets are reached from one place: (N,)."""
-    return np.asarray(free_from(question, at, turn)[1].any(axis=1))
+    return np.asarray(free_from(question, position, turn)[1].any(axis=1))
 
 
-def free_from(question: Question, at: Array, turn: float, within: bool = True) -> tuple[Solutions, NDArray[np.bool_]]:
-    """The branches of all targets from one place, and which are free (N, B); within: and within limits."""
+def free_from(
+    question: Question, position: Array, turn: float, legal_only: bool = True
+) -> tuple[Solutions, NDArray[np.bool_]]:
+    """The branches of all targets from one place, and which are free (N, B); legal_only: and within limits."""
     # of a family every posture is an answer, but what one branch carries is another
-    find = question.solve if within else isolated
-    s = find(question.arm, seen_from(question, at, turn), question.task.name)
-    legal = s.within_limits if within else s.valid
+    find = question.solve if legal_only else isolated
+    s = find(question.arm, targets_from(question, position, turn), question.task.name)
+    legal = s.within_limits if legal_only else s.valid
     if question.arm.keep_out:
         legal = legal & s.clear
-    if question.around.keep_out and legal.any():
-        place, q = (float(at[0]), float(at[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
-        arm, joints = question.whole or Held(question.arm, {})
-        legal = legal & free(arm, question.around, place, turn, unlock(arm, joints, q))
+    if question.obstacles.keep_out and legal.any():
+        place, q = (float(position[0]), float(position[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
+        arm, joints = question.full_arm or Held(question.arm, {})
+        legal = legal & free(arm, question.obstacles, place, turn, unlock(arm, joints, q))
     return s, np.asarray(legal)
 
 
-def seen_from(question: Question, at: Array, turn: float) -> Array:
+def targets_from(question: Question, position: Array, turn: float) -> Array:
     """The targets in the frame of an arm at a place (2,), or each from a place (N, 2) of its own, and a yaw."""
-    return _turned(question.task, _beside(question, at), np.array(turn), np.cos(turn), np.sin(turn))
+    return _turned(question.task, _unturned_targets(question, position), np.array(turn), np.cos(turn), np.sin(turn))
 
 
-def _beside(question: Question, at: Array) -> Array:
+def _unturned_targets(question: Question, position: Array) -> Array:
     """The same of an arm that is not turned."""
     targets = question.targets.copy()
-    shift = np.concatenate([at, np.full((*at.shape[:-1], 1), question.z)], axis=-1)
-    position = positions_of(question.task, targets)
-    position -= shift[..., : position.shape[1]]
+    shift = np.concatenate([position, np.full((*position.shape[:-1], 1), question.z)], axis=-1)
+    target_positions = positions_of(question.task, targets)
+    target_positions -= shift[..., : target_positions.shape[1]]
     return targets
 
 

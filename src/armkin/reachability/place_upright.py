@@ -28,13 +28,13 @@ ROUNDING = 1e-6  # [rad, mm, reaches]: what is nearer to a limit, or to being th
 
 
 class Radii(NamedTuple):
-    """Branches of T targets in C cells between radii that are `apart` [mm].
+    """Branches of T targets in C cells between radii that are `spacing` [mm].
 
     first: (T, B, C) joint 1 [rad] at azimuth 0. sure, open: (T, B, C) how far [rad] it may be from the middle of its
     limits, so that the branch is legal anywhere in the cell, or may be; below 0: nowhere.
     """
 
-    apart: float
+    spacing: float
     first: Array
     sure: Array
     open: Array
@@ -59,7 +59,7 @@ def by_radius(
             return None
         for i, target in enumerate(some):
             dx, dy = target[0] - foot_x, target[1] - foot_y
-            cell = np.minimum(np.sqrt(dx * dx + dy * dy) * (1.0 / table.apart), RADII).astype(np.int32)
+            cell = np.minimum(np.sqrt(dx * dx + dy * dy) * (1.0 / table.spacing), RADII).astype(np.int32)
             open_ = np.append((table.open[i] >= 0.0).any(axis=0), False)
             near = np.flatnonzero(open_.take(cell))
             at = cell.take(near)
@@ -120,9 +120,9 @@ def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
     )
 
 
-def _least(of: Array) -> Array:
+def _least(ends: Array) -> Array:
     """The lesser of what stands at a cell's two ends."""
-    return np.minimum(of[..., :-1], of[..., 1:])
+    return np.minimum(ends[..., :-1], ends[..., 1:])
 
 
 def _moved(value: Array, turns: bool = False) -> Array:

@@ -142,7 +142,7 @@ def reach(
     if not len(rings):
         raise UsageError(f"grid: {grid:g} mm: no cell within a reach of {arm.reach:.0f} mm; take a finer grid")
     run = _Run(question, None if out is None else os.fspath(out), Engine(workers, cluster), progress)
-    columns = run.done(list(chunks(question)))
+    columns = run.answer_all(list(chunks(question)))
     return Reach(
         question.grid,
         columns,
@@ -201,9 +201,9 @@ class _Run:
             check(out)
             if end == ".parquet":
                 require()
-            self.parts = Parts(out, _asked(question))
+            self.parts = Parts(out, _dependencies(question))
 
-    def done(self, all_chunks: list[Chunk]) -> dict[str, Array]:
+    def answer_all(self, all_chunks: list[Chunk]) -> dict[str, Array]:
         """Answer all chunks; the columns, unless they are in a file and too many."""
         kept: dict[int, Table] = {}
         cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
@@ -229,14 +229,14 @@ class _Run:
         if self.progress is not None:
             self.progress(self.cells)
 
-    def _write(self, count: int, kept: dict[int, Table]) -> None:
+    def _write(self, count: int, kept_tables: dict[int, Table]) -> None:
         assert self.out is not None
         assert self.parts is not None
         format, parts = format_of(self.out), self.parts
 
         def tables() -> Iterator[Any]:
             for number in range(count):
-                data = parts.read(number) if parts.held else npz.encoded(kept[number])
+                data = parts.read(number) if parts.held else npz.encoded(kept_tables[number])
                 yield io.BytesIO(data if format.name == "npz" else format.encoded(npz.decoded(data)))
 
         with write_whole(self.out, "wb") as file:
@@ -247,7 +247,7 @@ class _Run:
             parts.remove()
 
 
-def _asked(question: Question) -> dict[str, Any]:
+def _dependencies(question: Question) -> dict[str, Any]:
     """What the columns depend on."""
     grid, arm = question.grid, question.grid.arm
     names = ("step", "azimuths", "directions", "rolls", "tool_down")

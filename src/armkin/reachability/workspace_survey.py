@@ -118,7 +118,7 @@ def workspace(
             if write is not None:
                 write(part.q, part.tip, part.values)
             if progress is not None:
-                progress(tally.done)
+                progress(tally.samples)
         # Within the block: without its volume there is no result, and then no file either.
         size = extent(actual(arm), seed, sampling.count) if volume else None
     return tally.result(measures, size, time.perf_counter() - started)
@@ -140,8 +140,8 @@ class Part(NamedTuple):
     free: int
     low: Array
     high: Array
-    near: float
-    far: float
+    nearest: float
+    farthest: float
     least: Array
     most: Array
     q: Array
@@ -161,8 +161,8 @@ def work(job: Job, number: int) -> Part:
         free=int(clear(arm, q).sum()) if arm.keep_out else 0,
         low=tip.min(axis=0),
         high=tip.max(axis=0),
-        near=float(distance.min()),
-        far=float(distance.max()),
+        nearest=float(distance.min()),
+        farthest=float(distance.max()),
         least=np.array([value.min() for value in values]),
         most=np.array([value.max() for value in values]),
         q=q[some],
@@ -183,35 +183,35 @@ class _Tally:
     """Bounds so far, and a random choice of the samples."""
 
     def __init__(self, arm: Arm, count: int, measures: int, keep: int, seed: int) -> None:
-        self.arm, self.done, self.free = arm, 0, 0
+        self.arm, self.samples, self.free = arm, 0, 0
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
-        self.near, self.far = np.inf, 0.0
+        self.nearest, self.farthest = np.inf, 0.0
         self.least, self.most = np.full(measures, np.inf), np.full(measures, -np.inf)
         self._share = keep / count
         self._rng = np.random.default_rng([seed, 1])
-        self._kept: list[Array] = []
+        self._chosen_samples: list[Array] = []
 
     def add(self, part: Part) -> None:
         """Count a part of the samples."""
-        self.done += part.samples
+        self.samples += part.samples
         self.free += part.free
         self.low, self.high = np.minimum(self.low, part.low), np.maximum(self.high, part.high)
-        self.near, self.far = min(self.near, part.near), max(self.far, part.far)
+        self.nearest, self.farthest = min(self.nearest, part.nearest), max(self.farthest, part.farthest)
         self.least, self.most = np.minimum(self.least, part.least), np.maximum(self.most, part.most)
         if self._share > 0:
             chosen = self._rng.random(part.samples) < self._share if self._share < 1 else slice(None)
-            self._kept.append(np.column_stack([part.q, part.tip, *part.values])[chosen])
+            self._chosen_samples.append(np.column_stack([part.q, part.tip, *part.values])[chosen])
 
     def result(self, names: Sequence[str], size: Extent | None, seconds: float) -> Workspace:
         """What they come to; names: of their measures, size: the volume or area."""
         n = self.arm.n
-        kept = np.concatenate(self._kept) if self._kept else np.empty((0, n + 3 + len(names)))
+        kept = np.concatenate(self._chosen_samples) if self._chosen_samples else np.empty((0, n + 3 + len(names)))
         return Workspace(
             arm=self.arm,
-            samples=self.done,
+            samples=self.samples,
             low=self.low,
             high=self.high,
-            reach=(self.near, self.far),
+            reach=(self.nearest, self.farthest),
             extent=size,
             measures={
                 name: (float(low), float(high)) for name, low, high in zip(names, self.least, self.most, strict=True)

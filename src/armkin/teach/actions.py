@@ -35,7 +35,7 @@ class Actions:
         self.board: BoardActions | None = None
         self.tabs = Tabs(self._abandoned)
         self._solving = threading.Lock()  # one question at a time: two cores are not many
-        self._shown: dict[str, Any] = {}
+        self._last_answer: dict[str, Any] = {}
         self._quick: QuickIk | None = None
         self.program_actions = ProgramActions(
             arm, self.standing_pulses, lambda state: self.tabs.publish("program", state)
@@ -67,7 +67,7 @@ class Actions:
             return self.for_everyone[name]()
         tab = self.tabs.find(tab_id)
         if name == "take":
-            return self._take(tab)
+            return self._prepare_first_answer(tab)
         if name not in self.for_control:
             raise RefusedError(404, f"there is no action {name[:40]!r}")
         self.tabs.check_control(tab)
@@ -88,7 +88,7 @@ class Actions:
             self.board.stop()
         return {}
 
-    def _take(self, tab: Tab) -> dict[str, Any]:
+    def _prepare_first_answer(self, tab: Tab) -> dict[str, Any]:
         self.tabs.take_control(tab)
         if self.board is not None:
             self.board.end_follow()
@@ -99,9 +99,9 @@ class Actions:
         from armkin.teach.pose_answers import Question, look
 
         with self._solving:
-            if not self._shown:
+            if not self._last_answer:
                 held = first_lock(self.arm)
-                self._shown = look(self.arm, Question(self.arm.home, held=() if held is None else (held,)))
+                self._last_answer = look(self.arm, Question(self.arm.home, held=() if held is None else (held,)))
 
     def _open(self) -> dict[str, Any]:
         tab = self.tabs.open()
@@ -111,7 +111,7 @@ class Actions:
         return {
             "tab": tab.id,
             "scene": scene(self.arm) | {"meshes": self.meshes, "jogs": moved},
-            "look": self._shown,
+            "look": self._last_answer,
             "program": self.program_actions.program.state(),
             "board": board,
         }
@@ -129,7 +129,7 @@ class Actions:
         with self._solving:
             self._quick = self._quick or QuickIk()
             answer = look(self.arm, question, self._quick)
-        before, self._shown = self._shown, answer
+        before, self._last_answer = self._last_answer, answer
         self.tabs.publish("look", answer, except_tab=tab)
         if self.board is None:
             return answer

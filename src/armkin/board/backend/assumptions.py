@@ -60,10 +60,10 @@ def with_rates(arm: Arm) -> tuple[Arm, list[str]]:
     return arm, said
 
 
-def _driven(arm: Arm, bare: list[str]) -> Arm:
+def _driven(arm: Arm, joints: list[str]) -> Arm:
     """The arm with a stepper for each of these joints."""
     motors, gain = list(arm.motors), [*arm.motor_gain]
-    for name in bare:
+    for name in joints:
         j = arm.joint_names.index(name)
         slides = bool(arm.prismatic[j])
         chain = {"lead": _LEAD} if slides else {"gear": _GEAR}
@@ -71,5 +71,5 @@ def _driven(arm: Arm, bare: list[str]) -> Arm:
         row = np.zeros(arm.n)
         row[j] = motors[-1].pulses_per_unit() / (1.0 if slides else DEGREE)
         gain.append(row)
-    bias = np.concatenate([arm.motor_bias, np.zeros(len(bare))])
+    bias = np.concatenate([arm.motor_bias, np.zeros(len(joints))])
     return replace(arm, motors=tuple(motors), motor_gain=np.array(gain), motor_bias=bias)

@@ -62,9 +62,9 @@ def _without_rates(arm: Arm, board: bool) -> list[Lack]:
         joints_per_pulse(arm)  # raises if a joint has no motor
     except UsageError as error:
         still = undriven(arm)
-        found.append((_have(arm, still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), []))
+        found.append((_lack_text(arm, still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), []))
     absent = missing_rates(arm)
-    found += [(_have(arm, names, key), []) for key, names in absent.items()]
+    found += [(_lack_text(arm, names, key), []) for key, names in absent.items()]
     if absent:
         found[-1] = (found[-1][0], rate_lines(arm))
     return found
@@ -81,7 +81,7 @@ def _drive_lines(arm: Arm, joints: list[str], board: bool) -> list[str]:
         axis = next(free, None)
         at = "" if axis is None else f"axis: {axis}, "
         groups.setdefault(f"drive: {{{at}full_steps: 200, microsteps: 16{lead}}}", []).append(name)
-    return [f"{drive}   # for example; {_for_joints(names)}" for drive, names in groups.items()]
+    return [f"{drive}   # for example; {_to_joints(names)}" for drive, names in groups.items()]
 
 
 def _axes(arm: Arm) -> tuple[str, ...]:
@@ -141,7 +141,7 @@ def _without_driver(arm: Arm, settings: Board) -> list[Lack]:
 def _without_drives(arm: Arm) -> list[str]:
     still = undriven(arm)
     if still:
-        return [_have(arm, still, "drive")]
+        return [_lack_text(arm, still, "drive")]
     try:
         joints_per_pulse(arm)
     except UsageError as error:
@@ -153,14 +153,14 @@ def _without_homing(arm: Arm) -> list[str]:
     if arm.motors and all(motor.kind == "bus" for motor in arm.motors):
         return []  # bus servos know where they are
     bare = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
-    return [_have(arm, bare, "homing")] if bare else []
+    return [_lack_text(arm, bare, "homing")] if bare else []
 
 
-def _have(arm: Arm, names: list[str], what: str) -> str:
+def _lack_text(arm: Arm, names: list[str], key: str) -> str:
     if len(names) == arm.n > 1:
-        return f"its joints have no {what}"
-    return f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {what}"
+        return f"its joints have no {key}"
+    return f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {key}"
 
 
-def _for_joints(names: list[str]) -> str:
+def _to_joints(names: list[str]) -> str:
     return f"to joint{'s' * (len(names) > 1)} {', '.join(names)}"

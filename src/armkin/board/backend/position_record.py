@@ -76,7 +76,7 @@ class Record:
         if left.arm != _digest(self._arm) or len(left.offset) != len(self._arm.motor_gain):
             return "the robot file's drives or home pose are others than when it was told"
         for name in sorted({*marks, *left.marks}):
-            found, was = _plain(marks.get(name)), _plain(left.marks.get(name))
+            found, was = _comparable(marks.get(name)), _comparable(left.marks.get(name))
             if found != was:
                 return f"{name} is {_value_text(found)}, and armkin left {_value_text(was)}: {why}"
         return None
@@ -131,7 +131,7 @@ def _digest(arm: Arm) -> str:
     return hashlib.sha256(repr([np.round(part, 9).tolist() for part in parts]).encode()).hexdigest()[:16]
 
 
-def _plain(value: Sequence[float] | str | None) -> list[float] | str | None:
+def _comparable(value: Sequence[float] | str | None) -> list[float] | str | None:
     return value if value is None or isinstance(value, str) else [x + 0.0 for x in value]
 
 

@@ -69,7 +69,7 @@ class StepperArm(Backend):
         """Where the arm has come to rest, and what that means for the next command."""
         if self.loss_reason:
             return f"the arm's position is lost ({self.loss_reason}): {self.cure}"
-        return f"the arm stands at {self._where()}, its position is known: the next command starts there"
+        return f"the arm stands at {self._joints_text()}, its position is known: the next command starts there"
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
@@ -81,7 +81,7 @@ class StepperArm(Backend):
         if not self.loss_reason:
             if assume is not None:
                 joints = joints_out(self.arm, self.joints()).tolist()
-                raise PositionKnownError(f"the position is known ({self._where()})", joints=joints)
+                raise PositionKnownError(f"the position is known ({self._joints_text()})", joints=joints)
             return False
         if assume is None and not self.port.simulated:
             raise PositionLostError(
@@ -137,7 +137,7 @@ class StepperArm(Backend):
             raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing()}")
         self._record.write_motion(job, self.piece)
 
-    def _where(self) -> str:
+    def _joints_text(self) -> str:
         """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90``."""
         names = zip(self.arm.joint_names, joints_out(self.arm, self.joints()).tolist(), strict=True)
         return ", ".join(f"{name} = {round(value, 3) + 0.0:g}" for name, value in names)

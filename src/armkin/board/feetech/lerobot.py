@@ -88,7 +88,7 @@ def read(path: str) -> dict[int, Motor]:
         raise FileError(f"{path} is no calibration file of LeRobot: a JSON object of motors by their names", file=path)
     found: dict[int, Motor] = {}
     for name, values in told.items():
-        motor = Motor(name, **{key: _whole(path, name, values, key) for key in _WHOLE})
+        motor = Motor(name, **{key: _whole_number(path, name, values, key) for key in _WHOLE})
         if motor.id in found:
             raise FileError(f"{path}: {found[motor.id].name} and {name} have the same id {motor.id}", file=path)
         if motor.range_min >= motor.range_max:
@@ -98,7 +98,7 @@ def read(path: str) -> dict[int, Motor]:
     return found
 
 
-def _whole(path: str, name: str, values: Any, key: str) -> int:
+def _whole_number(path: str, name: str, values: Any, key: str) -> int:
     value = values.get(key) if isinstance(values, Mapping) else None
     low, high = _WHOLE[key]
     if type(value) is not int or not low <= value <= high:
@@ -129,7 +129,7 @@ def calibrated(arm: Arm, path: str, pose: Array | None) -> Calibrated:
         zero.append(at)
         limits.append((low, high))
         edits["joints", j, "limits"] = f"[{low:.6f}, {high:.6f}]"
-        edits["joints", j, "drive", "zero"] = _plain(at)
+        edits["joints", j, "drive", "zero"] = _short_number(at)
         edits["joints", j, "drive", "invert"] = "true" if motor.drive_mode else "false"
     jaw, ends = _gripper(arm, there, path, edits)
     return Calibrated(tuple(motors), tuple(zero), tuple(limits), jaw, ends, edits)
@@ -172,7 +172,7 @@ def _gripper(
     motor = _calibrated_motor(motors, drive.id, "gripper", path, drive.counts)
     half = (motor.range_max - motor.middle) / drive.pulses_per_unit()
     values: Sequence[tuple[str, float | int | str]] = (
-        ("zero", _plain(motor.middle)),
+        ("zero", _short_number(motor.middle)),
         ("invert", "true" if motor.drive_mode else "false"),
         ("open", f"{half:.6f}"),
         ("closed", f"{-half:.6f}"),
@@ -181,5 +181,5 @@ def _gripper(
     return motor, (half, -half)
 
 
-def _plain(count: float) -> int | float:
+def _short_number(count: float) -> int | float:
     return int(count) if count.is_integer() else round(count, 6)

@@ -75,10 +75,10 @@ def searches(
     return [_search(arm, configuration, j) for j in in_order]
 
 
-def _orders(arm: Arm, wanted: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
+def _orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
     """Of the joints that have a homing: joint -> its order. Raises NoHomingError for others that are not left out."""
-    orders = {j: homing.order for j in wanted if (homing := arm.homing[j]) is not None}
-    bare = [arm.joint_names[j] for j in wanted if j not in orders]
+    orders = {j: homing.order for j in joints if (homing := arm.homing[j]) is not None}
+    bare = [arm.joint_names[j] for j in joints if j not in orders]
     if bare and not (rest_at_home and orders):
         raise NoHomingError(
             f"{arm.path} has no homing for {', '.join(bare)}",
@@ -185,9 +185,9 @@ def switches(arm: Arm, configuration: Configuration) -> Callable[[int, Sequence[
     return level
 
 
-def _groups(arm: Arm, wanted: Sequence[int]) -> list[list[int]]:
+def _groups(arm: Arm, joints: Sequence[int]) -> list[list[int]]:
     """Joints that share motors home together: sets of joints, in file order."""
-    left, groups = set(wanted), []
+    left, groups = set(joints), []
     while left:
         group = {min(left)}
         while True:

@@ -58,26 +58,26 @@ class Trip:
 
     def __init__(self, machine: Machine, parts: Sequence[Cut], started: tuple[Note, float] | None = None) -> None:
         self._machine, self._file = machine, note_path(machine.port.name)
-        self._kept = not machine.port.simulated
+        self._keeps_note = not machine.port.simulated
         start = parts[0].start.tolist() if parts else list(machine.counts())
-        self._note, self._before = started or (Note(machine.arm.sha256, digest(parts), start, 0.0), 0.0)
-        self._note = replace(self._note, seconds=self._before, stands=None)
+        self._note, self._seconds_before = started or (Note(machine.arm.sha256, digest(parts), start, 0.0), 0.0)
+        self._note = replace(self._note, seconds=self._seconds_before, stands=None)
 
     def __enter__(self) -> Self:
-        if self._kept:
+        if self._keeps_note:
             write_note(self._file, asdict(self._note))
         return self
 
     def progress(self, seconds: float) -> None:
         """Note that so many seconds of what is left are done."""
-        done = self._before + seconds
+        done = self._seconds_before + seconds
         if done - self._note.seconds >= _NOTED:
             self._note = replace(self._note, seconds=done)
-            if self._kept:
+            if self._keeps_note:
                 write_note(self._file, asdict(self._note))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        if not self._kept:
+        if not self._keeps_note:
             return
         if isinstance(error, StoppedError) and error.status is not None:
             self._machine.status = error.status

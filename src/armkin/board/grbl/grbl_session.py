@@ -60,7 +60,7 @@ class Session:
         self.buffer = replies.RX_BUFFER
         self._text, self._heard = "", 0
         self._sent: deque[tuple[int, str]] = deque()  # lines without an answer: their bytes
-        self._other: list[str] = []  # what came between: settings, offsets, messages
+        self._other_lines: list[str] = []  # what came between: settings, offsets, messages
 
     def open(self) -> None:
         """Wait until GRBL answers a status request. Raises LinkError if it does not, or does not stand still."""
@@ -130,12 +130,12 @@ class Session:
 
     def ask(self, line: str, patience: float = _ANSWER) -> list[str]:
         """Send one line, wait for its ``ok``, and return what came before it."""
-        self._other.clear()
+        self._other_lines.clear()
         self._send(line)
         if not self._wait(lambda: not self._sent, patience):
             self._sent.clear()  # so that the next line's answer is not taken for this one's
             raise LinkError(f"GRBL on {self.port.name} did not answer {line!r} within {patience:g} s")
-        return list(self._other)
+        return list(self._other_lines)
 
     def status(self, patience: float = _REPORT) -> Report:
         """A fresh status report."""
@@ -267,8 +267,8 @@ class Session:
         elif (found := replies.report(line)) is not None:
             self._take_report(found)
         elif line:
-            self._other.append(line)
-            del self._other[:-400]
+            self._other_lines.append(line)
+            del self._other_lines[:-400]
 
     def _take_report(self, report: replies.Report) -> None:
         if self.state != report.state:
@@ -279,7 +279,7 @@ class Session:
         self._heard += report.state in ("Run", "Jog", "Home")  # else it only repeats itself
 
 
-def _agreed(read: Callable[[], T], port: str, enough: Callable[[T], bool]) -> T:
+def _agreed(read: Callable[[], T], port: str, accepts: Callable[[T], bool]) -> T:
     """What three readings in a row agree on, or one that is enough. Raises LinkError if none do.
 
     Three: two may lose the same digit, as -1000.000 and -1000.000 without one of its first zeros.
@@ -288,6 +288,6 @@ def _agreed(read: Callable[[], T], port: str, enough: Callable[[T], bool]) -> T:
     for _ in range(_READINGS):
         before, last = last, read()
         same = same + 1 if last and last == before else 1
-        if same == 3 or (enough(before) and enough(last)):
+        if same == 3 or (accepts(before) and accepts(last)):
             return last
     raise LinkError(_UNCLEAR.format(port=port))

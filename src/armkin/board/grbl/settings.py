@@ -86,7 +86,7 @@ def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool 
         there, bits = actual.get(number), _bits(number, axes)
         if there is not None and bits is not None:
             value = int(there) & ~bits | int(value) & bits  # the other bits are not ours
-        if there is not None and _same(number, there, value):
+        if there is not None and _is_equal(number, there, value):
             continue
         slower = number // 10 in (11, 12) and there is not None and there < value
         result.append(Difference(number, what, there, value, serious=not slower and number not in (1, *HOMING)))
@@ -100,7 +100,7 @@ def _bits(number: int, axes: Sequence[Axis]) -> int | None:
     return {10: 3, 22: 1}.get(number)
 
 
-def _same(number: int, actual: float, value: float) -> bool:
+def _is_equal(number: int, actual: float, value: float) -> bool:
     if number == 10:
         return int(actual) & 1 == 1  # machine position; the buffer is good to know, no more
     return math.isclose(actual, value, rel_tol=0, abs_tol=0.0006)

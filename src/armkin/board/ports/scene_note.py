@@ -10,7 +10,7 @@ from armkin.board.ports.port_lock import note_path
 _LONGEST = 4096  # bytes of a file's name
 
 
-def keep(port: str, scene: str) -> None:
+def write_scene(port: str, scene: str) -> None:
     """Note the scene's file."""
     path = _path(port)
     with suppress(OSError):

@@ -59,11 +59,11 @@ class Modes:
         self.g92, self.tool = [0.0] * self.axes, [0.0] * self.axes
         self.reset(power=True)
 
-    def reset(self, *, power: bool, keep: bool = False) -> None:
-        """What a reset leaves; keep: G92 is kept without power, too."""
+    def reset(self, *, power: bool, keep_offsets: bool = False) -> None:
+        """What a reset leaves; keep_offsets: G92 is kept without power, too."""
         if power or not self.hal:
             self.tool = [0.0] * self.axes
-            if not keep:
+            if not keep_offsets:
                 self.g92 = [0.0] * self.axes
         self.unit, self.feed = 1.0, 0.0
         self.relative = self.inverse = False
@@ -129,12 +129,12 @@ class Modes:
             return 28
         return self._unmovable(asked, values) if given and not asked & _USES_AXES else 0
 
-    def _unmovable(self, asked: set[float], values: dict[str, float]) -> int:
+    def _unmovable(self, codes: set[float], values: dict[str, float]) -> int:
         """The error of axis words that are a move, 0 if it can be made."""
-        motion = next(iter(asked & _MOTION), self.motion)
+        motion = next(iter(codes & _MOTION), self.motion)
         if motion == 80.0:
             return 31
-        feed = values.get("F", 0.0 if (93.0 in asked or self.inverse) and 94.0 not in asked else self.feed)
+        feed = values.get("F", 0.0 if (93.0 in codes or self.inverse) and 94.0 not in codes else self.feed)
         return 22 if motion == 1.0 and feed == 0.0 else 0
 
     def obey(self, words: Words, position: Sequence[float]) -> list[float] | None:
@@ -153,22 +153,22 @@ class Modes:
             return self._goal(given, position, absolute=53.0 in words.codes)
         return None
 
-    def _goal(self, given: dict[int, float], position: Sequence[float], *, absolute: bool) -> list[float]:
+    def _goal(self, axes: dict[int, float], position: Sequence[float], *, absolute: bool) -> list[float]:
         """Where the given axes go, in machine units; absolute: they are in these."""
         zero = [0.0] * self.axes if absolute else position if self.relative else self.work()
-        return [given[k] + zero[k] if k in given else position[k] for k in range(self.axes)]
+        return [axes[k] + zero[k] if k in axes else position[k] for k in range(self.axes)]
 
-    def _offset(self, words: Words, given: dict[int, float], position: Sequence[float]) -> None:
+    def _offset(self, words: Words, axes: dict[int, float], position: Sequence[float]) -> None:
         """G92, G92.1, G10 and G43.1."""
         if 92.1 in words.codes:
             self.g92 = [0.0] * self.axes
         elif 92.0 in words.codes:
             base = [a + b for a, b in zip(self.offsets[self.system], self.tool, strict=True)]
-            self.g92 = [position[k] - base[k] - given[k] if k in given else v for k, v in enumerate(self.g92)]
+            self.g92 = [position[k] - base[k] - axes[k] if k in axes else v for k, v in enumerate(self.g92)]
         elif 10.0 in words.codes:
-            self._write(words.values, given, position)
+            self._write(words.values, axes, position)
         else:
-            self.tool = [given.get(k, v) for k, v in enumerate(self.tool)]
+            self.tool = [axes.get(k, v) for k, v in enumerate(self.tool)]
 
     def _mode(self, code: float) -> None:
         if code in _MOTION:
@@ -186,11 +186,11 @@ class Modes:
         elif code == 49.0:
             self.tool = [0.0] * self.axes
 
-    def _write(self, values: dict[str, float], given: dict[int, float], position: Sequence[float]) -> None:
+    def _write(self, values: dict[str, float], axes: dict[int, float], position: Sequence[float]) -> None:
         """G10: an offset that outlives resets and power."""
         number = int(values["P"])
         rows = self.offsets[self.system if number == 0 else SYSTEMS[number - 1]]
-        for k, value in given.items():
+        for k, value in axes.items():
             rows[k] = value if values["L"] == 2.0 else position[k] - self.g92[k] - self.tool[k] - value
 
 

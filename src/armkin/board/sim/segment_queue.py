@@ -87,7 +87,7 @@ class Queue:
         self._fraction = [HALF] * len(self.axes.base)
         self.plan = [count * STEP + HALF for count in self.axes.base]
 
-    def made(self) -> list[int]:
+    def steps_made(self) -> list[int]:
         """Steps of every axis in the running segment so far."""
         if not self._queue or not self._queue[0].times:
             return [0] * len(self.axes.base)

@@ -38,20 +38,20 @@ class Block:
     most: float  # [units/s] that the axes allow
     accel: float  # [units/s2]
     jog: bool = False
-    done: float = 0.0  # [units]
+    distance_done: float = 0.0  # [units]
     rate: float = 0.0  # [units/s]
-    line: bool = True  # False: a dwell, `done` counts seconds up to `length`
+    line: bool = True  # False: a dwell, `distance_done` counts seconds up to `length`
 
-    def go(self, seconds: float, override: int, holding: bool) -> float:
+    def advance(self, seconds: float, override: int, holding: bool) -> float:
         """Go on for some seconds; the share of the way that is done."""
-        left, change = self.length - self.done, self.accel * seconds
+        left, change = self.length - self.distance_done, self.accel * seconds
         speed = min(self.feed * override / 100, self.most)
         if holding or self.rate**2 / (2 * self.accel) >= left or self.rate > speed + change:
             self.rate = max(0.0 if holding else change, self.rate - change)
         else:
             self.rate = min(speed, self.rate + change)
-        self.done = min(self.length, self.done + self.rate * seconds)
-        return self.done / self.length if self.length else 1.0
+        self.distance_done = min(self.length, self.distance_done + self.rate * seconds)
+        return self.distance_done / self.length if self.length else 1.0
 
 
 @dataclass
@@ -103,14 +103,14 @@ class Grbl(SimulatedTime):
         """Start anew: a reset by DTR or the button (`power`), which forgets the position, or a soft one."""
         if power:
             self.steps = [0] * self.axes
-        self.modes.reset(power=power, keep=self.hal and not self.settings[384])
+        self.modes.reset(power=power, keep_offsets=self.hal and not self.settings[384])
         self.state = "Idle"
         self._rx, self._begun = deque[int](), _Line()
         self._whole: str | None = None  # a line that waits to be carried out
         self._blocks, self._holding = deque[Block](), False
         self.override, self._reports = 100, 0
         self.spindle: float | None = None  # the S word of M3
-        self._say("\r\nGrbl 1.1f ['$' or '$HELP' for help]" if self.hal else "\r\nGrbl 1.1h ['$' for help]")
+        self._send("\r\nGrbl 1.1f ['$' or '$HELP' for help]" if self.hal else "\r\nGrbl 1.1h ['$' for help]")
 
     # The port
 
@@ -133,9 +133,9 @@ class Grbl(SimulatedTime):
         self._blocks.clear()
         self._rx.clear()
         self._whole, self._begun.text, self.state = None, "", "Alarm"
-        self._say(f"ALARM:{number}")
+        self._send(f"ALARM:{number}")
 
-    def _say(self, text: str) -> None:
+    def _send(self, text: str) -> None:
         self._out += text.encode() + b"\r\n"
 
     def _receive(self, byte: int) -> None:
@@ -151,7 +151,7 @@ class Grbl(SimulatedTime):
         self.state = "Alarm" if moving else "Idle"
 
     def _tell_state(self) -> None:
-        self._say(self._report())
+        self._send(self._report())
 
     def _hold(self) -> None:
         self._holding = self._holding or self.state != "Alarm"
@@ -179,12 +179,12 @@ class Grbl(SimulatedTime):
             return
         block = self._blocks[0]
         if not block.line:
-            block.done += seconds
-            if block.done >= block.length:
+            block.distance_done += seconds
+            if block.distance_done >= block.length:
                 self._blocks.popleft()
-                self._say("ok")
+                self._send("ok")
             return
-        share = block.go(seconds, self.override, self._holding)
+        share = block.advance(seconds, self.override, self._holding)
         here = [round(a + share * (b - a)) for a, b in zip(block.start, block.end, strict=True)]
         if here != self.steps:
             self.steps = here
@@ -193,7 +193,7 @@ class Grbl(SimulatedTime):
                 if self.settings[21] and here[k] == switch and self.state != "Home":
                     self.alarm(1)
                     return
-        if block.done >= block.length:
+        if block.distance_done >= block.length:
             self.steps = list(block.end)
             self._blocks.popleft()
 
@@ -238,7 +238,7 @@ class Grbl(SimulatedTime):
         if error == -2:
             error = 9 if line and self.state == "Alarm" else self._code(line)
         if error >= 0:
-            self._say("ok" if error == 0 else f"error:{error}")
+            self._send("ok" if error == 0 else f"error:{error}")
 
     def _system(self, line: str) -> int:
         """Carry out what follows a $; the number of its error, 0 for none, -1 where an alarm was the answer."""
@@ -261,7 +261,7 @@ class Grbl(SimulatedTime):
         }
         if line not in said:
             return 3
-        self._say("\r\n".join(said[line]))
+        self._send("\r\n".join(said[line]))
         return 0
 
     def _set(self, number: int, text: str) -> int:

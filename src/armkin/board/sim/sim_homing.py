@@ -63,12 +63,12 @@ class Homing:
         return self._slide(vector, share, lambda: self._steady(s, pressed), limit, error)
 
     def _slide(
-        self, vector: list[int], share: float, done: Callable[[], bool], limit: int, error: Error
+        self, vector: list[int], share: float, finished: Callable[[], bool], limit: int, error: Error
     ) -> Generator[None, None, bool]:
-        """Move until `done`, then to rest; its value: whether it went well."""
+        """Move until `finished`, then to rest; its value: whether it went well."""
         cruise, fine = self._cruise, True
         cruise.aim(vector)
-        while not cruise.stopped and not done():
+        while not cruise.stopped and not finished():
             if cruise.far > limit or cruise.now > self._until:
                 self._fault(Error.TIME if cruise.now > self._until else error)
                 fine = False

@@ -28,7 +28,7 @@ class Jogging:
             cruise.aim(self._target_rates)
             if not any(cruise.rate):
                 return
-            while not self._over() and self._target_rates == cruise.rate:
+            while not self._is_over() and self._target_rates == cruise.rate:
                 if not cruise.clear():
                     self._until = 0.0
                     break
@@ -37,8 +37,8 @@ class Jogging:
             while cruise.share > 0:
                 cruise.glide(0.0)
                 yield
-            if self._over():
+            if self._is_over():
                 return
 
-    def _over(self) -> bool:
+    def _is_over(self) -> bool:
         return self._cruise.stopped or self._cruise.now >= self._until

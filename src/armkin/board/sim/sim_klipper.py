@@ -31,7 +31,7 @@ class Stepper:
     """A manual stepper."""
 
     place: float = 0.0  # as commanded
-    on: bool = False
+    enabled: bool = False
     letter: str = ""  # of the G-code axis that it is
     velocity: float = math.inf
     corner: float = 1.0
@@ -44,7 +44,7 @@ class Move:
     start: dict[str, float]
     end: dict[str, float]
     seconds: float
-    done: float = 0.0
+    seconds_done: float = 0.0
 
 
 @dataclass
@@ -116,11 +116,11 @@ class Klipper(SimulatedTime):
             result = methods[request["method"]](request.get("params", {}))
         except Refused as error:
             self._lines = None
-            self._say({"id": request["id"], "error": {"error": "CommandError", "message": str(error)}})
+            self._send({"id": request["id"], "error": {"error": "CommandError", "message": str(error)}})
             return True
         if result is None:
             return False
-        self._say({"id": request["id"], "result": result})
+        self._send({"id": request["id"], "result": result})
         return True
 
     def _script(self, params: dict[str, Any]) -> dict[str, Any] | None:
@@ -143,7 +143,7 @@ class Klipper(SimulatedTime):
     def _info(self, params: dict[str, Any]) -> dict[str, Any]:
         return {"state": self.state, "state_message": f"Printer is {self.state}", "software_version": "sim"}
 
-    def _say(self, message: dict[str, Any]) -> None:
+    def _send(self, message: dict[str, Any]) -> None:
         self._out += json.dumps(message).encode() + END
 
     def _status(self) -> dict[str, Any]:
@@ -153,7 +153,7 @@ class Klipper(SimulatedTime):
             "configfile": {"settings": self.settings},
             "toolhead": {"position": [self.x, 0.0, 0.0, 0.0, *(self.steppers[name].place for name in self.axes)]},
             "gcode_move": {"axis_map": {"X": 0, "Y": 1, "Z": 2, "E": 3, **letters}},
-            "stepper_enable": {"steppers": {f"manual_stepper {n}": one.on for n, one in self.steppers.items()}},
+            "stepper_enable": {"steppers": {f"manual_stepper {n}": one.enabled for n, one in self.steppers.items()}},
         }
 
     # G-code
@@ -162,7 +162,7 @@ class Klipper(SimulatedTime):
         """Whether a line can be run now: M400 waits for the queue, a move for room in it."""
         if line.startswith(("M400", "MANUAL_STEPPER", "M84")):
             return not self._moves
-        return sum(move.seconds - move.done for move in self._moves) <= AHEAD
+        return sum(move.seconds - move.seconds_done for move in self._moves) <= AHEAD
 
     def _obey(self, line: str) -> None:
         head, *words = line.split()
@@ -182,7 +182,7 @@ class Klipper(SimulatedTime):
         if one.letter:
             raise Refused("Must unregister from gcode axis first")
         if "ENABLE" in given:
-            one.on = given["ENABLE"] == "1"
+            one.enabled = given["ENABLE"] == "1"
         if "SET_POSITION" in given:
             one.place = self.at[name] = float(given["SET_POSITION"])
 
@@ -211,7 +211,7 @@ class Klipper(SimulatedTime):
 
     def _motors_off(self, words: list[str]) -> None:
         for one in self.steppers.values():
-            one.on = False
+            one.enabled = False
 
     def _use_absolute(self, words: list[str]) -> None:
         self.relative = False
@@ -222,7 +222,7 @@ class Klipper(SimulatedTime):
     def _scale_feed(self, words: list[str]) -> None:
         self.factor = float(words[0][1:]) / 100
 
-    def _go(self, words: list[str]) -> None:
+    def _carry_out_gcode(self, words: list[str]) -> None:
         self._move({word[0]: float(word[1:]) for word in words})
 
     def _wait(self, words: list[str]) -> None:
@@ -246,7 +246,7 @@ class Klipper(SimulatedTime):
         self.x = end["X"]
         for name in self.axes:
             self.steppers[name].place = end[name]
-            self.steppers[name].on = True
+            self.steppers[name].enabled = True
 
     def _end(self, start: dict[str, float], words: dict[str, float]) -> dict[str, float]:
         """The places behind a line, by axis."""
@@ -260,20 +260,20 @@ class Klipper(SimulatedTime):
     def _run(self, seconds: float) -> None:
         while self._moves and seconds > 0.0:
             move = self._moves[0]
-            part = min(seconds, move.seconds - move.done)
-            move.done += part
+            part = min(seconds, move.seconds - move.seconds_done)
+            move.seconds_done += part
             seconds -= part
-            share = move.done / move.seconds
+            share = move.seconds_done / move.seconds
             for key, a in move.start.items():
                 self.at[key] = a + share * (move.end[key] - a)
-            if move.done >= move.seconds - 1e-12:
+            if move.seconds_done >= move.seconds - 1e-12:
                 self.at |= move.end
                 self._moves.popleft()
 
 
 _COMMANDS: dict[str, Callable[[Klipper, list[str]], None]] = {
-    "G0": Klipper._go,
-    "G1": Klipper._go,
+    "G0": Klipper._carry_out_gcode,
+    "G1": Klipper._carry_out_gcode,
     "G90": Klipper._use_absolute,
     "G91": Klipper._use_relative,
     "G92": Klipper._zero_x,

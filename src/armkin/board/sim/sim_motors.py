@@ -91,7 +91,7 @@ class Motors:
 
     def cut(self) -> None:
         """Stop dead, as a reset does."""
-        self.axes.settle(self.queue.made())
+        self.axes.settle(self.queue.steps_made())
         self._stop_at_rest()
 
     def advance(self, seconds: float) -> None:
@@ -134,4 +134,4 @@ class Motors:
         self.state = State.IDLE
 
     def _plus_made(self, counts: list[int]) -> list[int]:
-        return [count + made for count, made in zip(counts, self.queue.made(), strict=True)]
+        return [count + made for count, made in zip(counts, self.queue.steps_made(), strict=True)]

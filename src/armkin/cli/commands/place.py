@@ -93,13 +93,13 @@ def _search(
 ) -> list[Place]:
     """The places of arms for the targets of a file, or for a path."""
     from armkin.inverse.solve import ik
-    from armkin.reachability.place_search import each
+    from armkin.reachability.place_search import place_several
 
     targets: list[Any] = [source if _is_path(source) else _targets(arm, source) for arm in arms]
     for arm in arms if compiled else ():
         compiled_ik.prepare(arm)
     with output.progress("positions") as tick:
-        return each(arms, targets, settings, scene, out, engine, tick, compiled_ik.ik if compiled else ik)
+        return place_several(arms, targets, settings, scene, out, engine, tick, compiled_ik.ik if compiled else ik)
 
 
 def _settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, Any]:

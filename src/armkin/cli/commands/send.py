@@ -279,7 +279,7 @@ def _all_plans(planner: Planner, goals: Goals | Stream, start: Sequence[int]) ->
     from armkin.board.planner import Stream
 
     if isinstance(goals, Stream):
-        return goals.whole(planner, start)
+        return goals.all_plans(planner, start)
     near = armkin.joints(planner.arm, list(start))
     plans = [planner.plan(start, goals.resolve(planner.arm, near))]
     keep_outs.tell_ignored([plan.trajectory for plan in plans])

@@ -112,7 +112,7 @@ def carry(
     all_ = chains(arm, columns)
     all_ = through_boundaries(arm, columns, all_, fixed, tolerance)
     if route.task.orientation == "full" and has_wrist(arm):
-        aside = 0.0 if len(route.given[0]) else ASIDE * tolerance  # a curve of points has little tolerance left
+        aside = 0.0 if len(route.given_points[0]) else ASIDE * tolerance  # a curve of points has little tolerance left
         all_ = through_wrists(arm, route, columns, all_, pace.turn, aside)
     starts = _starts(arm, all_, fixed)
     if branch is not None:
@@ -203,12 +203,12 @@ def _groups(edges: list[float], s: Array) -> list[list[float]]:
     return [edges[a : b + 1] for a, b in pairwise([*first, len(edges) - 1])]
 
 
-def _check_kept(path: Knots, off: Array, pace: Pace) -> None:
+def _check_kept(path: Knots, deviation: Array, pace: Pace) -> None:
     """Raise NoSolutionError where a grid's cubics may leave the path."""
-    k = int(off.argmax())
-    if off[k] > pace.tolerance:
+    k = int(deviation.argmax())
+    if deviation[k] > pace.tolerance:
         raise NoSolutionError(
-            f"between {path.s[k]:.3f} and {path.s[k + 1]:.3f} mm the plan may leave the path by {off[k]:.3g} mm; "
+            f"between {path.s[k]:.3f} and {path.s[k + 1]:.3f} mm the plan may leave the path by {deviation[k]:.3g} mm; "
             f"{pace.tolerance:g} are allowed: nothing was moved"
         )
 

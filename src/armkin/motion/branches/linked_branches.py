@@ -104,9 +104,9 @@ class _Linking:
         group = np.repeat(np.arange(len(steps)), 3)
         while part.divide():
             group = np.insert(group, part.where, group[np.maximum(part.where - 1, 0)])
-        self._put(part, steps, group)
+        self._take_over(part, steps, group)
 
-    def _put(self, part: _Linking, steps: Int, group: Int) -> None:
+    def _take_over(self, part: _Linking, steps: Int, group: Int) -> None:
         """Take over what was added to the steps, and their links."""
         B = max(self.columns.q.shape[1], part.columns.q.shape[1])
         c, p, new = self.columns.wider(B), part.columns.wider(B), part.fresh
@@ -186,17 +186,17 @@ class _Linking:
         for i in rows[~straight]:
             self._match(int(i), valid)
 
-    def _certified(self, a: Array, b: Array, there: Bool) -> tuple[Bool, Bool]:
+    def _certified(self, a: Array, b: Array, present: Bool) -> tuple[Bool, Bool]:
         """Which branches (M, B, n) at steps' ends are one, by a cheap bound and where that is too coarse by the bound.
 
-        there: (M, B). Returns that, and which of the cheaply refused ones go the other way round: (M, B) each.
+        present: (M, B). Returns that, and which of the cheaply refused ones go the other way round: (M, B) each.
         """
         D = b - a
         if self.scale is not None:
             D *= self.scale
         with np.errstate(invalid="ignore"):
             good = self.top * np.einsum("mbi,mbi->mb", D, D) <= self.tolerance
-        k, j = np.nonzero(there & ~good)
+        k, j = np.nonzero(present & ~good)
         wrapped = np.zeros(good.shape, bool)
         if len(k):
             shorter = change(self.arm, a[k, j], b[k, j])
@@ -228,16 +228,18 @@ class _Linking:
         self.torn[i] = c.within_limits[i, alone].any() or c.within_limits[i + 1, other].any()
         self.both[i] = self.torn[i] and len(alone) and len(other)
 
-    def _crosses(self, q: Array, left: Int | slice, right: Int | slice, wrapped: Bool) -> Bool:
+    def _crosses(self, q: Array, starts: Int | slice, ends: Int | slice, wrapped: Bool) -> Bool:
         """Which columns of steps have a wide joint that passes one of its limits, whole turns apart: (M, B)."""
         out = wrapped.copy()
         for j in self.wide:
             value = q[:, :, j]
             for limit in (self.arm.lower[j], self.arm.upper[j]):
-                out |= np.floor((value[left] - limit) / self.turn[j]) != np.floor((value[right] - limit) / self.turn[j])
+                out |= np.floor((value[starts] - limit) / self.turn[j]) != np.floor(
+                    (value[ends] - limit) / self.turn[j]
+                )
         k, b = np.nonzero(wrapped)  # these go the other way round
         if len(k):
-            start, end = q[left][k, b], q[right][k, b]
+            start, end = q[starts][k, b], q[ends][k, b]
             there = start + change(self.arm, start, end)
             out[k, b] = False
             for j in self.wide:

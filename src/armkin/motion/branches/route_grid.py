@@ -85,14 +85,14 @@ def fine_enough(arm: Arm, way: Way, number: int, tolerance: float | None, exact:
     return path, every
 
 
-def _nearest(sorted_: Array, values: Array) -> Int:
+def _nearest(ordered: Array, values: Array) -> Int:
     """The nearest of sorted numbers (N,) for each of the values: (k,)."""
     if not len(values):
         return np.zeros(0, np.intp)
-    i = np.clip(np.searchsorted(sorted_, values), 1, max(len(sorted_) - 1, 1))
-    if len(sorted_) == 1:
+    i = np.clip(np.searchsorted(ordered, values), 1, max(len(ordered) - 1, 1))
+    if len(ordered) == 1:
         return np.zeros(len(values), np.intp)
-    return np.asarray(np.where(values - sorted_[i - 1] < sorted_[i] - values, i - 1, i))
+    return np.asarray(np.where(values - ordered[i - 1] < ordered[i] - values, i - 1, i))
 
 
 def _places(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, Int]:
@@ -126,63 +126,63 @@ def _places(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, Int]:
     return _divided(where, begin[1:], np.where(inside > 1, inside + 1, 1))
 
 
-def _too_long(arm: Arm, path: Knots, every: Array, tolerance: float, exact: bool) -> Array:
-    """How many times too long intervals without rests are (M,), by their distance from the route, `every`, and the way
-    from their chord."""
-    off, steps, h = (np.delete(each, path.rests) for each in (every, _steps(arm, path), path.h))
+def _too_long(arm: Arm, path: Knots, distance: Array, tolerance: float, exact: bool) -> Array:
+    """How many times too long intervals without rests are (M,), by `distance` from the route and the way from their
+    chord."""
+    off, steps, h = (np.delete(each, path.rests) for each in (distance, _steps(arm, path), path.h))
     coarse = np.sqrt(steps / max(tolerance, _COARSE))  # of second order in h
     if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
         coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
     return np.maximum(np.cbrt(off / tolerance), coarse)  # of third order in h
 
 
-def _parts(needed: Array, exact: bool) -> Int:
-    """Into how many parts each interval is divided, which is `needed` times too long (M,)."""
-    parts: Int = np.ceil(np.clip(1.15 * needed, 1.0, 6.0)).astype(int)
+def _parts(excess: Array, exact: bool) -> Int:
+    """Into how many parts each interval is divided, which is `excess` times too long (M,)."""
+    parts: Int = np.ceil(np.clip(1.15 * excess, 1.0, 6.0)).astype(int)
     if exact:
         return parts
     beside = np.maximum(np.append(parts[1:], 1), np.append(1, parts[:-1])) > 2
     return np.asarray(np.maximum(parts, 1 + beside))  # slopes that neighbours tell want even steps
 
 
-def _graded(where: Array, breaks: Int) -> tuple[Array, Int]:
+def _graded(points: Array, breaks: Int) -> tuple[Array, Int]:
     """Points (N,) with more where an interval is long beside its neighbour; breaks keep their places."""
     while True:
-        h = np.diff(where)
+        h = np.diff(points)
         left, right = _GROWTH * np.append(np.inf, h[:-1]), _GROWTH * np.append(h[1:], np.inf)
         long = np.flatnonzero(h > _GROWS * np.minimum(left, right))
         if not len(long):
-            return where, breaks
-        at = np.where(left <= right, where[:-1] + left, where[1:] - right)[long]
-        where, breaks = np.insert(where, long + 1, at), breaks + np.searchsorted(long, breaks)
+            return points, breaks
+        at = np.where(left <= right, points[:-1] + left, points[1:] - right)[long]
+        points, breaks = np.insert(points, long + 1, at), breaks + np.searchsorted(long, breaks)
 
 
-def _divided(where: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
+def _divided(points: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
     """Points (N,) with every interval in so many parts (N - 1,); breaks keep their places."""
     begin = np.cumsum(parts) - parts
     f = (np.arange(int(parts.sum())) - np.repeat(begin, parts)) / np.repeat(parts, parts)
-    new = np.repeat(where[:-1], parts) + f * np.repeat(np.diff(where), parts)
-    return np.append(new, where[-1]), begin[breaks]
+    new = np.repeat(points[:-1], parts) + f * np.repeat(np.diff(points), parts)
+    return np.append(new, points[-1]), begin[breaks]
 
 
-def _solved(arm: Arm, way: Way, where: Array, damping: float, known: Knots | None) -> Array:
-    """Joint values at the points, exact to the inverse kinematics; known: a grid whose points are among them."""
+def _solved(arm: Arm, way: Way, points: Array, damping: float, coarser: Knots | None) -> Array:
+    """Joint values at the points, exact to the inverse kinematics; coarser: a grid whose points are among them."""
     route, windows = way.route, way.windows
-    values, new = np.empty((len(where), arm.n), order="F"), np.ones(len(where), bool)  # long runs of numbers
-    if known is not None:
-        old = np.searchsorted(where, known.s)
-        values[old], new[old] = known.q, False
-    if known is None or windows:
-        guess = np.stack([np.interp(where[new], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
+    values, new = np.empty((len(points), arm.n), order="F"), np.ones(len(points), bool)  # long runs of numbers
+    if coarser is not None:
+        old = np.searchsorted(points, coarser.s)
+        values[old], new[old] = coarser.q, False
+    if coarser is None or windows:
+        guess = np.stack([np.interp(points[new], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
     else:  # they are nearer than chords of samples
-        guess, _ = known.evaluate(where[new])
-    values[new] = corrected(arm, route.task, guess, route.targets(where[new]), damping)
+        guess, _ = coarser.evaluate(points[new])
+    values[new] = corrected(arm, route.task, guess, route.targets(points[new]), damping)
     for one in windows:
         if one.detour is not None:  # the route is detoured itself
             continue
-        inside = new & (where > one.begin) & (where < one.end)
+        inside = new & (points > one.begin) & (points < one.end)
         if inside.any():
-            values[inside] = one.joints(arm, route, where[inside], one.copy_of(arm, guess[inside[new]][0]))
+            values[inside] = one.joints(arm, route, points[inside], one.copy_of(arm, guess[inside[new]][0]))
     return values
 
 
@@ -191,17 +191,17 @@ def deviation(arm: Arm, route: Route, path: Knots) -> float:
     return float(interval_deviations(arm, route, path).max(initial=0.0))
 
 
-def interval_deviations(arm: Arm, route: Route, path: Knots, before: tuple[Knots, Array] | None = None) -> Array:
+def interval_deviations(arm: Arm, route: Route, path: Knots, previous: tuple[Knots, Array] | None = None) -> Array:
     """An upper bound of the distance between the tip and the route in every interval of a grid: (N - 1,) [mm].
 
     The distance e is none at both ends and looked at in both quarters; up to the middle a quadratic through an end,
     the near quarter and the other end is at most 4/3 of what is seen there, and e leaves it by h^3 / 96 |e'''|: the
-    tip's is bounded by levers. before: a coarser grid and its distances; where a cubic is the same, so are they.
+    tip's is bounded by levers. previous: a coarser grid and its distances; where a cubic is the same, so are they.
     """
     lever, off = levers(arm), np.zeros(len(path.h))
     open_ = path.s[1:] > path.s[:-1]
-    if before is not None:
-        known, distances = before
+    if previous is not None:
+        known, distances = previous
         at = np.searchsorted(path.s, known.s)
         at += (np.diff(known.s, prepend=-1.0) == 0) & (path.s[np.minimum(at + 1, len(path.s) - 1)] == known.s)
         alike = (path.d.T.take(at, axis=1) == known.d.T).all(axis=0)
@@ -225,7 +225,7 @@ def _steps(arm: Arm, path: Knots) -> Array:
 
 def missed(arm: Arm, route: Route, path: Knots) -> Missed:
     """Greatest distance of a given point from the tip's motion on a grid, and where [mm]; None: there is none."""
-    s, points = route.given
+    s, points = route.given_points
     here = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)
     s, points = s[here], points[here]
     worst: Missed = None
@@ -253,12 +253,12 @@ def missed(arm: Arm, route: Route, path: Knots) -> Missed:
     return worst
 
 
-def _deviations(arm: Arm, route: Route, path: Knots, some: Int, lever: Array) -> Array:
-    (start, end), (d0, d1), h = path.ends(path.q, some), path.ends(path.d, some), path.h[some]
-    d0, d1, chord, seen = d0 * h, d1 * h, end - start, np.zeros(len(some))
+def _deviations(arm: Arm, route: Route, path: Knots, intervals: Int, lever: Array) -> Array:
+    (start, end), (d0, d1), h = path.ends(path.q, intervals), path.ends(path.d, intervals), path.h[intervals]
+    d0, d1, chord, seen = d0 * h, d1 * h, end - start, np.zeros(len(intervals))
     for f in (0.25, 0.75):
         q = start + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
-        wanted = route.targets(path.s[some] + f * h)
+        wanted = route.targets(path.s[intervals] + f * h)
         wanted = wanted[:, :3, 3] if route.task.orientation == "full" else wanted[:, : route.task.position]
         off = (position(arm, q.T)[:, : wanted.shape[1]] - wanted).T
         seen = np.maximum(seen, np.sqrt((off**2).sum(axis=0)))

@@ -102,19 +102,19 @@ def _damped_steps(J: Array, r: Array, damping: float) -> Array:
     return np.asarray(x)
 
 
-def exact_cubics(arm: Arm, route: Route, where: Array, q: Array, rests: Int, known: Knots | None) -> Knots | None:
-    """Cubics through joint values q (N, n) that solve the route at lengths `where` (N,), with its own slopes.
+def exact_cubics(arm: Arm, route: Route, points: Array, q: Array, rests: Int, coarser: Knots | None) -> Knots | None:
+    """Cubics through joint values q (N, n) that solve the route at lengths `points` (N,), with its own slopes.
 
-    rests: numbers of the points at which the path rests: these stand twice. known: such cubics on some of the points.
+    rests: numbers of the points at which the path rests: these stand twice. coarser: such cubics on some of the points.
     None: beside a singularity the joints need not follow all that the targets do.
     """
-    twice = np.sort(np.concatenate([np.arange(len(where)), rests]))
-    s, values = where[twice], np.asfortranarray(q[twice])
+    twice = np.sort(np.concatenate([np.arange(len(points)), rests]))
+    s, values = points[twice], np.asfortranarray(q[twice])
     d, new = np.empty_like(values), np.ones(len(s), bool)
-    if known is not None:
-        old = np.searchsorted(s, known.s)
-        old += np.diff(known.s, prepend=-1.0) == 0
-        d[old], new[old] = known.d, False
+    if coarser is not None:
+        old = np.searchsorted(s, coarser.s)
+        old += np.diff(coarser.s, prepend=-1.0) == 0
+        d[old], new[old] = coarser.d, False
     ends = np.append(twice[1:] == twice[:-1], True)  # the slope there is that of the way before it
     number = np.flatnonzero(new)
     for part in (number[i : i + _BLOCK] for i in range(0, len(number), _BLOCK)):
@@ -125,12 +125,12 @@ def exact_cubics(arm: Arm, route: Route, where: Array, q: Array, rests: Int, kno
     return Knots(s, values, d)
 
 
-def _slopes(arm: Arm, route: Route, s: Array, q: Array, aside: Array) -> Array | None:
+def _slopes(arm: Arm, route: Route, s: Array, q: Array, detour_slope: Array) -> Array | None:
     """dq/ds (M, n) of J dq = dx, by what misses to the targets a little aside; None: J is singular, or nearly."""
     if arm.n > len(_scale(arm, route.task)):
         return None
     T, J = _scaled(arm, route.task, q)
-    there = s + aside
+    there = s + detour_slope
     here, beside = (_missed(arm, route.task, T, q, route.targets(x)) for x in (s, there))
     rate = (beside - here) / (there - s)
     d = _damped_steps(J, rate, (_TELLING / arm.reach) ** 2)

@@ -74,7 +74,7 @@ def through_wrists(
                 if c.windows and s[j] <= c.windows[-1].end:
                     continue
                 for other in chains:
-                    joined = _joined(arm, route, s, c, other, j, (turn, tip_offset))
+                    joined = _chain_through_window(arm, route, s, c, other, j, (turn, tip_offset))
                     made += [] if joined is None else [joined]
         found, new = found + made, made
         if not made or len(found) > _MOST * len(chains):
@@ -109,17 +109,17 @@ def _straight(arm: Arm, c: Chain, near: float) -> list[int]:
     return (c.first + np.flatnonzero(least & (off - between < near))).tolist()
 
 
-def _spans(route: Route, s: Array, c: Chain, other: Chain, j: int) -> Iterator[tuple[int, int]]:
+def _spans(route: Route, s: Array, c: Chain, next_chain: Chain, j: int) -> Iterator[tuple[int, int]]:
     """First and last samples of windows about sample j, wider and wider, on one piece of the route."""
     k = int(np.searchsorted(route.breaks, s[j]))
     low, high = route.breaks[max(k - 1, 0)], route.breaks[min(k, len(route.breaks) - 1)]
     low = max(low, s[c.first], c.windows[-1].end if c.windows else 0.0)
-    high = min(high, s[other.last])
+    high = min(high, s[next_chain.last])
     for half in _HALF * _GROW ** np.arange(_WIDTHS):
         a, b = int(np.searchsorted(s, s[j] - half, side="right")) - 1, int(np.searchsorted(s, s[j] + half))
-        if a < c.first or b > min(other.last, len(s) - 1) or s[a] < low or s[b] > high:
+        if a < c.first or b > min(next_chain.last, len(s) - 1) or s[a] < low or s[b] > high:
             return
-        if b >= other.first:
+        if b >= next_chain.first:
             yield a, b
 
 
@@ -142,31 +142,31 @@ def _passed(
     return None
 
 
-def _joined(
-    arm: Arm, route: Route, s: Array, c: Chain, other: Chain, j: int, allowed: tuple[float, float]
+def _chain_through_window(
+    arm: Arm, route: Route, s: Array, c: Chain, next_chain: Chain, j: int, allowed: tuple[float, float]
 ) -> Chain | None:
     """A chain up to a window about sample j, and from there on another one, or itself again; None: none is allowed."""
-    on = max(j, other.first)  # exactly on the singularity one may end, and the other one begin behind it
-    if not (c.first <= j <= c.last and on <= other.last and s[on] - s[j] <= _GAP):
+    on = max(j, next_chain.first)  # exactly on the singularity one may end, and the other one begin behind it
+    if not (c.first <= j <= c.last and on <= next_chain.last and s[on] - s[j] <= _GAP):
         return None
-    step = change(arm, c.q[j - c.first], other.q[on - other.first])
+    step = change(arm, c.q[j - c.first], next_chain.q[on - next_chain.first])
     if np.abs(step[:3]).max() > _ARM:
         return None
-    spans = list(_spans(route, s, c, other, j))
+    spans = list(_spans(route, s, c, next_chain, j))
 
     @cache
     def window(k: int) -> Window:
         a, b = spans[k]
-        return _window(arm, route, s[[a, b]], c.q[a - c.first], other.q[b - other.first])
+        return _window(arm, route, s[[a, b]], c.q[a - c.first], next_chain.q[b - next_chain.first])
 
     best = _passed(arm, route, window, range(len(spans)), allowed)
     if best is None:
         return None
     (a, b), one = spans[best[0]], best[1]
     inside = _joints_in_window(arm, route, one, s[a + 1 : b])
-    offset = one.q[1] - other.q[b - other.first]
-    q = np.concatenate([c.q[: a + 1 - c.first], inside, other.q[b - other.first :] + offset])
-    left, right = c.labels[: j - c.first], other.labels[on - other.first :]
+    offset = one.q[1] - next_chain.q[b - next_chain.first]
+    q = np.concatenate([c.q[: a + 1 - c.first], inside, next_chain.q[b - next_chain.first :] + offset])
+    left, right = c.labels[: j - c.first], next_chain.labels[on - next_chain.first :]
     labels = np.concatenate([left, np.repeat(right[:1], len(q) - len(left) - len(right)), right])
     return Chain(arm, c.first, q, labels, (*c.windows, one))
 

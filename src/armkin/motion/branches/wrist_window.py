@@ -38,7 +38,7 @@ class Window:
     @property
     def tip_offset(self) -> float:
         """How far the tip goes aside [mm]."""
-        return 0.0 if self.detour is None else float(np.linalg.norm(self.detour.by))
+        return 0.0 if self.detour is None else float(np.linalg.norm(self.detour.displacement))
 
     def joints(self, arm: Arm, route: Route, s: Array, offset: Array | float = 0.0) -> Array:
         """Joint values at lengths s (N,) inside: (N, n); offset: whole turns (n,) of a copy."""

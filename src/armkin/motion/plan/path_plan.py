@@ -236,7 +236,7 @@ class PathPlan:
             if i >= 0:
                 stretch, base = self.on_path[numbers[i]]
                 assert isinstance(stretch, Curve | Smoothed)
-                out[here] = base + stretch.way(when[here] - begins[i])
+                out[here] = base + stretch.lengths(when[here] - begins[i])
         return out.reshape(np.shape(t))
 
     def s_range(self, number: int) -> tuple[float, float]:

@@ -26,7 +26,7 @@ def times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int
     count = int(min(most / 4, plan.duration / _FIRST)) + 2
     t = np.unique(np.concatenate([np.linspace(0.0, plan.duration, count), begins]))
     a, b = t[:-1], t[1:]  # intervals that may be divided
-    off = _off(arm, plan, a, b)
+    off = _drawn_error(arm, plan, a, b)
     done = [t]
     worst, room = 0.0, most - len(t)
     while True:
@@ -43,11 +43,11 @@ def times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int
         room -= len(middle)
         first, last = np.concatenate([a[order], middle]), np.concatenate([middle, b[order]])
         a, b = (np.concatenate([np.delete(old, order), new]) for old, new in ((a, first), (b, last)))
-        off = np.concatenate([np.delete(off, order), _off(arm, plan, first, last)])
+        off = np.concatenate([np.delete(off, order), _drawn_error(arm, plan, first, last)])
     return np.unique(np.concatenate(done)), max(worst, float(off.max(initial=0.0)))
 
 
-def _off(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:
+def _drawn_error(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:
     """How far the tip drawn is from the tip [mm], the most seen between the times a and b: (k,)."""
     first, last = plan.q(a), plan.q(b)
     tips = [position(arm, first), position(arm, last)]

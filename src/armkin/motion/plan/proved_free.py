@@ -45,7 +45,7 @@ class Found:
     cell: float
     joints: Array
     body: str
-    other: str
+    keep_out: str
     escaping: tuple[tuple[str, str], ...]
     postures: int
 
@@ -104,7 +104,7 @@ def proved(trajectory: Trajectory, *, tight: bool = False) -> Found | None:
 
     held, allowed, found, postures = guard(whole), None, None, 0
     escaping: tuple[int, ...] = ()
-    for first, way in _ways(trajectory):
+    for first, way in _geometries(trajectory):
         lifted = _Lifted(arm, way)
         proof = prove(held, lifted, tight=tight, ignored_pairs=allowed)
         postures += proof.postures
@@ -142,7 +142,7 @@ def checked(plan: PathPlan) -> PathPlan:
         return plan
     s = float(plan.s(seconds(plan.motion, found)))
     mm = found.mm if np.isfinite(found.mm) else None
-    plan.clearance = {"mm": mm, "s_mm": s, "body": found.body, "with": found.other}
+    plan.clearance = {"mm": mm, "s_mm": s, "body": found.body, "with": found.keep_out}
     if found.free or plan.arm.ignores_keep_out:
         if plan.approach is not None:
             check_free(plan.approach, " on the way to the path's start")
@@ -157,11 +157,11 @@ def refusal(trajectory: Trajectory, hit: Found, place: str = "", **fields: objec
     arm = trajectory.arm
     values = units.joints_out(arm, hit.joints).tolist()
     at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(arm.joint_names, values, strict=True))
-    stands = (hit.body, hit.other) in hit.escaping
+    stands = (hit.body, hit.keep_out) in hit.escaping
     many = f" on the way to waypoint {hit.stretch + 1}" if len(trajectory.stretches) > 1 and not place else ""
     what = "would go deeper into" if stands else "would hit"
-    told = {"body": hit.body, "with": hit.other, "joints": values, **fields}
-    return NoSolutionError(f"{hit.body} {what} {hit.other}{place or many}, at {at}: nothing was moved", **told)
+    told = {"body": hit.body, "with": hit.keep_out, "joints": values, **fields}
+    return NoSolutionError(f"{hit.body} {what} {hit.keep_out}{place or many}, at {at}: nothing was moved", **told)
 
 
 def free_way(arm: Arm, q: Array, goal: Array) -> tuple[float, NoSolutionError | None]:
@@ -216,7 +216,7 @@ class _Lifted:
         return found
 
 
-def _ways(trajectory: Trajectory) -> list[tuple[int, Way]]:
+def _geometries(trajectory: Trajectory) -> list[tuple[int, Way]]:
     """The stretches' geometry, those that are cubics together; and the number of the first stretch of each."""
     found: list[tuple[int, Way]] = []
     numbered = enumerate(trajectory.stretches)

@@ -66,7 +66,7 @@ class Curve:
         v, u = np.sqrt(self.x[i]), self._u[i]
         return i, np.clip(tau * (v + tau * u / 2), 0.0, self.path.h[i]), np.maximum(v + tau * u, 0.0), u
 
-    def way(self, t: Array) -> Array:
+    def lengths(self, t: Array) -> Array:
         """s at times t: (T,) -> (T,)."""
         i, along, _, _ = self.place(t)
         return np.asarray(self.path.s[i] + along)

@@ -54,9 +54,9 @@ class Smoothed:
         """Upper bound of the speed of every joint: (n,)."""
         return self.curve.top_speed
 
-    def way(self, t: Array) -> Array:
+    def lengths(self, t: Array) -> Array:
         """s of the curve at the middle of the window: (T,) -> (T,)."""
-        return self.curve.way(np.asarray(t) - self.window / 2)
+        return self.curve.lengths(np.asarray(t) - self.window / 2)
 
     @cached_property
     def _sums(self) -> Array:

@@ -23,7 +23,7 @@ class Motion(NamedTuple):
     """What is bounded along the M intervals: joints, and motors that turn several of them; k of them in all."""
 
     first: Array  # (k, M) their slopes at the left end of every interval
-    left: Array  # (k, M) their second derivatives at its left end
+    left_slope: Array  # (k, M) their second derivatives at its left end
     bend: Array  # (k, M) how much greater these are at its right end
     h: Array  # (M,)
     accel: Array  # (k, M) greatest acceleration
@@ -34,8 +34,8 @@ class Motion(NamedTuple):
         With q'' = l + f (r - l) and x(f) = x + 2 u h f at its fraction f it is u q'(f) + q''(f) x(f).
         """
         u = (x1 - x0) / (2 * self.h)
-        a = u * self.first + self.left * x0  # a + b f + c f^2
-        b = 3 * u * self.h * self.left + self.bend * x0
+        a = u * self.first + self.left_slope * x0  # a + b f + c f^2
+        b = 3 * u * self.h * self.left_slope + self.bend * x0
         c = 2.5 * u * self.h * self.bend
         f = np.fmin(np.fmax(-b / (2 * c), 0.0), 1.0)  # 0 where it does not bend
         inside = np.abs(a + f * (b + f * c))
@@ -47,10 +47,12 @@ class Motion(NamedTuple):
         (q'(f))^2 x(f) is greatest at an end, which its cap holds, or where its derivative, a quadratic, is zero.
         """
         n, h = len(speed), self.h
-        ends = np.maximum(np.abs(self.first[:n]), np.abs(self.first[:n] + h * (self.left[:n] + 0.5 * self.bend[:n])))
+        ends = np.maximum(
+            np.abs(self.first[:n]), np.abs(self.first[:n] + h * (self.left_slope[:n] + 0.5 * self.bend[:n]))
+        )
         bound = ((ends + 0.125 * h * np.abs(self.bend[:n])) / speed).max(axis=0) ** 2 * np.maximum(x0, x1)
         near = np.flatnonzero(bound > 1.0)
-        d, left, bend = self.first[:n, near], self.left[:n, near], self.bend[:n, near]
+        d, left, bend = self.first[:n, near], self.left_slope[:n, near], self.bend[:n, near]
         h, dx, x = h[near], (x1 - x0)[near], x0[near]
         c = 2 * h * left * x + d * dx
         b = 2 * h * bend * x + 3 * h * left * dx
@@ -131,9 +133,9 @@ def in_parts(intervals: int) -> list[slice]:
 
 def _rows(motion: Motion) -> tuple[Array, Array, Array]:
     """P > 0, R, C of |P u + R x| <= C, x at the left end, for both ends of the intervals: (k, M)."""
-    right = motion.left + motion.bend
-    p = np.concatenate([motion.first, motion.first + motion.h * (3 * motion.left + 2.5 * motion.bend)])
-    r = np.concatenate([motion.left, right])
+    right = motion.left_slope + motion.bend
+    p = np.concatenate([motion.first, motion.first + motion.h * (3 * motion.left_slope + 2.5 * motion.bend)])
+    r = np.concatenate([motion.left_slope, right])
     size = np.abs(p)
     P = np.maximum(size, 1e-12 * size.max(initial=0.0) + TINY)
     return P, np.copysign(1.0, p) * r, np.concatenate([motion.accel, motion.accel])

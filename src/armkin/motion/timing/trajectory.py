@@ -198,10 +198,10 @@ class Trajectory:
         return out.reshape(*when.shape, self.arm.n)
 
 
-def grouped(which: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:
+def grouped(numbers: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:
     """Numbers (N,) that occur, each once, and where it stands: in time that grows with N alone."""
-    order = np.argsort(which, kind="stable")
-    edges = [0, *(np.flatnonzero(np.diff(which[order])) + 1).tolist(), len(which)]
+    order = np.argsort(numbers, kind="stable")
+    edges = [0, *(np.flatnonzero(np.diff(numbers[order])) + 1).tolist(), len(numbers)]
     for a, b in pairwise(edges):
         if b > a:
-            yield int(which[order[a]]), order[a:b]
+            yield int(numbers[order[a]]), order[a:b]

@@ -73,9 +73,9 @@ class Rows:
             edge | np.append(edge[1:], True),
         )
 
-    def part(self, some: Int) -> Rows:
+    def part(self, curves: Int) -> Rows:
         """Those of some curves, all rows of each."""
-        taken = {field.name: getattr(self, field.name).T.take(some, axis=-1).T for field in fields(self)}
+        taken = {field.name: getattr(self, field.name).T.take(curves, axis=-1).T for field in fields(self)}
         taken["curve"] = np.unique(taken["curve"], return_inverse=True)[1]
         return Rows(**taken)
 
@@ -146,11 +146,11 @@ def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
 
 
 def _refine(
-    rows: Rows, layout: Layout, off: Array, bad: Bool, astray: Bool, knot: Bool, weight: Array, age: Int
+    rows: Rows, layout: Layout, misses: Array, bad: Bool, astray: Bool, knot: Bool, weight: Array, age: Int
 ) -> None:
     """Divide intervals that miss their rows, or give some of the rows more weight: in place."""
     worst = np.zeros(len(layout.begin))
-    np.maximum.at(worst, layout.interval[bad], off[bad])
+    np.maximum.at(worst, layout.interval[bad], misses[bad])
     begins = np.searchsorted(layout.interval, np.arange(len(worst) + 1))
     at = np.flatnonzero(knot)
     mine = at[np.searchsorted(at, begins[:-1])]
@@ -163,7 +163,7 @@ def _refine(
     fresh = can[layout.interval]
     weight[fresh] = rows.weight[fresh]
     heavier = bad & ~fresh
-    weight[heavier] = np.minimum(np.maximum(weight[heavier], 0.05) * (1.4 * off[heavier]) ** 2, _HEAVIEST)
+    weight[heavier] = np.minimum(np.maximum(weight[heavier], 0.05) * (1.4 * misses[heavier]) ** 2, _HEAVIEST)
 
 
 def _astray(rows: Rows, layout: Layout, miss: Array, weight: Array) -> Bool:

@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 OF_JOINTS = ("joint", "wait", "grip")  # moves that need no targets
 
 
-def moves(arm: Arm, given: Any, task: str | None = None) -> PathFile:
+def moves(arm: Arm, path: Any, task: str | None = None) -> PathFile:
     """Whatever `armkin.path` takes as the model of a path file."""
     from armkin import path_file
 
-    if isinstance(given, path_file.PathFile):
-        return given
-    if isinstance(given, str | os.PathLike):
-        return path_file.read(os.fspath(given))
-    if isinstance(given, Mapping):
-        return path_file.validated(dict(given))
+    if isinstance(path, path_file.PathFile):
+        return path
+    if isinstance(path, str | os.PathLike):
+        return path_file.read(os.fspath(path))
+    if isinstance(path, Mapping):
+        return path_file.validated(dict(path))
     definition = task_for(arm, task)
-    rows = np.asarray(given, dtype=float)
+    rows = np.asarray(path, dtype=float)
     if definition.orientation == "full" and rows.ndim == 3:
         rows = np.concatenate([rows[:, :3, 3], units.angles_out(rpy(rows[:, :3, :3]))], axis=1)
     elif rows.ndim == 2:
@@ -54,7 +54,7 @@ def of_tool(file: PathFile) -> bool:
     return point or any(move.kind not in OF_JOINTS for move in file.moves)
 
 
-def joints(arm: Arm, now: Array, value: Any) -> Array:
+def joints(arm: Arm, standing: Array, value: Any) -> Array:
     """Joint values (n,) [rad | mm]: a list, a pose's name, or {name: value} with the others as they are now."""
     if isinstance(value, str):
         if value not in arm.poses:
@@ -64,18 +64,18 @@ def joints(arm: Arm, now: Array, value: Any) -> Array:
         wrong = [name for name in value if name not in arm.joint_names]
         if wrong:
             raise UsageError(f"there is no joint {wrong[0]}; {arm.name} has {', '.join(arm.joint_names)}")
-        old = units.joints_out(arm, now).tolist()
+        old = units.joints_out(arm, standing).tolist()
         value = [value.get(name, before) for name, before in zip(arm.joint_names, old, strict=True)]
     if len(value) != arm.n:
         raise UsageError(f"{arm.name} has {arm.n} joints ({', '.join(arm.joint_names)}); got {len(value)} values")
     return np.asarray(units.joints_in(arm, value))
 
 
-def target(task: Task, now: Spot, value: Sequence[float]) -> Spot:
+def target(task: Task, last_spot: Spot, value: Sequence[float]) -> Spot:
     """A target; with the position alone the sums and the orientation stay as they are now."""
     labels = task.labels
     if len(value) == task.position < len(labels):
-        return replace(now, p=np.asarray(value, dtype=float))
+        return replace(last_spot, p=np.asarray(value, dtype=float))
     if len(value) != len(labels):
         short = f", or {' '.join(labels[: task.position])} alone" if len(labels) > task.position else ""
         raise UsageError(f"a target of task {task.name} is {' '.join(labels)}{short}; got {len(value)} numbers")

@@ -240,7 +240,7 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
     a side is nearer.
     """
     corner, half = b.first.p, max(a.length - side / 2, 0.0)
-    radius = min(radius, *(_away(piece, corner, s) for piece, s in ((a, half), (b, b.length / 2))))
+    radius = min(radius, *(_distance_from(piece, corner, s) for piece, s in ((a, half), (b, b.length / 2))))
     cut_a = _leaves(a, corner, radius, a.length, half)
     cut_b = _leaves(b, corner, radius, 0.0, b.length / 2)
     before, after = a.part(0.0, cut_a), b.part(cut_b, b.length)
@@ -265,7 +265,7 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
     return before, slow, after, radius
 
 
-def _away(piece: Piece, corner: Array, s: float) -> float:
+def _distance_from(piece: Piece, corner: Array, s: float) -> float:
     """Distance of a piece's place from a corner [mm]."""
     return float(np.linalg.norm(piece.curve(np.array([s]))[0, : piece.task.position] - corner))
 

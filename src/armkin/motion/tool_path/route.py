@@ -21,17 +21,17 @@ _SMOOTH = 1e-3  # [rad] between two directions that count as one
 
 @dataclass(frozen=True)
 class Detour:
-    """From length `begin` to `end` the way goes aside: all of `by` (3,) [mm] in its middle third, none at its ends."""
+    """From length `begin` to `end` the way goes aside: by `displacement` (3,) [mm] in its middle third."""
 
     begin: float
     end: float
-    by: Array
+    displacement: Array
 
     def offset(self, s: Array) -> Array:
         """How far aside at lengths s (N,): (N, 3) [mm], with a bend that does not jump."""
         f = (s - self.begin) / (self.end - self.begin)
         f = np.clip(3 * np.minimum(f, 1 - f), 0.0, 1.0)
-        return np.asarray((f**3 * (10 - f * (15 - 6 * f)))[:, None] * self.by)
+        return np.asarray((f**3 * (10 - f * (15 - 6 * f)))[:, None] * self.displacement)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Route:
     @cached_property
     def largest_detour(self) -> float:
         """How far its detours lead away from its pieces, at most [mm]."""
-        return max((float(np.linalg.norm(one.by)) for one in self.detours), default=0.0)
+        return max((float(np.linalg.norm(one.displacement)) for one in self.detours), default=0.0)
 
     @cached_property
     def breaks(self) -> Array:
@@ -94,7 +94,7 @@ class Route:
         return np.concatenate(inside) if inside else np.zeros(0)
 
     @cached_property
-    def given(self) -> tuple[Array, Array]:
+    def given_points(self) -> tuple[Array, Array]:
         """Points that the route was fitted to: where each is passed (N,) [mm], and its position (N, 2 or 3)."""
         dense = [(self.ends[k], p.dense) for k, p in enumerate(self.pieces) if p.dense is not None]
         if not dense:
@@ -190,18 +190,18 @@ def joined(
     return Route(task, tuple(made), frozenset(stops)), order
 
 
-def _angle(before: Piece, piece: Piece) -> float:
+def _angle(last_piece: Piece, piece: Piece) -> float:
     """The angle of the corner between two pieces [rad], 0 for none."""
-    a, b = before.direction(before.length), piece.direction(0.0)
+    a, b = last_piece.direction(last_piece.length), piece.direction(0.0)
     return float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1, 1)))
 
 
-def _blend_radius(before: Piece, piece: Piece, angle: float, wish: float | None, tolerance: float) -> float:
+def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wish: float | None, tolerance: float) -> float:
     """The radius of a corner's blend [mm]; 0: none, and the arm rests there. wish: see `joined`'s blends."""
     # a cubic blend passes its corner at r |a - b| / 4
     radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wish is None else wish
     sharpest = REVERSAL if wish is None else np.pi - _SMOOTH
-    return radius if radius > 0 and angle <= sharpest and both_move(before, piece) else 0.0
+    return radius if radius > 0 and angle <= sharpest and both_move(last_piece, piece) else 0.0
 
 
 def _passing(piece: Piece, corner: Array) -> Dense:

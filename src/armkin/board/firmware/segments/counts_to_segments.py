@@ -132,17 +132,17 @@ class Cutter:
         self.late = min(exact - cycles_of(segment), float(segment.ticks))
         return segment
 
-    def _steady(self, exact: float, left: Sequence[int], most: float, drift: float) -> Segment:
-        """A piece of one speed that lasts `exact` cycles; left: (motors,) 2^-23 step, most: steps of the fastest."""
+    def _steady(self, exact: float, remainders: Sequence[int], most: float, drift: float) -> Segment:
+        """One speed for `exact` cycles; remainders: (motors,) 2^-23 step, most: the fastest's steps."""
         ticks = self._ticks(exact, most)
-        if ticks > _SLOW * most or _drift(ticks, left) > drift:
-            ticks = _exact_ticks(ticks, left)
+        if ticks > _SLOW * most or _drift(ticks, remainders) > drift:
+            ticks = _exact_ticks(ticks, remainders)
         interval, add = round(exact / ticks), 0
         if ticks > 1 and exact > _EVEN * self.clock:
-            interval, add = _even(exact, ticks)
-        return Segment(ticks, interval, add, _rates(left, ticks))
+            interval, add = _evenly_spread(exact, ticks)
+        return Segment(ticks, interval, add, _rates(remainders, ticks))
 
-    def _ramp(self, exact: float, left: Sequence[int], most: float, change: float) -> Segment:
+    def _ramp(self, exact: float, remainders: Sequence[int], most: float, change: float) -> Segment:
         """A piece whose speed changes evenly, see `piece`: as many ticks as the board makes, as `bend` has 16 bits."""
         fast = (1 + abs(change) / 2) * self.min_interval
         shortest = exact / (16 * change**2 * exact) ** (1 / 3)  # [cycles] of a tick, for the quick bend to have 16 bits
@@ -162,7 +162,7 @@ class Cutter:
             spread = range(ticks - min(ticks // _CHOICE, _CHOICES), ticks + 1)
             ticks = min(spread, key=lambda t: _parabola(exact, t, change, quick)[3])
         interval, add, bend, _ = _parabola(exact, ticks, change, quick)
-        segment = Segment(ticks, interval, add, _rates(left, ticks), bend, quick and bend != 0)
+        segment = Segment(ticks, interval, add, _rates(remainders, ticks), bend, quick and bend != 0)
         rest = exact - cycles_of(segment)  # every interval is cut to whole cycles
         return replace(segment, interval=interval + round(rest / ticks))
 
@@ -180,29 +180,29 @@ class Cutter:
         return max(1, math.ceil(cycles / _LONGEST), round(cycles / tick))
 
 
-def _rates(left: Sequence[int], ticks: int) -> tuple[int, ...]:
-    return tuple(nearest_rate(x / ticks) for x in left)
+def _rates(remainders: Sequence[int], ticks: int) -> tuple[int, ...]:
+    return tuple(nearest_rate(x / ticks) for x in remainders)
 
 
-def _drift(ticks: int, left: Sequence[int]) -> float:
+def _drift(ticks: int, remainders: Sequence[int]) -> float:
     """How far the rounding of rates leaves the motors from their places [steps]."""
-    return max(abs(x - ticks * nearest_rate(x / ticks)) for x in left) / STEP
+    return max(abs(x - ticks * nearest_rate(x / ticks)) for x in remainders) / STEP
 
 
-def _exact_ticks(ticks: int, left: Sequence[int]) -> int:
+def _exact_ticks(ticks: int, remainders: Sequence[int]) -> int:
     """The number of ticks, within 3 % of `ticks`, whose rates come nearest to what is left (motors,).
 
     A rate has 2^-15 step a tick: over thousands of ticks that is up to a tenth of a step, which a short ramp behind a
     slow cruise would have to make up for.
     """
     near = np.arange(ticks - ticks // 32, ticks + ticks // 32 + 1)
-    exact = np.abs(np.array(left, dtype=float))[:, None] / near
+    exact = np.abs(np.array(remainders, dtype=float))[:, None] / near
     rates = np.where(exact < FINE - 0.5, np.rint(exact), np.rint(exact / COARSE) * COARSE)
     off = np.abs(exact - rates) * near
     return int(near[off.max(axis=0).argmin()])
 
 
-def _even(cycles: float, ticks: int) -> tuple[int, int]:
+def _evenly_spread(cycles: float, ticks: int) -> tuple[int, int]:
     """Interval and `add` of a segment of one speed that lasts so many cycles.
 
     A whole number of cycles an interval is up to half a cycle a tick off, which the next segment would have to make

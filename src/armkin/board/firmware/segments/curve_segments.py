@@ -87,13 +87,13 @@ class CurveSegments:
         return np.asarray(out)
 
     def _smooth(
-        self, cutter: Cutter, seconds: float, counts: list[float], change: float, before: Array, since: float,
-        after: Array, until: float,
+        self, cutter: Cutter, seconds: float, counts: list[float], change: float, start_speed: Array, begin_time: float,
+        end_speed: Array, end_time: float,
     ) -> tuple[Segment, Array]:  # fmt: skip
         """One segment and the motors' speeds at its end, its ramp taken back as far as the board asks for it.
 
-        before: speeds at the end of the segment before, since: the longer of the two's time; after, until: the mean
-        speed of the next one, and the same of it. Without a ramp a segment always fits: its mean follows the one before
+        start_speed: speeds at the end of the segment before; end_speed: the mean speed of the next one; begin_time,
+        end_time: the longer time of each two. Without a ramp a segment always fits: its mean follows the one before
         within the greatest acceleration.
         """
         most = _JUMP * motor_accel(self.arm)
@@ -103,8 +103,10 @@ class CurveSegments:
             one = cutter.piece(seconds, counts, change * share)
             rate = np.array(one.rates) * (self.clock / STEP)
             begin, end = rate / one.interval, rate / one.last_interval
-            slow = (np.abs(begin - before) <= most * since).all() and (np.abs(end - begin) <= most * seconds).all()
-            if share == 0.0 or (slow and (np.abs(after - end) <= most * until).all()):
+            slow = (np.abs(begin - start_speed) <= most * begin_time).all() and (
+                np.abs(end - begin) <= most * seconds
+            ).all()
+            if share == 0.0 or (slow and (np.abs(end_speed - end) <= most * end_time).all()):
                 break
         return one, end
 

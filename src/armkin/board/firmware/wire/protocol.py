@@ -31,7 +31,7 @@ from armkin.board.firmware.wire.segment_format import Segment as Segment
 from armkin.board.firmware.wire.segment_format import nearest_rate as nearest_rate
 from armkin.board.firmware.wire.segment_format import read_segment as read_segment
 from armkin.board.firmware.wire.segment_format import segment_size as segment_size
-from armkin.board.firmware.wire.segment_format import whole as whole
+from armkin.board.firmware.wire.segment_format import whole_steps as whole_steps
 
 VERSION = 2
 

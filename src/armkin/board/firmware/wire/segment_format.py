@@ -98,7 +98,7 @@ def _long(short: int) -> int:
     return short * COARSE if abs(short) != FINE - 1 else int(math.copysign(_FULL, short))
 
 
-def whole(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Segment:
+def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Segment:
     """A segment of whole steps, from the middle between two to the middle between two, as near as rates come.
 
     add: 1/256 cycle a tick.

@@ -206,7 +206,7 @@ class Session:
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
                 reply_checks.check_session(reply.session, self._digest, self.port.name)
                 self._window.check(reply)
-            goes_on, asked = reply.queued < self.queued or _moved(self.latest, reply), 0.0
+            goes_on, asked = reply.queued < self.queued or _has_moved(self.latest, reply), 0.0
             self.state, self.queued = State(reply.state), reply.queued
             self.last = reply
             if isinstance(reply, Status):
@@ -301,9 +301,11 @@ def _nonce() -> int:
     return secrets.randbits(16) << 16 | 1 + secrets.randbelow(65535)
 
 
-def _moved(before: Status | None, reply: Ack | Status) -> bool:
+def _has_moved(last_status: Status | None, reply: Ack | Status) -> bool:
     """Whether a status tells other counts than the one before."""
-    return isinstance(reply, Status) and before is not None and reply.page == 0 and reply.counts != before.counts
+    return (
+        isinstance(reply, Status) and last_status is not None and reply.page == 0 and reply.counts != last_status.counts
+    )
 
 
 def _silent(port: Port) -> LinkError:
