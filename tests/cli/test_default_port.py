@@ -17,7 +17,7 @@ def plugged_in(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
     """What the operating system says is there."""
     found = [ports.Found(name, "a board", "USB", "Arduino Uno") for name in names]
     found.append(ports.Found("/dev/modem", "a modem", "USB", ""))
-    for module in ("armkin.board.ports", "armkin.board.firmware.wire.find_boards"):
+    for module in ("armkin.board.ports", "armkin.board.backend.board", "armkin.board.firmware.wire.find_boards"):
         monkeypatch.setattr(f"{module}.list_ports", lambda: found)
 
 
