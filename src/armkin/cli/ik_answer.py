@@ -22,15 +22,12 @@ def answer_of(
     request: choose_branch.Request,
     task: Task,
     values: list[float],
-    goal: Array,
     chosen: choose_branch.Answer,
     all_branches: bool,
     turns: bool,
-    *,
-    with_closest: bool,
-    nearest: NearestPose | None = None,
+    closest: Closest | None,
 ) -> Ik:
-    """The JSON of one target [mm, deg]: its branches, or the nearest pose where none is; nearest: if it is known."""
+    """The JSON of one target [mm, deg]: its branches, or the closest pose where none is."""
     arm = request.arm
     listed, best = chosen.branches, chosen.best
     if not all_branches:
@@ -53,7 +50,7 @@ def answer_of(
         "branches_within_limits": chosen.within_limits,
         "branches": [_branch(request, branch, turns) for branch in listed],
         "best": best,
-        "closest": _closest(request, goal, chosen, nearest) if best is None and with_closest else None,
+        "closest": closest,
         "free_joints": chosen.free,
     }
     answer.update(render.scene_and_tool(arm))
@@ -72,8 +69,8 @@ def nearest_to(
     return dict(zip(rows, choose_branch.closest(request, targets[rows]), strict=True)) if rows else {}
 
 
-def _closest(
-    request: choose_branch.Request, goal: Array, chosen: choose_branch.Answer, nearest: NearestPose | None
+def closest_pose(
+    request: choose_branch.Request, goal: Array, chosen: choose_branch.Answer, nearest: NearestPose | None = None
 ) -> Closest | None:
     """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for.
 

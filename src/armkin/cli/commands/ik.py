@@ -11,7 +11,7 @@ import typer
 
 import armkin
 from armkin.cli import arguments, compiled_ik, ik_text, lock_and_sweep, output, piped_answers, render
-from armkin.cli.ik_answer import answer_of, nearest_to
+from armkin.cli.ik_answer import answer_of, closest_pose, nearest_to
 from armkin.cli.number_parsing import decimals
 from armkin.cli.options import (
     AllBranches,
@@ -159,9 +159,8 @@ def _single_target(
     request, task = questions.request, questions.task
     goal = targets_in(task.labels, values)
     [found] = choose_branch.solve(request, goal, _rounding(request.arm, task, values, words))
-    answer = answer_of(
-        request, task, values[0].tolist(), goal[0], found, questions.all_branches, questions.turns, with_closest=True
-    )
+    closest = closest_pose(request, goal[0], found) if found.best is None else None
+    answer = answer_of(request, task, values[0].tolist(), found, questions.all_branches, questions.turns, closest)
     with output.destination(out, "one answer is", output.TEXT) as write:
         write(f"{render.to_json(answer)}\n" if json else ik_text.text(request.arm, answer))
     if answer["best"] is None and answer["closest"] is None:
@@ -271,10 +270,9 @@ class Questions:
             alone = self.continuous or not with_closest  # each row's `near` is another one
             nearest = {} if alone else nearest_to(self.request, targets, found)
             for k, (values, goal, (request, one)) in enumerate(zip(part.tolist(), targets, each, strict=True)):
-                yield answer_of(
-                    request, self.task, values, goal, one, self.all_branches, self.turns,
-                    with_closest=with_closest, nearest=nearest.get(k),
-                )  # fmt: skip
+                missed = with_closest and one.best is None
+                closest = closest_pose(request, goal, one, nearest.get(k)) if missed else None
+                yield answer_of(request, self.task, values, one, self.all_branches, self.turns, closest)
                 if self.continuous and one.best is not None:
                     self.request = replace(request, near=one.branches[one.best].joints)
 
