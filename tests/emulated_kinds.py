@@ -15,7 +15,7 @@ from armkin.board.firmware.configuration import configure
 from armkin.board.kinds import board_of
 from armkin.board.klipper.extra_axes import axes_of
 from armkin.board.sim.sim_servo_bus import Servo
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import parse
 from other_programs import GRBL, OURS
 from starting_elsewhere import KINDS

@@ -22,7 +22,7 @@ from armkin.board.klipper.extra_axes import axes_of
 from armkin.board.sim.sim_servo_bus import Servo
 from armkin.board_catalogue import BOARDS
 from armkin.formula.arrays import Array
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import parse
 from command_line import ROOT
 

@@ -322,7 +322,7 @@ def test_outside_board_nobody_knows_a_kind() -> None:
                 if any(word in asked for word in ("Machine", "Foreign", "Configuration", "Backend", "FirmwareBoard")):
                     found.append(f"{module}: {ast.unparse(node)}")
         # `stop` ends sessions of our firmware without knowing the arm, and what was flashed is asked what it is
-        if module not in ("armkin.cli.commands.stop", "armkin.flash.uploading"):
+        if module not in ("armkin.cli.commands.stop", "armkin.flash.upload_firmware"):
             found += [f"{module}: {name}" for name in _imports(module) if name.startswith(tuple(kinds))]
     assert not found
 
@@ -331,7 +331,7 @@ def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     """A file in board/kinds/ alone, and robot files, their schema and `board_of` know the kind."""
     from armkin import board_catalogue
     from armkin.board import kinds
-    from armkin.model.build import build
+    from armkin.model.build_arm import build
     from armkin.robot_file import parse
     from armkin.robot_file.robot_schema import json_schema
 

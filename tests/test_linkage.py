@@ -5,7 +5,7 @@ import pytest
 
 import armkin
 from armkin import robot_file
-from armkin.model.build import build
+from armkin.model.build_arm import build
 
 LEVEL, DROP = 60.0, -40.0  # from the last joint to the tip, always level
 

@@ -13,7 +13,7 @@ from armkin import robot_file
 from armkin.errors import UsageError
 from armkin.forward import position
 from armkin.model.arm import Arm, from_links
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.motors import (
     best_pulses,
     joints,
@@ -25,7 +25,7 @@ from armkin.motors import (
     resolution,
     rounding,
 )
-from armkin.reachability.measures import measure
+from armkin.reachability.dexterity import measure
 
 ROOT = Path(__file__).parents[1]
 THREE_DOF = armkin.load(ROOT / "robots/three_dof.yaml")

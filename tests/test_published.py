@@ -179,7 +179,7 @@ def test_three_dof_branch_by_name() -> None:
 
 def test_three_dof_as_printed() -> None:
     from armkin import robot_file
-    from armkin.model import build as arm
+    from armkin.model import build_arm as arm
 
     text = (ROOT / "robots/three_dof.yaml").read_text()
     # E1: Tables 1 and 3 print alpha1 = -90 and d2 = +10, which mirrors z for all cases but the first.

@@ -12,16 +12,16 @@ Where things are, in the order of the data; each folder's `__init__.py` lists it
 
 robot_file/ model/          a robot file, checked; the arm that it describes
 forward.py inverse/         where the tool is; the joint values that reach a target
-keep_out/                   what the arm must not touch, and how far it is from it
+keep_out/  what the arm must not touch, and how far it is from it
 path_file/ motion/          a path as a file or drawing; joint values over time
 motors.py board/ flash/     pulses of motors; boards that turn them; armkin's firmware onto a board
-board_catalogue.py          what boards and drivers can do, and which kinds are installed
+board_catalogue.py  what boards and drivers can do, and which kinds are installed
 reachability/ calibration/  where an arm reaches, where to put it; a robot file corrected by measured tips
 formula/ compiled/          formulas recorded once; machine code made of them
-export/                     the arm as URDF, DH table, C, JavaScript
+export/  the arm as URDF, DH table, C, JavaScript
 view/ plot/ teach/          an arm's lines and points; pictures; the page in the browser
 columns/ engines/           many answers as CSV, npz, Parquet; long work in processes and on clusters
-cli/                        the command line
+cli/  the command line
 errors.py files.py          what is raised; files that appear whole or not at all
 signals.py user_folders.py  Ctrl-C; where this user's locks and compiled arms lie
 """
@@ -59,8 +59,8 @@ if TYPE_CHECKING:
     from armkin.keep_out.clearance import clearance as clearance
     from armkin.keep_out.load_with_scene import load as load
     from armkin.model.arm import Arm as Arm
-    from armkin.model.lock import lock as lock
-    from armkin.model.lock import unlock as unlock
+    from armkin.model.lock_joints import lock as lock
+    from armkin.model.lock_joints import unlock as unlock
     from armkin.motion.drawings import drawing as drawing
     from armkin.motion.path import path as path
     from armkin.motion.plan.path_plan import PathPlan as PathPlan
@@ -104,8 +104,8 @@ _HOME = {
     "clearance": "keep_out.clearance",
     "load": "keep_out.load_with_scene",
     "Arm": "model.arm",
-    "lock": "model.lock",
-    "unlock": "model.lock",
+    "lock": "model.lock_joints",
+    "unlock": "model.lock_joints",
     "drawing": "motion.drawings",
     "path": "motion.path",
     "time_law": "motion.time_law",

@@ -31,7 +31,7 @@ from armkin.keep_out.shapes.capsule import Capsule
 from armkin.keep_out.shapes.floor import Floor
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan
-from armkin.motion.plan.proved_free import proved
+from armkin.motion.plan.trajectory_proof import proved
 from armkin.motion.timing.trajectory import Trajectory
 
 ARMS = ("three_dof", "ur5e", "ar4", "cobra600")

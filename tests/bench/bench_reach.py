@@ -104,7 +104,7 @@ def compiled() -> bool:
 def unseen(seed: int = 1, poses: int = 10**6) -> bool:
     """Cells of random grids by arcs, against `ik` of each of their poses."""
     from armkin.reachability.cell_answers import TURN, Question, answered
-    from armkin.reachability.cells import Grid
+    from armkin.reachability.reach_cells import Grid
 
     rng, total, different = np.random.default_rng(seed), 0, 0
     for name in TEN:

@@ -26,7 +26,7 @@ from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_mov
 from armkin.board.firmware.wire.session import probe
 from armkin.board.ports import SerialPort
 from armkin.errors import LinkError
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 
 ROBOT = Path(__file__).parents[2] / "robots" / "three_dof.yaml"
 SEGMENTS = 1000

@@ -30,7 +30,9 @@ class Mutant:
 
 
 MUTANTS = [
-    Mutant("model/build.py", "[0, ca, -sa, 0], [0, sa, ca, 0]", "[0, ca, sa, 0], [0, -sa, ca, 0]", "test_published.py"),
+    Mutant(
+        "model/build_arm.py", "[0, ca, -sa, 0], [0, sa, ca, 0]", "[0, ca, sa, 0], [0, -sa, ca, 0]", "test_published.py"
+    ),
     Mutant("model/units.py", "dtype=float) * scale(arm)", "dtype=float) / scale(arm)", "test_published.py"),
     Mutant("motors.py", "(0.5 + slack)", "slack", "test_motors.py"),
     Mutant("robot_file/strict_yaml.py", "    if text in parent.items:", "    if text in parent.items and False:",
@@ -46,14 +48,15 @@ MUTANTS = [
     Mutant("motion/timing/profile.py", "min(speed, math.sqrt(accel * length))",
            "min(speed, math.sqrt(2 * accel * length))", "motion board"),
     Mutant("keep_out/shapes/capsule.py", "np.clip(share, 0.0, 1.0)", "np.minimum(share, 1.0)", "keep_out"),
-    Mutant("keep_out/shapes/capsule.py", "between(a, b, *ends) - self.radius", "between(a, b, *ends)", "keep_out"),
+    Mutant("keep_out/shapes/capsule.py", "segment_distance(a, b, *ends) - self.radius",
+           "segment_distance(a, b, *ends)", "keep_out"),
     Mutant("path_file/gcode.py", "self.feed / 60", "self.feed", "path_file"),
     Mutant("teach/page_key.py", "if not hmac.compare_digest(", "if False and not hmac.compare_digest(", "teach"),
-    Mutant("flash/images.py", "if sums.get(path.name) != ", "if sums.get(path.name) == '' != ", "flash"),
+    Mutant("flash/firmware_images.py", "if sums.get(path.name) != ", "if sums.get(path.name) == '' != ", "flash"),
     Mutant("flash/intel_hex.py", "or sum(record) % 256", "", "flash"),
     Mutant("flash/stk500v1.py", " or answer[-1] != _OK", "", "flash firmware/test_flash.py"),
     Mutant("export/urdf_writer.py", "_real(x / METRE)", "_real(x * METRE)", "export robot_file"),
-    Mutant("reachability/cells.py", "(3.0 - math.sqrt(5.0))", "(2.0 - math.sqrt(5.0))", "reachability"),
+    Mutant("reachability/reach_cells.py", "(3.0 - math.sqrt(5.0))", "(2.0 - math.sqrt(5.0))", "reachability"),
     Mutant("columns/csv_cells.py", "'\"' + text.replace('\"', '\"\"') + '\"'", "'\"' + text + '\"'",
            "columns test_doctests.py cli"),
     Mutant("calibration/dropped_rows.py", "/ K**2) ** -2)", "/ K**2) ** 0)", "calibration"),
@@ -61,8 +64,8 @@ MUTANTS = [
     Mutant("cli/exit_codes.py", "LINK = 1, 2, 3, 4, 5", "LINK = 1, 2, 4, 3, 5",
            "cli/test_cli_errors.py cli/test_cli_commands.py"),
     Mutant("motion/timing/limit_jerk.py", "(2 * accel / np.asarray", "(accel / np.asarray", "motion"),
-    Mutant("keep_out/motion_proof.py", "(apart[:-1] + apart[1:] - moved) / 2", "(apart[:-1] + apart[1:]) / 2",
-           "keep_out"),
+    Mutant("keep_out/motion_proof.py", "(clearances[:-1] + clearances[1:] - moved) / 2",
+           "(clearances[:-1] + clearances[1:]) / 2", "keep_out"),
     Mutant("motion/tool_path/path_pieces.py", "omega - np.cross(w, omega) / 2", "omega + np.cross(w, omega) / 2",
            "motion"),
     Mutant("path_file/svg_shapes.py", "0.0) if kind == \"skewX\" else", "0.0) if kind == \"skewY\" else", "path_file"),

@@ -11,7 +11,7 @@ from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_servo_bus import ServoBus
 from armkin.errors import LinkError
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 from command_line import COUNTS, POSE, ROOT
 from sim_wire import Wire
 

@@ -23,7 +23,7 @@ from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
 from armkin.board_catalogue import BOARDS
 from armkin.errors import LinkError
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 from armkin.model.arm import Arm
 from armkin.motion.rounded_waypoints import rounded
 from armkin.robot_file import parse

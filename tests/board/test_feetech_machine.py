@@ -13,7 +13,7 @@ from armkin.board.feetech import registers
 from armkin.board.feetech.feetech_machine import LAG, SETTLED, ServoMachine
 from armkin.board.sim.sim_servo_bus import Noise, Servo, ServoBus
 from armkin.errors import LinkError, NoSolutionError
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import parse
 
 TEXT = """

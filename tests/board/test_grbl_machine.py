@@ -19,7 +19,7 @@ from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import expected_settings
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError, UsageError
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import parse
 from armkin.robot_file.robot_keys import Gripper
 from command_line import ROOT, THREE_DOF

@@ -22,7 +22,7 @@ from armkin.board.klipper.klipper_machine import KlipperMachine
 from armkin.board.klipper.trajectory_to_g1_lines import Lines
 from armkin.board.sim.sim_klipper import Klipper
 from armkin.errors import LinkError, PositionLostError, UsageError
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import parse
 from command_line import ROOT
 

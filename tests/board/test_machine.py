@@ -22,7 +22,7 @@ from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
 from armkin.board_catalogue import BOARDS
 from armkin.errors import LinkError, UsageError
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 from armkin.model.arm import Arm
 from armkin.motors import joints, pulses
 from armkin.robot_file import parse

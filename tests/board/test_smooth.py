@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from armkin.board.firmware.segments import counts_to_segments, straight_lines
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import BLOCK, HALF, STEP, Segment
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 
 CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK, 448
 

@@ -18,7 +18,7 @@ from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
 from armkin.board_catalogue import BOARDS
 from armkin.errors import HeldError
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 
 ARM = arms.load("robots/three_dof.yaml")
 

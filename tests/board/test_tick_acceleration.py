@@ -20,7 +20,7 @@ from armkin.board.firmware.wire.protocol import BLOCK, HALF, STEP, AxisImage, Im
 from armkin.board.sim.frame_fields import RefusedError
 from armkin.board.sim.rate_checks import Velocity, times_valid
 from armkin.board_catalogue import BOARDS
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 from armkin.motion.timing.profile import Profile, trapezoid
 from armkin.motors import pulses
 

@@ -19,7 +19,7 @@ from armkin.board.firmware.wire.protocol import AxisImage, Image, Segment
 from armkin.board.sim.rate_checks import Velocity, times_valid
 from armkin.board_catalogue import BOARDS
 from armkin.errors import NoSolutionError, UsageError
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 from armkin.model.arm import Arm
 from armkin.motion.timing import profile
 from armkin.motors import joints, pulses

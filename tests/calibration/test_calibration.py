@@ -17,7 +17,7 @@ from armkin.calibration import dropped_rows, robust_fit
 from armkin.calibration.calibrate_arm import next_poses
 from armkin.calibration.corrected_chain import KINDS, model
 from armkin.errors import UsageError
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from quick import least
 
 # arm, noise [mm], tip error on unseen poses that a prototype reached with 60 rows [mm]; the bar is 1.5 times as much

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import armkin
 from armkin import robot_file
 from armkin.export import conventions
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file.robot_file_text import text
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from armkin.compiled import toolchain
 from armkin.inverse.elimination import method
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import parse
 
 ROBOTS = Path(__file__).parents[2] / "robots"

@@ -17,7 +17,7 @@ import right_angles
 from armkin.export.c.c_program import identifier, program
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.model.rotation import rotation_about
 from armkin.robot_file import parse
 from command_line import run as run_armkin

@@ -18,7 +18,7 @@ from armkin.export import conventions
 from armkin.export.urdf_writer import urdf as write_urdf
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.arm import actual, from_links
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import text
 from command_line import ROOT, run

@@ -11,7 +11,7 @@ from stepped_port import SteppedPort
 from armkin.board.conformance import Emulated, Start
 from armkin.board.firmware.configuration import configure
 from armkin.board.kinds import board_of
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import parse
 from other_programs import OURS
 from starting_elsewhere import KINDS

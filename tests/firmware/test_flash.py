@@ -10,7 +10,7 @@ import pytest
 from emulator import MCU, EmulatedBoard, build_firmware
 
 from armkin.board_catalogue import BOARDS
-from armkin.flash import images
+from armkin.flash import firmware_images
 from command_line import run
 
 LOADERS = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders")
@@ -23,7 +23,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Images as scripts/release makes them."""
     folder = tmp_path_factory.mktemp("images")
     for kind in KINDS:
-        (folder / images.file_name(kind)).write_bytes(build_firmware(kind).with_suffix(".hex").read_bytes())
+        (folder / firmware_images.file_name(kind)).write_bytes(build_firmware(kind).with_suffix(".hex").read_bytes())
     sums = subprocess.run("sha256sum *.hex > SHA256SUMS", shell=True, cwd=folder, check=True)
     assert sums.returncode == 0
     return folder
@@ -57,8 +57,8 @@ def empty(loaders: dict[str, Path]) -> Make:
 
 @pytest.fixture(autouse=True)
 def _installed(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armkin.flash.images.FOLDER", built)
-    monkeypatch.setattr(images.image, "__defaults__", (built,))
+    monkeypatch.setattr("armkin.flash.firmware_images.FOLDER", built)
+    monkeypatch.setattr(firmware_images.image, "__defaults__", (built,))
 
 
 @pytest.fixture

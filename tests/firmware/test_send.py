@@ -15,7 +15,7 @@ from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import Flag
 from armkin.board.ports import SerialPort
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, process, run
 
 

@@ -22,7 +22,7 @@ from armkin.board.firmware.firmware_machine import Machine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.ports import SerialPort
 from armkin.errors import HeldError
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 from command_line import BUSY, COUNTS, POSE, ROOT, THREE_DOF, patiently, run
 
 

@@ -12,17 +12,17 @@ import pytest
 
 from armkin.board.ports import Port, SerialPort
 from armkin.errors import LinkError, MissingExtraError
-from armkin.flash import avrdude, boot_drive, images, intel_hex, stk500v1, uploading
-from armkin.flash.images import Image
+from armkin.flash import avrdude, boot_drive, firmware_images, intel_hex, stk500v1, upload_firmware
+from armkin.flash.firmware_images import Image
 from armkin.flash.stk500v1 import Stk500v1
-from armkin.flash.uploading import upload
+from armkin.flash.upload_firmware import upload
 from command_line import run
 
 UF2 = b"UF2\n" * 30_000
 
 
 def test_a_clone_without_images_says_how_they_come(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(images.image, "__defaults__", (tmp_path,))
+    monkeypatch.setattr(firmware_images.image, "__defaults__", (tmp_path,))
     done = run("flash", "three_dof", "--port", "/dev/null")
     assert done.code == 1
     assert "scripts/release builds it" in done.err
@@ -34,7 +34,7 @@ def test_an_image_that_is_not_what_was_built_is_refused(sums: str, tmp_path: Pat
     (tmp_path / "uno_servos.hex").write_text(":00000001FF\n")
     (tmp_path / "SHA256SUMS").write_text(sums)
     with pytest.raises(MissingExtraError):
-        images.image("uno_servos", tmp_path)
+        firmware_images.image("uno_servos", tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def drive(tmp_path: Path) -> Path:
 
 
 def test_a_picos_boot_drive_gets_the_image(drive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armkin.flash.uploading._RESTART", 0.0)
+    monkeypatch.setattr("armkin.flash.upload_firmware._RESTART", 0.0)
     done = upload(Image("pico6", Path("pico6.uf2"), UF2), str(drive))
     assert (drive / "pico6.uf2").read_bytes() == UF2
     assert (done.port, done.bytes, done.uploader) == (None, len(UF2), "UF2")
@@ -85,8 +85,8 @@ def test_a_picos_boot_drive_gets_the_image(drive: Path, monkeypatch: pytest.Monk
 def test_the_command_says_what_it_copied(drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "pico6.uf2").write_bytes(UF2)
     (tmp_path / "SHA256SUMS").write_text(f"{hashlib.sha256(UF2).hexdigest()}  pico6.uf2\n")
-    monkeypatch.setattr(images.image, "__defaults__", (tmp_path,))
-    monkeypatch.setattr("armkin.flash.uploading._RESTART", 0.0)
+    monkeypatch.setattr(firmware_images.image, "__defaults__", (tmp_path,))
+    monkeypatch.setattr("armkin.flash.upload_firmware._RESTART", 0.0)
     done = run("flash", "--board", "pico6", "--port", drive, "--json")
     assert done.json == {"board": "pico6", "port": None, "bytes": len(UF2), "uploader": "UF2", "firmware": None}
     assert "120000 bytes copied" in run("flash", "--board", "pico6", "--port", drive).out
@@ -106,8 +106,8 @@ def test_bytes_are_counted_from_when_the_boot_loader_is_found(monkeypatch: pytes
         def leave(self) -> None: ...
 
     counted: list[tuple[int, int]] = []
-    monkeypatch.setattr(uploading, "_loader", lambda chip, kind, port: (Loader(), io.BytesIO(), 115_200))
-    monkeypatch.setattr(uploading, "_answered_version", lambda kind, port: "3.0")
+    monkeypatch.setattr(upload_firmware, "_loader", lambda chip, kind, port: (Loader(), io.BytesIO(), 115_200))
+    monkeypatch.setattr(upload_firmware, "_answered_version", lambda kind, port: "3.0")
     monkeypatch.setattr(avrdude, "program", lambda: None)
     data = b":04001000DEADBEEFB4\n:00000001FF\n"
     upload(Image("uno_servos", Path("uno_servos.hex"), data), "port", lambda done, total: counted.append((done, total)))
@@ -129,7 +129,7 @@ def test_a_boot_drive_that_does_not_come_is_told(monkeypatch: pytest.MonkeyPatch
 def test_an_installed_image_is_what_its_checksum_says(tmp_path: Path) -> None:
     (tmp_path / "pico6.uf2").write_bytes(UF2)
     (tmp_path / "SHA256SUMS").write_text(f"{hashlib.sha256(UF2).hexdigest()}  pico6.uf2\n")
-    assert images.image("pico6", tmp_path).data == UF2
+    assert firmware_images.image("pico6", tmp_path).data == UF2
 
 
 class BootLoader:
@@ -176,7 +176,7 @@ def test_a_boot_loader_that_was_called_twice_and_is_silent_is_called_anew(
 
     monkeypatch.setattr(stk500v1, "_ANSWER", 0.01)
     port = Late(b"")
-    heard = uploading._heard(Stk500v1, cast(SerialPort, port))
+    heard = upload_firmware._heard(Stk500v1, cast(SerialPort, port))
     assert (heard is not None, port.resets) == (found, min(silent + 1, 3))
     assert heard is None or heard[1].hex() == "1e950f"
 

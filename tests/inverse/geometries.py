@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from oracle import Screws, screws
 
 from armkin.model.arm import Arm
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import RobotFile
 
 Array = NDArray[np.float64]

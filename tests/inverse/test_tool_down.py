@@ -13,7 +13,7 @@ import armkin
 from armkin import Arm
 from armkin.inverse.elimination import choose_variable, method, pencil, roots
 from armkin.inverse.elimination.joint_order import roles
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.model.rotation import inverse, rotation_about
 from armkin.robot_file import parse
 

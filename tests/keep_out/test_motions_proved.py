@@ -18,7 +18,7 @@ from armkin.keep_out.motion_geometry import Cubics
 from armkin.keep_out.motion_proof import hit_samples
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan
-from armkin.motion.plan.proved_free import check_free, proved, seconds
+from armkin.motion.plan.trajectory_proof import check_free, proved, seconds
 from armkin.motion.timing.trajectory import Trajectory
 
 TABLE = "keep_out:\n  - self\n  - floor: -20\n  - box: {min: [300, -400, 0], max: [700, 400, 180]}\n    name: table\n"

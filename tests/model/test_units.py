@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import armkin
 from armkin.model import units
 from armkin.model.arm import from_links
-from armkin.model.lock import lock
+from armkin.model.lock_joints import lock
 
 ROBOTS = sorted((Path(__file__).parents[2] / "robots").glob("*.yaml"))
 

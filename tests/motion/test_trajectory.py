@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from armkin.model import build as arms
+from armkin.model import build_arm as arms
 from armkin.model.arm import Arm, from_links
 from armkin.motion.joint_moves import plan
 from armkin.motion.timing.profile import trapezoid

@@ -16,7 +16,7 @@ from oracle import Goal, branches, screws
 
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.reachability.cells import Grid
+from armkin.reachability.reach_cells import Grid
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi

@@ -14,7 +14,7 @@ from armkin.errors import UsageError
 from armkin.reachability import reach_map as maps
 from armkin.reachability import voxels
 from armkin.reachability.cell_answers import TURN, Question, answered
-from armkin.reachability.cells import Grid
+from armkin.reachability.reach_cells import Grid
 from command_line import ROOT, Result, run
 from interrupted import interrupted
 

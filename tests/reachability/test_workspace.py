@@ -19,7 +19,7 @@ from armkin.model.arm import Arm, from_links
 from armkin.model.rotation import transform
 from armkin.motors import joints_per_pulse, rounding
 from armkin.reachability import workspace
-from armkin.reachability.measures import measure
+from armkin.reachability.dexterity import measure
 from armkin.reachability.sampling import CHUNK, Random, grid
 from armkin.reachability.volume import extent
 

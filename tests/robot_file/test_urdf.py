@@ -12,7 +12,7 @@ import armkin
 from armkin import robot_file
 from armkin.errors import ArmkinError, FileError, RobotFileError, UsageError
 from armkin.export.urdf_writer import urdf as write_urdf
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import angles, number, text
 from command_line import ROOT, run

@@ -13,7 +13,7 @@ import pytest
 import armkin
 from armkin import robot_file
 from armkin.errors import UsageError
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import text
 from armkin.robot_file.urdf_document import document

@@ -116,7 +116,7 @@ def test_free_joints_of_a_self_motion_are_named() -> None:
 
 
 def test_moves_start_where_the_arm_stands() -> None:
-    answer = asked("three_dof", [-30, 5, -5], stands=(-1000, 0, 0))
+    answer = asked("three_dof", [-30, 5, -5], standing_pulses=(-1000, 0, 0))
     assert answer["motors"]["moves"] == [-67, -10144, 5667]
     assert answer["motors"]["from"] == "arm"
 

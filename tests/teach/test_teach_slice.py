@@ -11,7 +11,7 @@ from served import serving
 import armkin
 from armkin.errors import UsageError
 from armkin.reachability import voxels
-from armkin.reachability.cells import Grid
+from armkin.reachability.reach_cells import Grid
 from armkin.teach.actions import Actions
 from armkin.teach.reach_slice import ACROSS, DIRECTIONS, VALUES, reach_slice
 

@@ -18,7 +18,7 @@ _RANGE = "JOINT=LOW:HIGH:COUNT, for example J3=-90:90:16"
 def locks(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
     """`--lock J=V`: joint name -> value [deg | mm]. Raises NoSolutionError for one outside its joint's limits."""
     from armkin.model import limits
-    from armkin.model.lock import joint_index
+    from armkin.model.lock_joints import joint_index
 
     found: dict[str, float] = {}
     for text in words or ():
@@ -56,7 +56,7 @@ def sweeps(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> 
 
 
 def _named(arm: Arm, text: str, option: str, example: str, given_joints: dict[str, Any]) -> tuple[str, str]:
-    from armkin.model.lock import joint_index
+    from armkin.model.lock_joints import joint_index
 
     name, equals, value = text.partition("=")
     if not equals:

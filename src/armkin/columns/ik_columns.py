@@ -19,7 +19,7 @@ from armkin.inverse.branches.names import find
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.tasks.residuals import residual
 from armkin.model import limits, units
-from armkin.model.lock import unlock
+from armkin.model.lock_joints import unlock
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array, Bool

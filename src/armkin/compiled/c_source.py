@@ -46,7 +46,7 @@ PARTS = Path(__file__).parent / "parts"
 LANES = 16  # poses at once: vectors of any length, and blocks of some kilobytes
 LONGER = 2  # times that a self-motion which leaves its span is asked for one twice as long
 BLOCK = 8  # poses at once of an elimination: a multiple of its vectors' lanes
-_LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_shared", "lanes_pass")
+_LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_equal_roots", "lanes_pass")
 
 
 class Library(NamedTuple):

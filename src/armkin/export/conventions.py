@@ -17,7 +17,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import fk
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
-from armkin.model.build import build
+from armkin.model.build_arm import build
 from armkin.model.rotation import FLIP, inverse, transform
 from armkin.robot_file.robot_file_text import pose, text, tidy
 

@@ -33,7 +33,7 @@ from armkin.inverse.solve import ik
 from armkin.keep_out.clearance import Hit, hits, hits_text
 from armkin.model import limits, units
 from armkin.model.arm import Arm
-from armkin.model.lock import unlock
+from armkin.model.lock_joints import unlock
 
 MOST_SWEEPS = 10_000  # combinations of swept values that are tried
 _RANKS = Status.EXACT, Status.BOUNDARY, Status.SINGULAR, Status.POSITION, Status.UNREACHABLE  # the best first

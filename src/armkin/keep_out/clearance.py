@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints
-from armkin.model.lock import unlock
+from armkin.model.lock_joints import unlock
 
 if TYPE_CHECKING:
     from armkin.keep_out.body_pairs import Guard

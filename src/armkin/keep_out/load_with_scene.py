@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING
 
-from armkin.model.build import build
+from armkin.model.build_arm import build
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -1,6 +1,6 @@
 """From the millimetres and degrees of the command line and of JSON to the API's millimetres and radians, and back.
 
-(The robot file's degrees are converted by `armkin.model.build`.)
+(The robot file's degrees are converted by `armkin.model.build_arm`.)
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from armkin.model import units
 from armkin.motion.branches.branch_chains import Chain, why_ended
 from armkin.motion.branches.joint_steps import change
 from armkin.motion.plan.path_plan import Branch, Passed, PathPlan, PathRun, Reconfiguration
-from armkin.motion.plan.proved_free import hits_said
+from armkin.motion.plan.trajectory_proof import hits_said
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

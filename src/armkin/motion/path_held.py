@@ -11,11 +11,11 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
-from armkin.model.lock import lock, unlock
+from armkin.model.lock_joints import lock, unlock
 from armkin.motion.joint_moves import approach, check_jerk, check_rates, straight
 from armkin.motion.path_planner import PathRequest, planned
 from armkin.motion.plan.path_plan import PathPlan
-from armkin.motion.plan.proved_free import checked
+from armkin.motion.plan.trajectory_proof import checked
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed

@@ -15,7 +15,7 @@ from armkin.motion.branches.branch_path import Pace
 from armkin.motion.joint_moves import check_jerk, check_share
 from armkin.motion.move_kinds import MOVES
 from armkin.motion.plan.path_plan import PathPlan
-from armkin.motion.plan.proved_free import checked
+from armkin.motion.plan.trajectory_proof import checked
 from armkin.motion.plan_moves import PathOptions, Walk
 from armkin.motors import legal_with_same_pulses, undriven
 

@@ -25,8 +25,8 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.solve import ik
 from armkin.model.limits import SLACK
 from armkin.motors import joints_per_pulse
-from armkin.reachability.cells import STRAIGHT, Grid
-from armkin.reachability.measures import measure
+from armkin.reachability.dexterity import measure
+from armkin.reachability.reach_cells import STRAIGHT, Grid
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -340,7 +340,7 @@ _ONES = np.array([bin(i).count("1") for i in range(256)], dtype=np.int64)
 
 
 def _manipulability(arm: Arm, q: Array) -> Array:
-    """See `armkin.reachability.measures`."""
+    """See `armkin.reachability.dexterity`."""
     return measure(arm, "manipulability")(q) if len(q) else np.zeros(0)
 
 

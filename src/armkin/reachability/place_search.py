@@ -33,10 +33,9 @@ from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import read_targets
-from armkin.model.lock import unlock
+from armkin.model.lock_joints import unlock
 from armkin.reachability import kept_chunks, place_path
 from armkin.reachability.cell_answers import TURN, limit_margin
-from armkin.reachability.cells import STRAIGHT
 from armkin.reachability.place_arm import split_keep_outs
 from armkin.reachability.place_path import Planned
 from armkin.reachability.place_targets import (
@@ -48,6 +47,7 @@ from armkin.reachability.place_targets import (
     positions_of,
     reached_counts,
 )
+from armkin.reachability.reach_cells import STRAIGHT
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -14,13 +14,13 @@ from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.solve import columns, ik, isolated
 from armkin.inverse.tasks.task import Task
-from armkin.model.lock import lock, unlock
+from armkin.model.lock_joints import lock, unlock
 from armkin.model.rotation import rotation_about
 from armkin.reachability import place_branches
 from armkin.reachability.cell_answers import TURN, arc, packed, some_copy_legal
-from armkin.reachability.cells import STRAIGHT
 from armkin.reachability.place_arm import Around, free
 from armkin.reachability.place_upright import RADII, by_radius
+from armkin.reachability.reach_cells import STRAIGHT
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

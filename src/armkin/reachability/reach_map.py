@@ -25,7 +25,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import actual
 from armkin.reachability import kept_chunks
 from armkin.reachability.cell_answers import TURN, Question, answered
-from armkin.reachability.cells import Grid
+from armkin.reachability.reach_cells import Grid
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -107,7 +107,7 @@ def reach(
     cluster: str | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Reach:
-    """Ask every cell of a grid about joint 1's axis for every orientation; cells: `armkin.reachability.cells`.
+    """Ask every cell of a grid about joint 1's axis for every orientation; cells: `armkin.reachability.reach_cells`.
 
     Args:
         arm: the arm, as `armkin.load` gives it.

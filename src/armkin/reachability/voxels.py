@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
-    from armkin.reachability.cells import Grid
+    from armkin.reachability.reach_cells import Grid
 
 TURN = 2 * np.pi
 

@@ -18,7 +18,7 @@ from armkin.forward import position as position_of
 from armkin.keep_out.clearance import clear
 from armkin.model.arm import actual
 from armkin.reachability import cloud_file as clouds
-from armkin.reachability.measures import MEASURES, measure
+from armkin.reachability.dexterity import MEASURES, measure
 from armkin.reachability.sampling import Random, Sampling, grid
 from armkin.reachability.volume import Extent, extent
 

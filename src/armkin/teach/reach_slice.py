@@ -14,7 +14,7 @@ from armkin.inverse.tasks.task import distance
 from armkin.keep_out.clearance import clear
 from armkin.model.arm import actual
 from armkin.reachability import voxels
-from armkin.reachability.cells import Grid
+from armkin.reachability.reach_cells import Grid
 from armkin.reachability.reach_map import reach
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armkin.board.ports import LOG
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.limits import SLACK, fields, outside_text
-from armkin.motion.plan.proved_free import check_free, free_way
+from armkin.motion.plan.trajectory_proof import check_free, free_way
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import joints, legal_with_same_pulses, pulses, resolution
 

@@ -114,7 +114,7 @@ def is_on_path(points: NDArray[np.int64], counts: NDArray[np.int64]) -> bool:
     """Whether every motor is within one step of some point of the lines between corners (points, motors).
 
     >>> corners = np.array([[0, 0], [10, 5]])
-    >>> on_way(corners, np.array([4, 3])), on_way(corners, np.array([4, 5]))
+    >>> is_on_path(corners, np.array([4, 3])), is_on_path(corners, np.array([4, 5]))
     (True, False)
     """
     if len(points) == 1:

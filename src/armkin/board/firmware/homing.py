@@ -18,7 +18,7 @@ from armkin.board.firmware import resets_and_stops
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.session import DeviceError
 from armkin.errors import NoHomingError, UsageError
-from armkin.model.lock import joint_index
+from armkin.model.lock_joints import joint_index
 from armkin.model.units import scale
 from armkin.motors import joints, pulses
 

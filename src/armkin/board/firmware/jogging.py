@@ -15,7 +15,7 @@ from armkin.board.firmware.wire.protocol import State
 from armkin.board.firmware.wire.session import DeviceError
 from armkin.errors import NoSolutionError, PositionLostError, UsageError
 from armkin.model import units
-from armkin.motion.plan.proved_free import free_way
+from armkin.motion.plan.trajectory_proof import free_way
 
 if TYPE_CHECKING:
     from armkin.board.firmware.firmware_machine import Machine

@@ -1,7 +1,7 @@
 """The JSON of every command: keys, types and what they mean.
 
-kinematics.py  answers about an arm, and errors; branches.py: those of ik; calibration.py: of calibrate
-moving.py      answers about an arm that moves, and about its board
+kinematics.py        answers about an arm, and errors; branches.py: those of ik; calibration.py: of calibrate
+motion_and_board.py  answers about an arm that moves, and about its board
 
 `docs/json.md` is written from these types (scripts/json_docs.py); a test holds the two equal, and the
 commands' real answers to the types. Millimetres and degrees throughout; no NaN and no infinity.
@@ -41,29 +41,29 @@ from armkin.cli.answers.kinematics import Solver as Solver
 from armkin.cli.answers.kinematics import Solving as Solving
 from armkin.cli.answers.kinematics import Violation as Violation
 from armkin.cli.answers.kinematics import Workspace as Workspace
-from armkin.cli.answers.moving import BranchAt as BranchAt
-from armkin.cli.answers.moving import Difference as Difference
-from armkin.cli.answers.moving import DryRun as DryRun
-from armkin.cli.answers.moving import Grip as Grip
-from armkin.cli.answers.moving import GripOfServo as GripOfServo
-from armkin.cli.answers.moving import Home as Home
-from armkin.cli.answers.moving import LostSteps as LostSteps
-from armkin.cli.answers.moving import NearestSingularity as NearestSingularity
-from armkin.cli.answers.moving import Option as Option
-from armkin.cli.answers.moving import Path as Path
-from armkin.cli.answers.moving import PathBranch as PathBranch
-from armkin.cli.answers.moving import PathMoved as PathMoved
-from armkin.cli.answers.moving import PathRun as PathRun
-from armkin.cli.answers.moving import Reconfiguration as Reconfiguration
-from armkin.cli.answers.moving import Send as Send
-from armkin.cli.answers.moving import Servo as Servo
-from armkin.cli.answers.moving import Setup as Setup
-from armkin.cli.answers.moving import SetupOfKlipper as SetupOfKlipper
-from armkin.cli.answers.moving import Stands as Stands
-from armkin.cli.answers.moving import StatusOfBoard as StatusOfBoard
-from armkin.cli.answers.moving import StatusOfGrbl as StatusOfGrbl
-from armkin.cli.answers.moving import StatusOfServos as StatusOfServos
-from armkin.cli.answers.moving import Zero as Zero
+from armkin.cli.answers.motion_and_board import BranchAt as BranchAt
+from armkin.cli.answers.motion_and_board import Difference as Difference
+from armkin.cli.answers.motion_and_board import DryRun as DryRun
+from armkin.cli.answers.motion_and_board import Grip as Grip
+from armkin.cli.answers.motion_and_board import GripOfServo as GripOfServo
+from armkin.cli.answers.motion_and_board import Home as Home
+from armkin.cli.answers.motion_and_board import LostSteps as LostSteps
+from armkin.cli.answers.motion_and_board import NearestSingularity as NearestSingularity
+from armkin.cli.answers.motion_and_board import Option as Option
+from armkin.cli.answers.motion_and_board import Path as Path
+from armkin.cli.answers.motion_and_board import PathBranch as PathBranch
+from armkin.cli.answers.motion_and_board import PathMoved as PathMoved
+from armkin.cli.answers.motion_and_board import PathRun as PathRun
+from armkin.cli.answers.motion_and_board import Reconfiguration as Reconfiguration
+from armkin.cli.answers.motion_and_board import Send as Send
+from armkin.cli.answers.motion_and_board import Servo as Servo
+from armkin.cli.answers.motion_and_board import Setup as Setup
+from armkin.cli.answers.motion_and_board import SetupOfKlipper as SetupOfKlipper
+from armkin.cli.answers.motion_and_board import Stands as Stands
+from armkin.cli.answers.motion_and_board import StatusOfBoard as StatusOfBoard
+from armkin.cli.answers.motion_and_board import StatusOfGrbl as StatusOfGrbl
+from armkin.cli.answers.motion_and_board import StatusOfServos as StatusOfServos
+from armkin.cli.answers.motion_and_board import Zero as Zero
 
 # Command -> its answers; a command that is not here has no --json.
 ANSWERS: dict[str, tuple[type, ...]] = {

@@ -38,7 +38,7 @@ def import_(
     """
     from armkin import robot_file
     from armkin.export import conventions
-    from armkin.model.build import build
+    from armkin.model.build_arm import build
     from armkin.robot_file import catalogue, urdf_reader
     from armkin.robot_file.robot_file_text import text
 
@@ -69,7 +69,7 @@ def _gain(raw: bytes, imported: Imported, arm: Arm) -> str | None:
     import numpy as np
 
     from armkin import robot_file
-    from armkin.model.build import build
+    from armkin.model.build_arm import build
     from armkin.robot_file import urdf_reader
     from armkin.robot_file.robot_file_text import text
 

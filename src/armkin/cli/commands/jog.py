@@ -37,7 +37,7 @@ def jog(
     itself when this command is gone, and before the joint limits and keep-outs if the position is known.
     """
     from armkin.board.planner import where_arm_stands
-    from armkin.model.lock import joint_index
+    from armkin.model.lock_joints import joint_index
 
     arm = board_link.rehearsed(keep_outs.moving(robot, scene, ignore_keep_out), port)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)

@@ -40,7 +40,7 @@ def reach(
     Cells are sectors of rings about joint 1's axis, so that one solve answers whole arcs of azimuths and rolls,
     exactly. Columns of --out: centre, share of orientations, branches, places that one branch alone reaches, measures.
     """
-    from armkin.reachability.cells import MOST, Grid
+    from armkin.reachability.reach_cells import MOST, Grid
 
     arm = arguments.load(robot, scene)
     step, ring = number(grid, "--grid"), whole_number(azimuths, "--azimuths", 1, MOST)

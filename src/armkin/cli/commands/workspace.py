@@ -115,7 +115,7 @@ def _measures(names: list[str] | None, shade: str | None) -> tuple[list[str], in
     if shade is None:
         return measures, 0
     from armkin.plot.workspace_picture import KEEP
-    from armkin.reachability.measures import MEASURES
+    from armkin.reachability.dexterity import MEASURES
 
     return measures + [shade] * (shade in MEASURES and shade not in measures), KEEP
 

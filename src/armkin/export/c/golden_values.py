@@ -14,7 +14,7 @@ from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import actual
-from armkin.model.lock import lock, unlock
+from armkin.model.lock_joints import lock, unlock
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array, Bool

@@ -22,7 +22,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.keep_out.bodies import ends_formula
 from armkin.model.arm import actual
-from armkin.model.lock import lock
+from armkin.model.lock_joints import lock
 from armkin.model.rotation import inverse
 from armkin.model.units import radian_or_reach
 

@@ -31,7 +31,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task, targets_of
 from armkin.model.arm import Arm
-from armkin.model.chain import Chain, axes
+from armkin.model.joint_chain import Chain, axes
 from armkin.model.rotation import joint_motion
 
 WORDS = {"shoulder": ("left", "right"), "elbow": ("elbow up", "elbow down"), "wrist": ("no flip", "flip")}

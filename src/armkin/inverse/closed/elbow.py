@@ -18,7 +18,7 @@ from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, d
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.chain import Chain, is_parallel
+from armkin.model.joint_chain import Chain, is_parallel
 from armkin.model.rotation import FLIP, inverse
 
 

@@ -21,7 +21,7 @@ from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.chain import Chain, axes, reverse
+from armkin.model.joint_chain import Chain, axes, reverse
 from armkin.model.rotation import FLIP, inverse
 
 Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Doubt]]

@@ -23,7 +23,7 @@ from armkin.inverse.closed.wrist import Wrist, meeting_point
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.chain import Chain, is_parallel, reverse
+from armkin.model.joint_chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse
 
 Place = Callable[..., tuple[list[Pair], Doubt]]

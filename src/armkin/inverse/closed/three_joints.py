@@ -42,7 +42,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.choose_task import rank
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.chain import Chain
+from armkin.model.joint_chain import Chain
 from armkin.model.rotation import inverse
 
 

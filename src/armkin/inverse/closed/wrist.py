@@ -9,7 +9,7 @@ from armkin.formula.arrays import Array, Entry
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Doubt, Pair, Prefer, distance2, linear, rotation_between, signs, spin
 from armkin.inverse.numeric import tolerances as tol
-from armkin.model.chain import is_parallel
+from armkin.model.joint_chain import is_parallel
 from armkin.model.rotation import inverse
 
 

@@ -21,7 +21,7 @@ from armkin.inverse.closed.wrist import foot, meeting_point
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
 from armkin.model.arm import Arm
-from armkin.model.chain import is_parallel
+from armkin.model.joint_chain import is_parallel
 from armkin.model.rotation import inverse, rotation_about, shrunk
 
 DEGREE = 8

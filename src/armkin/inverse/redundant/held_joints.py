@@ -10,7 +10,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.model.arm import Arm
-from armkin.model.lock import lock
+from armkin.model.lock_joints import lock
 
 
 @lru_cache(maxsize=128)

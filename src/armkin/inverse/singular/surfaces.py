@@ -20,7 +20,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.singular.components import More, examine
 from armkin.model.arm import Arm
-from armkin.model.lock import lock
+from armkin.model.lock_joints import lock
 
 Pair = tuple[int, int, float]  # joints about one line, and the way of the first for a turn of the second
 

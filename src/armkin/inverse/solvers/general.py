@@ -24,7 +24,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm, from_links
-from armkin.model.chain import Chain, is_parallel, reverse
+from armkin.model.joint_chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse, rotation_about
 
 PHASE = 0.7321  # [rad]

@@ -30,7 +30,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.chain import Chain
+from armkin.model.joint_chain import Chain
 from armkin.model.rotation import inverse
 
 CHUNK = 1024  # targets solved at once

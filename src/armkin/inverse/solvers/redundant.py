@@ -19,7 +19,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.lock import lock
+from armkin.model.lock_joints import lock
 from armkin.model.rotation import inverse, joint_motion
 
 

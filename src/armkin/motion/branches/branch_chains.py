@@ -19,7 +19,7 @@ from armkin.model.limits import SLACK
 from armkin.motion.branches.branch_columns import Columns, Int
 from armkin.motion.branches.joint_steps import turns_of
 from armkin.motion.branches.linked_branches import ENDS
-from armkin.motion.plan.proved_free import hit_samples as motion_hits
+from armkin.motion.plan.trajectory_proof import hit_samples as motion_hits
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

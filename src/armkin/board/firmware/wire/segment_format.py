@@ -103,7 +103,7 @@ def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Se
 
     add: 1/256 cycle a tick.
 
-    >>> whole(100, 1600, 0, (50, -100)).steps
+    >>> whole_steps(100, 1600, 0, (50, -100)).steps
     (50, -100)
     """
     exact = (s * STEP / ticks for s in steps)

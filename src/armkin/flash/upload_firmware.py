@@ -13,7 +13,7 @@ from armkin.board.ports import SerialPort, list_ports
 from armkin.board_catalogue import BOARDS, board_name
 from armkin.errors import LinkError
 from armkin.flash import avrdude, boot_drive, intel_hex
-from armkin.flash.images import Image
+from armkin.flash.firmware_images import Image
 from armkin.flash.stk500v1 import Stk500v1
 from armkin.flash.stk500v2 import Stk500v2
 

@@ -16,7 +16,7 @@ from armkin.keep_out.motion_geometry import Cubics, Way
 from armkin.keep_out.motion_proof import Proof, prove
 from armkin.keep_out.motion_proof import hit_samples as find_hits
 from armkin.model import units
-from armkin.model.lock import unlock
+from armkin.model.lock_joints import unlock
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed
 from armkin.motion.timing.profile import trapezoid
