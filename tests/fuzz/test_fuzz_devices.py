@@ -115,7 +115,8 @@ def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest
         return Unreliable(boards[0], rng)
 
     # our firmware's; boards of others, and stop; Klipper's
-    for port in ("kinds.firmware.SerialPort", "backend.board.SerialPort", "kinds.klipper.SocketPort"):
+    places = "kinds.firmware.SerialPort", "backend.board.SerialPort", "ports.SerialPort", "kinds.klipper.SocketPort"
+    for port in places:
         monkeypatch.setattr(f"armkin.board.{port}", opened)
     # The same in every run: no notes of other runs, no random session numbers, no leads for a busy computer.
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
