@@ -10,16 +10,19 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import pytest
 
 import armkin
 from armkin import errors
+from command_line import ROOT
 
 SECTION = re.compile(r"^(Args|Attributes|Returns|Raises):\n((?:(?:    .*)?\n?)*)", re.M)
 ENTRY = re.compile(r"^    \*{0,2}(\w+): *(\S.*(?:\n {6,}.*)*)", re.M)  # a name, what it is, and lines indented more
 SHAPE = re.compile(r"^\((?:\.\.\.|\d+|[A-Za-z]\w*| [+-] |, ?)*\)")  # (), (..., n), (N, 3)
+UNIT = re.compile(r"\[[^]]+\]")
 ARRAYS = ("ArrayLike", "Array", "NDArray", "Joints", "Points", "Poses", "Frames", "Jacobians", "Figures", "Pulses")
 
 
@@ -65,8 +68,14 @@ def _parameters(of: Callable[..., Any]) -> list[str]:
     return [name for name in inspect.signature(of).parameters if name != "self"]
 
 
-def _is_array(annotation: str) -> bool:
-    return annotation.removesuffix(" | None").partition("[")[0] in ARRAYS
+def _has_shape_and_unit(annotation: str, text: str) -> bool:
+    """An array's shape comes first; numbers with fractions have a unit in brackets, [1] if they have none."""
+    kind = annotation.removesuffix(" | None")
+    shaped = kind.partition("[")[0] in ARRAYS
+    counted = kind == "Pulses" or kind.startswith("NDArray")
+    return (not shaped or SHAPE.match(text) is not None) and (
+        counted or not (shaped or kind == "float") or UNIT.search(text) is not None
+    )
 
 
 def test_there_is_something_to_read() -> None:
@@ -85,8 +94,8 @@ def test_the_first_line_is_a_sentence_by_itself(name: str) -> None:
 def test_every_parameter_has_a_line(name: str) -> None:
     told = _entries(FUNCTIONS[name], "Args")
     assert list(told) == _parameters(FUNCTIONS[name])
-    arrays = {given for given in told if _is_array(inspect.signature(FUNCTIONS[name]).parameters[given].annotation)}
-    assert not {given for given in arrays if not SHAPE.match(told[given])}, "an array's line begins with its shape"
+    parameters = inspect.signature(FUNCTIONS[name]).parameters
+    assert not {given for given, text in told.items() if not _has_shape_and_unit(parameters[given].annotation, text)}
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -94,7 +103,7 @@ def test_what_is_returned_is_told(name: str) -> None:
     annotation = inspect.signature(FUNCTIONS[name]).return_annotation
     told = " ".join(_sections(FUNCTIONS[name]).get("Returns", "").split())
     assert bool(told) == (annotation != "None")
-    assert not _is_array(annotation) or SHAPE.match(told), "an array's shape comes first"
+    assert _has_shape_and_unit(annotation, told)
 
 
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if "." not in name])
@@ -108,7 +117,7 @@ def test_what_is_raised_is_told(name: str) -> None:
 def test_of_an_array_that_is_read_the_shape_is_told(name: str) -> None:
     getter: Callable[..., Any] = getattr(READ[name], "fget", None) or READ[name].func
     text = inspect.getdoc(getter) or ""
-    assert not _is_array(inspect.signature(getter).return_annotation) or SHAPE.match(text)
+    assert _has_shape_and_unit(inspect.signature(getter).return_annotation, text)
 
 
 @pytest.mark.parametrize("name", CLASSES)
@@ -123,10 +132,20 @@ def test_every_field_has_a_line(name: str) -> None:
         return
     lines = _entries(kind, "Attributes")
     assert list(lines) == [field for field, _ in told]
-    assert not {field for field, type_ in told if _is_array(type_) and not SHAPE.match(lines[field])}
+    assert not {field for field, type_ in told if not _has_shape_and_unit(type_, lines[field])}
 
 
-FILES = sorted((Path(armkin.__file__).parent).rglob("*.py"))
+def test_the_reference_has_a_row_for_every_parameter_and_field() -> None:
+    page = "\n".join(run_path(str(ROOT / "scripts/site.py"))["python"]())
+    heads = re.split(r"^##+ (.*)$", page, flags=re.M)
+    text = dict(zip(heads[1::2], heads[2::2], strict=True))
+    assert text.keys() == PUBLIC.keys()
+    for name, member in PUBLIC.items():
+        told = {**_entries(member, "Args"), **_entries(member, "Attributes"), **_entries(member, "Raises")}
+        assert re.findall(r"^\| `\*{0,2}(\w+)` \| ", text[name], re.M) == list(told), name
+
+
+FILES = sorted(Path(armkin.__file__).parent.rglob("*.py"))
 
 
 def test_every_class_and_public_function_of_the_package_has_a_docstring() -> None:

@@ -22,8 +22,8 @@ class Clearance:
     """How far an arm is from the nearest thing that it must not touch.
 
     Attributes:
-        mm: (...) least distance of any pair, `Arm.clearance` taken off; negative where the arm hits something, inf for
-            an arm without keep-outs, nan where a joint value is.
+        mm: (...) [mm] least distance of any pair, `Arm.clearance` taken off; negative where the arm hits something, inf
+            for an arm without keep-outs, nan where a joint value is.
         body: (...) the moving body of that pair; text for one posture, empty where there is none.
         other: (...) what it is nearest to.
     """

@@ -38,13 +38,13 @@ class Arm:
         max_speed: (n,) [rad/s | mm/s] nan where the file has none.
         max_accel: (n,) [rad/s2 | mm/s2] nan where the file has none.
         max_jerk: (n,) [rad/s3 | mm/s3] nan where the file has none.
-        dh_sign: (n,) DH angle = dh_sign * joint value + dh_theta.
+        dh_sign: (n,) [1] DH angle = dh_sign * joint value + dh_theta.
         dh_theta: (n,) [rad].
-        ratio: (n,) actual turn per commanded turn; joint values are commanded ones.
+        ratio: (n,) [1] actual turn per commanded turn; joint values are commanded ones.
         pitch_offset: [rad] added to the sum of the parallel joints' angles in the tasks with a pitch.
         task: as the file says; None: by structure.
-        motor_gain: (motors, n) pulses per rad | mm.
-        motor_bias: (motors,) pulses at home.
+        motor_gain: (motors, n) [pulses/rad | pulses/mm].
+        motor_bias: (motors,) [pulses] at home.
         reach: [mm] no point of the chain is farther from its first joint; 1, a unit, where all lengths are zero.
         pose_names: of the robot file's poses, besides home.
         pose_joints: (poses, n) [rad | mm].

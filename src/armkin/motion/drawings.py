@@ -31,7 +31,7 @@ def drawing(
         at: where the file's zero lies in the arm's base frame, x y z [mm] or with roll pitch yaw [deg]; the tool points
             against the drawing's z.
         task: what the path's targets prescribe; by default the arm's own task.
-        scale: factor of the file's lengths.
+        scale: [1] factor of the file's lengths.
         feed: [mm/s] speed of the tool where the file has none; None: as fast as the joints allow.
         lift: [mm] height of the pen between strokes of an SVG.
         grip_by: the words that close and open the gripper, "M3" or "M106".

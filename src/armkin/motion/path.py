@@ -57,12 +57,12 @@ def path(
         corners: how those without their own blend are passed, "stop", "blend" or "tolerance" (dense points become one
             smooth curve).
         blend: [mm] radius of the sphere that rounds corners without their own; in place of `corners`.
-        speed: fraction of the joints' max_speed.
-        accel: fraction of the joints' max_accel.
+        speed: [1] fraction of the joints' max_speed.
+        accel: [1] fraction of the joints' max_accel.
         tool_speed: [mm/s] at most, along the tool's way; by default the file's.
         jerk: () or (n,) [rad/s3 | mm/s3] for all joints or each; by default the robot file's, where all joints have
             one.
-        hold: how many times max_accel a joint may be asked for when the board holds on the path, None: no matter.
+        hold: [1] how many times max_accel a joint may be asked for when the board holds on the path, None: no matter.
         split: change the branch, by a joint move, where none carries on.
         samples: targets along each way that are solved at first; by default one a mm, 200 at least.
 

@@ -40,12 +40,12 @@ def time_law(
     Args:
         arm: the arm, as `armkin.load` gives it.
         q: (N, n) [rad | mm] the samples, N at least 5.
-        s: (N,) the parameter of the samples, increasing; by default their numbers.
-        speed: fraction of the joints' max_speed.
-        accel: fraction of the joints' max_accel.
+        s: (N,) [any unit] the parameter of the samples, increasing; by default their numbers.
+        speed: [1] fraction of the joints' max_speed.
+        accel: [1] fraction of the joints' max_accel.
         tool_speed: [mm/s] of the tool at most; None: no bound.
         jerk: () or (n,) [rad/s3 | mm/s3] at most, by a moving average; None: no bound.
-        hold: how many times max_accel a joint may be asked for when the board holds on the way; None: no matter.
+        hold: [1] how many times max_accel a joint may be asked for when the board holds on the way; None: no matter.
 
     Returns:
         The motion, sampled at will: `duration` [s], `q(t)`, `qd(t)`, `qdd(t)` (..., n) [rad | mm, per s, per s2].

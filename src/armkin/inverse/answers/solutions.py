@@ -90,7 +90,7 @@ class Solutions:
 
     @cached_property
     def motion(self) -> Array:
-        """(..., B) sum of |change| from `near` in joint units (degrees or mm); nan where there is no branch."""
+        """(..., B) [deg + mm] sum of |change| from `near`; nan where there is no branch."""
         unit = np.where(self.arm.prismatic, 1.0, 180.0 / np.pi)
         total: Array = (np.abs(self.q - self.near[..., None, :]) * unit).sum(axis=-1)
         return total

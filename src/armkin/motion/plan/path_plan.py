@@ -86,7 +86,7 @@ class PathPlan:
         arm: the arm that moves.
         task: what targets prescribe; None: joint moves alone, on an arm that no task fits.
         tolerance: [mm] between plan and path that was allowed.
-        speed: fraction of the joints' max_speed, on joint moves.
+        speed: [1] fraction of the joints' max_speed, on joint moves.
         length: [mm] of the tool's way.
         samples: targets along the tool's way of which all branches were asked for.
         complete: every isolated branch of these targets is guaranteed to have been found.
@@ -182,7 +182,7 @@ class PathPlan:
 
     @property
     def duration(self) -> float:
-        """Seconds."""
+        """[s] of the whole motion."""
         return self.motion.duration
 
     def q(self, t: ArrayLike) -> Array:

@@ -121,7 +121,7 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
-        """Seconds."""
+        """[s] of the whole motion."""
         return float(self.begins[-1])
 
     @property
