@@ -138,8 +138,11 @@ def python() -> Iterator[str]:
 def docstring_markdown(name: str, what: Any) -> Iterator[str]:
     """A signature, if it is called, and a docstring: its sections as tables, its examples as code."""
     if inspect.isfunction(what):
-        signature = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(what)))
-        yield f"```python\n{name}{signature}\n```\n"
+        call = re.sub(r"(: |-> )'([^']+)'", r"\1\2", f"{name}{inspect.signature(what)}")
+        if len(call) > 100:  # a parameter a line
+            parameters, arrow, returned = call.replace("(", "(\n    ", 1).rpartition(") -> ")
+            call = re.sub(r", (?=\w+: |\*)", ",\n    ", parameters) + f",\n{arrow}{returned}"
+        yield f"```python\n{call}\n```\n"
     for block in (inspect.getdoc(what) or "").split("\n\n"):
         head, _, rest = block.partition("\n")
         if head in ("Args:", "Attributes:", "Raises:"):
