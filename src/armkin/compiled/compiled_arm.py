@@ -231,8 +231,8 @@ class _CompiledTask:
         solved = self._solved if self.geometry.pairs is not None else self._in_blocks
         out = solved(target, each, workers, read=False)
         if out is None:
-            read = read_targets(self.task, target)  # refuses what is no target
-            target, rounding = np.ascontiguousarray(read.values), read.rounding
+            values, _, rounding = read_targets(self.task, target)  # refuses what is no target
+            target = np.ascontiguousarray(values)
             out = solved(target, each, workers, read=True)
             assert out is not None
         single = arrays.is_single(targets)

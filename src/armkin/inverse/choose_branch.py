@@ -27,9 +27,9 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.branches.whole_turns import turns as copies_of
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.families import intervals_out
-from armkin.inverse.redundant.held_joints import arm_without, others, redundant_alone
 from armkin.inverse.redundant.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
+from armkin.inverse.solvers.redundant import arm_without, redundant_alone, without_held
 from armkin.keep_out.clearance import Hit, hits, hits_text
 from armkin.model import limits, units
 from armkin.model.arm import Arm
@@ -116,7 +116,7 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
     found = [_Found() for _ in targets]
     more: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
     for held in _holds(request):
-        one, goals = others(arm, request.task, held, targets)
+        one, goals = without_held(arm, request.task, held, targets)
         s = request.ik(one, goals, request.task, near=near[_kept(arm, held)], **more)
         wanted = set(s.names)
         if request.branch is not None:
@@ -209,12 +209,8 @@ def refusal(request: Request, answer: Answer, distance: float) -> NoSolutionErro
     arm = request.arm
     away = f"the nearest pose within limits is {distance:.4f} mm away"
     legal = answer.within_limits
-    fields: dict[str, Any] = {
-        "robot": arm.name,
-        "status": answer.status,
-        "distance_mm": distance,
-        "branches_within_limits": legal,
-    }
+    fields: dict[str, Any] = {"robot": arm.name, "status": answer.status}
+    fields |= {"distance_mm": distance, "branches_within_limits": legal}
     if answer.status == "unreachable":
         return NoSolutionError(f"{arm.name} cannot reach this target; {away}", **fields)
     if answer.refused is not None:
@@ -267,14 +263,8 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
     outside = limits.outside(arm, q)  # nan is not outside anything
     within = s.within_limits & ~outside.any(axis=-1)
     mm, rad = s.residual()
-    columns = (
-        units.joints_out(arm, q),
-        s.branch,
-        within,
-        mm,
-        units.angles_out(rad),
-        units.joints_out(arm, np.abs(q - near)).sum(axis=-1),
-    )
+    motions = units.joints_out(arm, np.abs(q - near)).sum(axis=-1)
+    columns = units.joints_out(arm, q), s.branch, within, mm, units.angles_out(rad), motions
     # From here on plain Python: numpy is slow at single numbers, and a batch has many.
     joints, names, legal, miss, turn, motion = (column.tolist() for column in columns)
     kept = [name for name in arm.joint_names if name not in held]
@@ -351,18 +341,16 @@ class _Found:
             row = both[best][0]
             missed = math.hypot(row.residual_mm / request.arm.reach, math.radians(row.residual_deg))
             status = (Status.EXACT if missed <= tol.SOLUTION else Status.POSITION).name.lower()
-        return Answer(
-            status,
-            first.method,
-            first.why,
-            first.complete and not request.swept,
-            sorted(self.free),
-            [branch for branch, _ in both],
-            best,
-            refused,
-            self.total,
-            self.legal,
-            tuple(self.names),
+        return first._replace(
+            status=status,
+            complete=first.complete and not request.swept,
+            free=sorted(self.free),
+            branches=[branch for branch, _ in both],
+            best=best,
+            refused=refused,
+            total=self.total,
+            within_limits=self.legal,
+            names=tuple(self.names),
         )
 
 

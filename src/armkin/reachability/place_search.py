@@ -285,7 +285,7 @@ def _question(
         spare, held = place_path.held(arm, file)
     arm, around = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
-    values = read_targets(task, targets).values
+    values, *_ = read_targets(task, targets)
     return Question(arm, task, values, yaws, settings["yaw"], settings["z"], around, ways, spare, held)
 
 

@@ -86,15 +86,9 @@ class Batch(NamedTuple):
 
 def empty(N: int, B: int, n: int) -> Batch:
     """Room for N targets with B branches of n joints, written by whoever solves them."""
-    return Batch(
-        np.empty((N, B, n)),
-        np.empty((N, B), bool),
-        np.empty((N, B), bool),
-        np.empty((N, B), np.int8),
-        np.zeros(N, np.int8),
-        np.zeros((N, n), bool),
-        np.ones(N, bool),
-    )
+    valid, within = np.empty((2, N, B), bool)
+    branch, status, free = np.empty((N, B), np.int8), np.zeros(N, np.int8), np.zeros((N, n), bool)
+    return Batch(np.empty((N, B, n)), valid, within, branch, status, free, np.ones(N, bool))
 
 
 Text = tuple[tuple[str, ...], str, str]  # of an answer: `Solutions.names`, method and why

@@ -85,7 +85,7 @@ def closest_each(
 ) -> list[Closest]:
     """What `closest` says of each of many targets (N, m) or (N, 4, 4); near: (n,) or (N, n)."""
     definition = task_for(arm, task)
-    goal = read_targets(definition, targets).values
+    goal, *_ = read_targets(definition, targets)
     close = np.broadcast_to(arm.home if near is None else np.asarray(near, float), (len(goal), arm.n))
     parts = [slice(start, start + AT_ONCE) for start in range(0, len(goal), AT_ONCE)]
     return [one for part in parts for one in _of_chunk(arm, definition, goal[part], close[part])]
@@ -171,8 +171,7 @@ def _weighted(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Arr
 def _downhill(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Half the negative gradient of the squared residual (M, n), joints in rad or reaches."""
     r, J = _weighted(arm, task, q, target)
-    downhill: Array = (r[:, None] @ J)[:, 0]
-    return downhill
+    return np.asarray((r[:, None] @ J)[:, 0])
 
 
 def _stopped(arm: Arm, q: Array, downhill: Array) -> Bool:
@@ -260,5 +259,4 @@ def _cost(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     r = residual(task, fk(arm, q), q, target)
     r[:, : task.position] /= arm.reach
     r[:, task.position :] *= 0.25
-    cost: Array = np.einsum("mr,mr->m", r, r)
-    return cost
+    return np.asarray(np.einsum("mr,mr->m", r, r))

@@ -90,8 +90,7 @@ def last_place_of_position(p: Array) -> Array:
         left = left[~here]
     single = left[(p[left] == p[left].astype(np.float32)).all(axis=1)]
     half[single] = tol.FLOAT32 * np.abs(p[single]).max(axis=1)
-    off: Array = 3.0**0.5 * half
-    return off
+    return np.asarray(3.0**0.5 * half)
 
 
 def last_place(R: Array) -> Array:
@@ -130,8 +129,7 @@ def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLi
     angles = np.array([unit == "deg" for unit in units])
     scale = np.array([1.0 / reach if unit == "mm" else 1.0 for unit in units])
     turned = np.radians(off[:, angles].sum(axis=1))
-    size: Array = np.hypot(np.linalg.norm((off * scale)[:, ~angles], axis=1), turned)
-    return size
+    return np.asarray(np.hypot(np.linalg.norm((off * scale)[:, ~angles], axis=1), turned))
 
 
 # half a unit of the last of so many decimals, 0 below FEWEST; of more than 300 it is nothing, too

@@ -92,8 +92,7 @@ class Solutions:
     def motion(self) -> Array:
         """(..., B) [deg + mm] sum of |change| from `near`; nan where there is no branch."""
         unit = np.where(self.arm.prismatic, 1.0, 180.0 / np.pi)
-        total: Array = (np.abs(self.q - self.near[..., None, :]) * unit).sum(axis=-1)
-        return total
+        return np.asarray((np.abs(self.q - self.near[..., None, :]) * unit).sum(axis=-1))
 
     @property
     def _rank(self) -> Array:

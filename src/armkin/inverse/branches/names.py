@@ -143,8 +143,7 @@ def _bent_wrist(arm: Arm, postures: Array) -> Array:
     A, b = arm.link[4][:3, :3], arm.link[5][:3, 2]
     z4 = A.T @ [0.0, 0.0, 1.0]
     turned = np.stack([c * b[0] - s * b[1], s * b[0] + c * b[1], np.full_like(c, b[2])], axis=1)
-    sine: Array = np.cross(np.broadcast_to(z4, turned.shape), turned)[:, 2]
-    return sine
+    return np.asarray(np.cross(np.broadcast_to(z4, turned.shape), turned)[:, 2])
 
 
 def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:

@@ -194,11 +194,8 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
             choices.append([float(row[i] + TURN * k) for k in range(last, first - 1, -1)])
     count = math.prod(map(len, choices))
     if count > MOST:
-        raise UsageError(
-            f"{arm.name}: {count:,} copies of one branch are within the limits; at most {MOST:,} are listed",
-            copies=count,
-            most=MOST,
-        )
+        message = f"{arm.name}: {count:,} copies of one branch are within the limits; at most {MOST:,} are listed"
+        raise UsageError(message, copies=count, most=MOST)
     rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
     unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
     motion = (np.abs(rows - close) * unit).sum(axis=1)

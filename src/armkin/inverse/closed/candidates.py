@@ -54,7 +54,11 @@ class Recorded:
         return self._of(self.geometry.pairs(goal, prefer), goal)
 
     def _of(self, found: Candidates, goal: list[Entry]) -> list[Entry]:
-        miss = _miss(self.arm, self.task, self.link, found.pairs, goal) if found.miss is None else found.miss
+        miss = found.miss
+        if miss is None:
+            miss, *rest = _misses(self.arm, self.task, self.link, found.pairs, goal)
+            for one in rest:
+                miss = miss + one
         values = found.values()
         if len(self.task.sums):
             miss = arrays.maximum(miss, _sum_miss(self.task, values, goal))
@@ -222,14 +226,6 @@ def recorded(arm: Arm, task: Task, geometry: Geometry) -> Recorded:
 def entries(task: Task, goal: Array) -> list[Entry]:
     """Targets (N, m) or (N, 4, 4) as arrays of length N."""
     return pose.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
-
-
-def _miss(arm: Arm, task: Task, link: list[pose.Pose], pairs: list[Pair], goal: list[Entry]) -> Entry:
-    """Squared residual of every branch, from its pairs, lengths in units of the reach."""
-    total, *rest = _misses(arm, task, link, pairs, goal)
-    for one in rest:
-        total = total + one
-    return total
 
 
 def _misses(

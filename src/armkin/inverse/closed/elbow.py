@@ -7,13 +7,11 @@ al., Robotics, 2.12.2 and 2.12.4).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
-from armkin.inverse.closed.geometry import Geometry
+from armkin.inverse.closed.geometry import ClosedForm, Geometry
 from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer, distance2, linear, rotation_between, spin
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
@@ -170,7 +168,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     return Geometry("elbow with pitch", why, True, _pitch(arm, task, elbow), labels=labels)
 
 
-def _pitch(arm: Arm, task: Task, elbow: Elbow) -> Callable[[list[Entry], Prefer], Candidates]:
+def _pitch(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
     """Joint 4 takes what joints 2 and 3 leave of the pitch; joint 5, if there is one, is the roll."""
     link = arm.link
     # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
@@ -203,7 +201,7 @@ def _pitch(arm: Arm, task: Task, elbow: Elbow) -> Callable[[list[Entry], Prefer]
     return pitch
 
 
-def _roll(arm: Arm, task: Task, elbow: Elbow) -> Callable[[list[Entry], Prefer], Candidates]:
+def _roll(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
     """Joint 4 is given by the target; it moves the tip that the three joints before it place."""
     weight, after3, end = float(task.sums[0][3]), pose.constant(arm.link[3]), pose.constant(arm.link[4])
 

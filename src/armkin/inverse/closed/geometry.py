@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 from armkin.formula.arrays import Array, Bool, Entry, Int
 from armkin.inverse.closed.subproblems import Candidates, Prefer
 
+ClosedForm = Callable[[list[Entry], Prefer], Candidates]  # `Geometry.pairs`
+
 
 class Rows(NamedTuple):
     """What a solver that works row by row returns for targets.
@@ -39,7 +41,7 @@ class Geometry:
     name: str
     why: str
     complete: bool
-    pairs: Callable[[list[Entry], Prefer], Candidates] | None = None
+    pairs: ClosedForm | None = None
     rows: Callable[[Array], Rows] | None = None
     unmoved: Callable[[Array], Rows] | None = None  # `rows` for targets that are examined where they are in doubt
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")

@@ -8,15 +8,15 @@ What the seeds leave open is a doubt, for which other ways are taken.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry, Truth
 from armkin.inverse.closed.elbow import together
+from armkin.inverse.closed.geometry import ClosedForm
 from armkin.inverse.closed.precision import precision
-from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, spin
+from armkin.inverse.closed.subproblems import Candidates, Pair, spin
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -158,9 +158,7 @@ def _peeled(arm: Arm) -> tuple[Array, list[float]]:
     return link, turns
 
 
-def steps(
-    arm: Arm, task: Task, off: float, seeds: Callable[[list[Entry], Prefer], Candidates]
-) -> tuple[Callable[[list[Entry], Prefer], Candidates], bool] | None:
+def steps(arm: Arm, task: Task, off: float, seeds: ClosedForm) -> tuple[ClosedForm, bool] | None:
     """A closed form of an arm that misses a class by `off`, and whether it counts all roots; None where it has none.
 
     seeds: the closed form of the class.

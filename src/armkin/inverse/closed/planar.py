@@ -135,8 +135,7 @@ def _direction(goal: list[Entry], task: Task, chain: Chain) -> pose.Pose:
 
 def _at_zero(chain: Chain) -> Array:
     """The tool's pose when all joints are zero."""
-    T: Array = np.linalg.multi_dot(list(chain.link))
-    return T
+    return np.asarray(np.linalg.multi_dot(list(chain.link)))
 
 
 def _rest(goal: list[Entry], task: Task, weights: Array, pairs: list[Pair | None], joint: int) -> Pair:

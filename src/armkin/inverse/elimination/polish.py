@@ -57,8 +57,7 @@ def _moved(frame: Array, q: Array, cosine: Array, sine: Array, prismatic: bool) 
 
 def advance(frame: Array, link: Array) -> Array:
     """``frame @ link`` for blocks (3, 4, M) and one (4, 4) link, or one link a candidate (4, 4, M)."""
-    out: Array = np.matmul(link.T, frame) if link.ndim == 2 else np.einsum("ikm,kjm->ijm", frame, link)
-    return out
+    return np.asarray(np.matmul(link.T, frame) if link.ndim == 2 else np.einsum("ikm,kjm->ijm", frame, link))
 
 
 def tip(link: Array, prismatic: Bool, q: Array) -> tuple[Array, Array]:

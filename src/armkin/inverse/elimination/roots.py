@@ -240,8 +240,7 @@ def _half_powers(q: Array) -> Array:
 def _ratio(powers: Array) -> Array:
     """q from multiples of (1, q, q^2, ..) (M, k): the least-squares quotient of neighbours."""
     below = powers[:, :-1]
-    out: Array = np.sum(below * powers[:, 1:], axis=1) / np.maximum(np.sum(below * below, axis=1), tol.TINY)
-    return out
+    return np.asarray(np.sum(below * powers[:, 1:], axis=1) / np.maximum(np.sum(below * below, axis=1), tol.TINY))
 
 
 def _other_joints(pencil: Pencil, middle: Array, Y: Array, pose: Int, recover: Array) -> tuple[Array, Array, Array]:

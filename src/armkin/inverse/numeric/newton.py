@@ -29,6 +29,11 @@ def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     return r, J
 
 
+def missed(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+    """Residual (M, r) alone, lengths in units of the arm's reach."""
+    return residual(task, fk(arm, q), q, target, arm.reach)
+
+
 def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Size of the residual (M,), lengths in units of the arm's reach; infinite where it is not known."""
     r = residual(task, fk(arm, q), q, target, arm.reach)
@@ -61,7 +66,7 @@ def correct(
         if k < steps:
             r, J = scaled(arm, task, q[active], target[active])
         else:
-            r = residual(task, fk(arm, q[active]), q[active], target[active], arm.reach)
+            r = missed(arm, task, q[active], target[active])
         size = np.sqrt((r * r).sum(axis=1))
         size[np.isnan(size)] = np.inf
         before = best_size[active]
@@ -108,8 +113,7 @@ def difference(arm: Arm, a: Array, b: Array) -> Array:
 
 def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:
     """The largest `difference`: (..., n) -> (...)."""
-    largest: Array = np.abs(difference(arm, a, b)).max(axis=-1)
-    return largest
+    return np.asarray(np.abs(difference(arm, a, b)).max(axis=-1))
 
 
 def distances(arm: Arm, a: Array, b: Array) -> Array:

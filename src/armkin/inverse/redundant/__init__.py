@@ -1,6 +1,5 @@
 """More joints than the target has numbers: the answers are curves or surfaces, told by their pieces and minima.
 
-held_joints.py        joints that are held: the arm of the others, and its targets
 other_joints.py       answers of the other joints at any value of the redundant one
 followed_branches.py  its branches, followed along it
 boundaries.py         where along it these may end, all such places

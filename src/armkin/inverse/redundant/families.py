@@ -133,11 +133,8 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
         guide = nearly_closed(true, free)
         name = free.geometry.name if guide is free else f"near {guide.geometry.name}"
         how = f"{name}, at {PLANES} values of {arm.joint_names[guide.joint]}, and traced between them"
-    return (
-        f"families of {joint}",
-        f"{joint} is redundant: ik lists the intervals of its values; the others: {how}",
-        complete,
-    )
+    why = f"{joint} is redundant: ik lists the intervals of its values; the others: {how}"
+    return f"families of {joint}", why, complete
 
 
 class _Rows:

@@ -69,7 +69,6 @@ class _Tangent(NamedTuple):
 
     P: Array
     back: Array
-    multipliers: Array  # (M, 3) of the position
     H: Array  # (M, n, n) of the Lagrangian
     slope: Array  # (M, n) of the Lagrangian
 
@@ -85,7 +84,7 @@ def _tangent(at: _Local, held: Bool) -> _Tangent:
     multipliers = -np.einsum("mna,mn->ma", back, np.where(held, 0.0, at.g))
     slope = at.g + np.einsum("man,ma->mn", at.J, multipliers)
     H = at.H + np.einsum("maij,ma->mij", at.bend, multipliers)
-    return _Tangent(P, back, multipliers, P @ H @ P, slope)
+    return _Tangent(P, back, P @ H @ P, slope)
 
 
 class _Move(NamedTuple):
@@ -180,5 +179,4 @@ def flat_minima(arm: Arm, q: Array, target: Array) -> Bool:
     tangent = _tangent(at, held)
     values, vectors = np.linalg.eigh(tangent.H)
     inside = np.linalg.norm(tangent.P @ vectors, axis=1) > 0.5
-    flat: Bool = (inside & (np.abs(values) <= tol.LEVEL_CURVATURE)).any(axis=1)
-    return flat
+    return np.asarray((inside & (np.abs(values) <= tol.LEVEL_CURVATURE)).any(axis=1))

@@ -13,9 +13,8 @@ from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Int, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.redundant.curve_points import Points, Ways
-from armkin.inverse.redundant.held_joints import arm_without
 from armkin.inverse.redundant.other_joints import Follower
-from armkin.inverse.solvers.redundant import nearly_closed
+from armkin.inverse.solvers.redundant import arm_without, nearly_closed
 
 VALUES = 0.05, 0.05 + np.pi / 2  # [rad] at which that joint is held, beside where the other joints would be special
 SECANTS = 4  # steps along a cubic to where it has such a value

@@ -212,5 +212,4 @@ def _least(J: Array, c: Array) -> Array:
     """Damped steps of least norm (M, n) of J d = c, J (M, 3, n)."""
     size = np.einsum("mi,mi->m", c, c)[:, None, None]
     G = J @ J.swapaxes(1, 2) + (1e-2 * size + tol.WEAK * tol.WEAK) * np.eye(3)
-    step: Array = (J.swapaxes(1, 2) @ np.linalg.solve(G, c[:, :, None]))[:, :, 0]
-    return step
+    return np.asarray((J.swapaxes(1, 2) @ np.linalg.solve(G, c[:, :, None]))[:, :, 0])

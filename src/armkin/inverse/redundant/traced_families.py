@@ -72,7 +72,9 @@ class Traced(NamedTuple):
             return curves
         extent = np.zeros(N)
         np.maximum.at(extent, row, 0.5 * np.add.reduceat(np.abs(ways.chord), begin, axis=0).max(axis=1))
-        return curves._replace(pieces=curves._pieces(row, branch), short=(extent > 0) & (extent < tol.REACH))
+        return curves._replace(
+            pieces=curves._nodes().of_curves(curves, row, branch), short=(extent > 0) & (extent < tol.REACH)
+        )
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Turning.at`."""
@@ -97,11 +99,6 @@ class Traced(NamedTuple):
         ways = rows_of(self.ways, point)
         last = np.where(ways.chord.any(axis=1, keepdims=True), ways.chord, self.points.tangent[point])
         return onto(self.find, self.row[point], ways.at(self.find, share), last, enough)
-
-    def _pieces(self, row: Int, branch: Int) -> Pieces:
-        """All pieces of curves (C,)."""
-        nodes = self._nodes()
-        return nodes.of_curves(self, row, branch, np.searchsorted(nodes.at, self.begin))
 
     def _nodes(self) -> _Nodes:
         """Samples of all curves, and where something changes between them."""
@@ -195,10 +192,10 @@ class _Nodes(NamedTuple):
     up: Bool  # (K,) whether the joint grows behind it
     alive: Bool  # (K,) whether the curve goes on behind it
 
-    def of_curves(self, curves: Traced, row: Int, branch: Int, cuts: Int) -> Pieces:
-        """The pieces of curves (C,), which begin at nodes cuts (C,): in a table with a row each, whose last node is
-        repeated at the parameter where the curve closes."""
-        arm, near = curves.find.arm, curves.find.near
+    def of_curves(self, curves: Traced, row: Int, branch: Int) -> Pieces:
+        """The pieces of curves (C,): in a table with a row each, whose last node is repeated at the parameter where the
+        curve closes."""
+        arm, near, cuts = curves.find.arm, curves.find.near, np.searchsorted(self.at, curves.begin)
         count = np.diff(cuts, append=len(self.at))
         C, K = len(row), int(count.max())
         k = np.arange(K)

@@ -30,25 +30,13 @@ from armkin.model.arm import Arm
 TURNED_AT_ONCE = 512  # poses whose columns become rows: both stay in a core's own cache
 
 
-class Solved(NamedTuple):
-    """A batch, how many branch columns the class has, the targets as they were solved, and their `rounding`.
-
-    left: targets on an edge, of a class that has another way for them.
-    """
-
-    out: Batch
-    columns: int
-    target: Array
-    rounding: Array
-    left: Int
-
-
 def solve(  # noqa: C901 - one pass over a batch's arrays
     arm: Arm, task: Task, geometry: Geometry, given: Array, near: Array, one: Array | None, examine: bool, workers: int
-) -> Solved:
+) -> tuple[Batch, int, Array, Array, Int]:
     """All branches of targets (N, m), or of poses (N, 4, 4) that have not been read yet.
 
-    near: (N, n), one: (n,) if it serves all; workers: threads.
+    near: (N, n), one: (n,) if it serves all; workers: threads. Also how many branch columns the class has, the targets
+    as they were solved, their `rounding`, and those on an edge, of a class that has another way for them.
     """
     runner, N = recorded(arm, task, geometry), len(given)
     step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts: one set of buffers serves all
@@ -73,11 +61,9 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
                 room = [buffer[..., : len(goal)] for buffer in workspace]
                 found = list(runner.code.run(entries(task, goal) if columns is None else columns, room))
             first = goal[:, 0] if columns is None else cast("Array", columns[9])
-            there = (
-                near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
-                if examine
-                else None
-            )
+            there = None
+            if examine:
+                there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             edge = _keep(Goals(arm, task, goal, near[some]), runner.axes, rows_of(out, some), found, close, there)
             if len(edge.rows):
                 left.append(edge._replace(rows=start + edge.rows))
@@ -95,7 +81,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
             for start in range(0, len(edge), AT_ONCE):
                 out = decided(goals, runner, out, edge[start : start + AT_ONCE])
         edge = edge[:0]
-    return Solved(out, math.prod(runner.axes), target, rounding, edge)
+    return out, math.prod(runner.axes), target, rounding, edge
 
 
 def _keep(

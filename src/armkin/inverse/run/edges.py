@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -168,28 +167,18 @@ def _at_two(runner: Recorded, target: Array, values: Array, others: Array) -> tu
 
 
 def examined(
-    goals: Goals,
-    out: Batch,
-    doubted: Int,
-    seeds: Seeds,
-    others: Callable[[Array, Array, Bool], tuple[Array, Int, Bool]],
-    unsettled: Bool | None = None,
+    goals: Goals, out: Batch, doubted: Int, seeds: Seeds, others: components.More, unsettled: Bool | None = None
 ) -> Batch:
     """Examine the doubted targets and write what is found: branches first, nan behind.
 
-    seeds: candidates of these; others: more of them, for targets and preferred values, and whether branches seem lost
-    or an elimination did not settle them, and whether they may not be all; unsettled: (N,), see `components.examine`.
+    seeds: candidates of these; others, unsettled: (N,), see `components.examine`.
     """
     for start in range(0, len(doubted), AT_ONCE):
         rows = doubted[start : start + AT_ONCE]
         some = goals.of(rows)
-        incomplete = np.zeros(len(rows), bool) if unsettled is None else unsettled[rows] & ~out.complete[rows]
-
-        def more(which: Int, lost: Bool, some: Goals = some, incomplete: Bool = incomplete) -> Any:
-            return others(some.target[which], some.near[which], lost | incomplete[which])
-
         part = rows_of(seeds, slice(start, start + AT_ONCE))
-        seen = components.examine(some, part, more, None if unsettled is None else unsettled[rows])
+        lacking = (None, None) if unsettled is None else (unsettled[rows], unsettled[rows] & ~out.complete[rows])
+        seen = components.examine(some, part, others, *lacking)
         if seen.surface.any():
             seen = surfaces.swept(some, seen)
         out = write(goals.arm, out, rows, seen.q, seen.valid, seen.label, some.near)

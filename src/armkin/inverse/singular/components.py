@@ -28,18 +28,20 @@ AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one 
 FEW = 24  # candidates of a target that are compared all with all
 PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
 
-# For targets (rows of those examined) and whether branches seem lost: more postures to start from (rows, M, n), their
-# branches (M,), and of which targets (rows,) these may not lead to all.
-More = Callable[[Int, Bool], tuple[Array, Int, Bool]]
+# For targets (R, ...), preferred values (R, n) and whether branches seem lost (R,): more postures (R, M, n), their
+# branches (M,), and of which targets (R,) these may not lead to all.
+More = Callable[[Array, Array, Bool], tuple[Array, Int, Bool]]
 
 
-def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None) -> Examined:
+def examine(
+    goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None, incomplete: Bool | None = None
+) -> Examined:
     """Correct, group and classify candidate branches of doubted targets.
 
     goals: K targets; `near` is a branch itself where it solves its target. more: other candidates, for
     targets that seem to have no branch, for those of which the preferred value leaves the other joints no solution,
     and for self-motions that may meet others; unsettled: (K,) targets whose candidates may not be all, of a solver
-    that loses singular ones: more are asked for these and for what is singular.
+    that loses singular ones: more are asked for these and for what is singular, as of lost ones for incomplete (K,).
     """
     found = _settle(goals, seeds, tol.SEED)
     again = found.again | found.surface | ~(found.valid.any(axis=1) | (found.beyond & (unsettled is None)))
@@ -52,7 +54,8 @@ def examine(goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = Non
     if not more_of.any():
         return found._replace(again=again)
     rows = np.flatnonzero(more_of)
-    others, labels, open_ = more(rows, again[rows])
+    lost = again if incomplete is None else again | incomplete
+    others, labels, open_ = more(goals.target[rows], goals.near[rows], lost[rows])
     if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
         open_ |= found.surface[rows]
     if open_.any():
@@ -312,17 +315,10 @@ class _Groups:
         if len(k):
             lost = self.lost.V[k, b], self.lost.nullity[k, b]
             surface[k[self_motions.on_surface(arm, task, q[k, b], *lost, target[k])]] = True
-        return Examined(
-            np.where(there[:, :, None], q[each, order], np.nan),
-            there,
-            np.where(there, self.at.label[each, order], OWN),
-            status,
-            self.free,
-            missed,
-            surface,
-            np.asarray((self.curve & ~self.alone[:, :, None]).any(axis=1)),
-            beyond,
-        )
+        listed = np.where(there[:, :, None], q[each, order], np.nan)
+        label = np.where(there, self.at.label[each, order], OWN)
+        moved = np.asarray((self.curve & ~self.alone[:, :, None]).any(axis=1))
+        return Examined(listed, there, label, status, self.free, missed, surface, moved, beyond)
 
 
 def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:

@@ -11,10 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.forward import fk
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -114,5 +112,5 @@ def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tupl
     back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):
         q = q + (back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
-        r = residual(task, fk(arm, q), q, target, arm.reach)
+        r = newton.missed(arm, task, q, target)
     return q, V, np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))

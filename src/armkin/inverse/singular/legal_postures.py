@@ -42,7 +42,7 @@ def with_legal_postures(goals: Goals, out: Batch, rows: Int) -> Batch:
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = out.branch[k, out.valid[k]].astype(np.int64)
-        found = surfaces.swept(beside, components.examine(beside, Seeds.of(q[None], label), surfaces.no_more(arm)))
+        found = surfaces.swept(beside, components.examine(beside, Seeds.of(q[None], label), surfaces.no_more))
         _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
         if not (inside & found.valid[0]).any():
             continue

@@ -14,10 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.forward import fk
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -177,7 +175,7 @@ def _second_order(
         """The pose's way f (2, M, rows) along away (2, M, n), in directions of U."""
         ends = (q + away * unit).reshape(-1, n)
         goals = np.concatenate([target, target])
-        f = r - residual(task, fk(arm, ends), ends, goals, arm.reach).reshape(2, *r.shape)
+        f = r - newton.missed(arm, task, ends, goals).reshape(2, *r.shape)
         return np.asarray((f[..., None] * U).sum(axis=2))
 
     along = both_ways(SIGNS * tol.FOLD_WAY * v).sum(axis=0) / tol.FOLD_WAY**2
@@ -372,7 +370,7 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     u, way = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
     both = np.concatenate([q + way, q - way])
     goals = np.concatenate([target, target])
-    ahead, behind = np.split(residual(task, fk(arm, both), both, goals, arm.reach), 2)
+    ahead, behind = np.split(newton.missed(arm, task, both, goals), 2)
     bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
     lost = (u * r).sum(axis=1)
     rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)

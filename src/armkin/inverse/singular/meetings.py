@@ -14,12 +14,10 @@ import numpy as np
 
 from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.forward import fk
 from armkin.inverse.answers.batch import OWN, Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
-from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -99,7 +97,7 @@ def _tangents(
         push = np.stack([V[:, i] if i == j else V[:, i] + V[:, j] for i, j in pairs])
         ends = (q[rows] + np.multiply.outer([tol.FOLD_WAY, -tol.FOLD_WAY], push * radian_or_reach(arm))).reshape(-1, n)
         goal = np.concatenate([target[rows]] * (2 * len(pairs)))
-        r = residual(task, fk(arm, ends), ends, goal, arm.reach).reshape(2, len(pairs), len(rows), n)
+        r = newton.missed(arm, task, ends, goal).reshape(2, len(pairs), len(rows), n)
         bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / tol.FOLD_WAY**2
         own = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
         forms = np.stack([b if i == j else b - own[i] - own[j] for b, (i, j) in zip(bent, pairs, strict=True)])

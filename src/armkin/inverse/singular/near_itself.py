@@ -63,8 +63,7 @@ def _taken(goals: Goals, out: Batch, rows: Int) -> Int:
         return rows
     near, target = goals.near[rows], goals.target[rows]
     if not out.valid.shape[1]:  # an elimination that found nothing at all
-        alone: Int = rows[newton.missing(arm, task, near, target) <= tol.SOLUTION]
-        return alone
+        return np.asarray(rows[newton.missing(arm, task, near, target) <= tol.SOLUTION])
     away = newton.wrapped_distance(arm, out.q[rows], near[:, None])
     away = np.where(out.valid[rows], away, np.inf)
     place = away.argmin(axis=1)
@@ -79,8 +78,7 @@ def _taken(goals: Goals, out: Batch, rows: Int) -> Int:
         stays[some] = newton.missing(arm, task, between, target[some]) <= tol.SOLUTION
     out.q[rows[stays], place[stays]] = near[stays]
     out.within[rows[stays], place[stays]] = True
-    left: Int = rows[solves & ~stays]
-    return left
+    return np.asarray(rows[solves & ~stays])
 
 
 def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> Int:
@@ -94,8 +92,7 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> I
     close = np.broadcast_to(near, (len(target), arm.n))
     rows = reached(arm, task, target, position(arm, near), room=np.where(known, most, -1.0))
     rows = rows[~limits.outside(arm, close[rows]).any(axis=1)]
-    there: Int = rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]]
-    return there
+    return np.asarray(rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]])
 
 
 def stand(goals: Goals, out: Batch, most: Array) -> Batch:

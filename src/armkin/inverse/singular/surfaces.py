@@ -8,7 +8,6 @@ second of the two held it is that curve, and each curve of the arm of the others
 from __future__ import annotations
 
 import itertools
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.singular.components import More, examine
+from armkin.inverse.singular.components import examine
 from armkin.model.arm import Arm
 from armkin.model.lock_joints import lock
 
@@ -34,13 +33,9 @@ def swept(goals: Goals, seen: Examined) -> Examined:
     return seen
 
 
-def no_more(arm: Arm) -> More:
+def no_more(target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
     """Further candidates: none, those that were found are all."""
-
-    def none(rows: Int, lost: Bool) -> tuple[Array, Int, Bool]:
-        return np.full((len(rows), 1, arm.n), np.nan), np.zeros(1, np.int64), np.zeros(len(rows), bool)
-
-    return none
+    return np.full((len(near), 1, near.shape[1]), np.nan), np.zeros(1, np.int64), np.zeros(len(near), bool)
 
 
 def _with_curves(goals: Goals, seen: Examined, k: np.intp) -> Examined:
@@ -54,7 +49,7 @@ def _with_curves(goals: Goals, seen: Examined, k: np.intp) -> Examined:
     found = [_curves(one, q[on], label[on], pair) for pair, on in _pairs(arm, at, rest)]
     if not found:
         return seen
-    rows, names, free, pair = max(found, key=lambda curves: len(curves.q))
+    rows, names, free, pair = max(found, key=lambda curves: len(curves[0]))
     if not len(rows):
         return seen
     on = _about_one_line(at, pair)
@@ -68,17 +63,9 @@ def _with_curves(goals: Goals, seen: Examined, k: np.intp) -> Examined:
     return out
 
 
-class _Curves(NamedTuple):
-    """A posture of each curve (M, n), its label (M,), the joints that move (n,) besides the surfaces' others."""
-
-    q: Array
-    label: Int
-    free: Bool
-    pair: Pair
-
-
-def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> _Curves:
-    """The curves that postures q (M, n) of one target lie on, and all others, with the second joint of a pair held."""
+def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> tuple[Array, Int, Bool, Pair]:
+    """The curves that postures q (M, n) of one target lie on, and all others, with the second joint of a pair held: a
+    posture of each, its label, and the joints that move (n,) besides the surfaces' others."""
     arm, task, target, [near] = goals
     i, j, way = pair
     turned = q.copy()
@@ -89,12 +76,12 @@ def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> _Curves:
     starts = starts[~np.isnan(starts[:, 0])]
     marks = np.concatenate([label, np.full(len(starts), OWN)])
     seeds = Seeds.of(np.concatenate([turned[:, others], starts])[None], marks[None])
-    found = examine(Goals(rest, task, target, near[None, others]), seeds, no_more(rest))
+    found = examine(Goals(rest, task, target, near[None, others]), seeds, no_more)
     there = found.valid[0]
     rows, free = np.insert(found.q[0, there], j, near[j], axis=1), np.insert(found.free[0], j, True)
     free[i] = True
     on = _about_one_line(_jacobians(goals, rows)[0], pair)
-    return _Curves(rows[on], found.label[0, there][on], free, pair)
+    return rows[on], found.label[0, there][on], free, pair
 
 
 def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:

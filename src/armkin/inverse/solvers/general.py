@@ -9,14 +9,14 @@ its own Jacobian has full rank, because the virtual axes are in general position
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Entry
 from armkin.inverse.closed import spherical
 from armkin.inverse.closed.candidates import is_sound
-from armkin.inverse.closed.geometry import Geometry, Rows
+from armkin.inverse.closed.geometry import ClosedForm, Geometry, Rows
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2
 from armkin.inverse.closed.wrist import foot
 from armkin.inverse.elimination import method
@@ -28,6 +28,7 @@ from armkin.model.joint_chain import Chain, is_parallel, reverse
 from armkin.model.rotation import inverse, rotation_about
 
 PHASE = 0.7321  # [rad]
+NAME = "general elimination"
 _POSE = Task("pose", 3, np.zeros((0, 6)), np.zeros(0), "full")
 
 
@@ -37,15 +38,9 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     if arm.n == 6:
         prepared = method.prepare(arm.link, arm.prismatic)
-        return Geometry(
-            "general elimination",
-            "no axes meet or run parallel as a closed form would need: numeric elimination, up to 16 branches",
-            prepared.complete,
-            rows=lambda T: _six(prepared, T),
-            unmoved=lambda T: _six(prepared, T, False),
-            ordered=False,
-            elimination=prepared,
-        )
+        why = "no axes meet or run parallel as a closed form would need: numeric elimination, up to 16 branches"
+        every, unmoved = (partial(_six, prepared, moved=moved) for moved in (True, False))
+        return Geometry(NAME, why, prepared.complete, None, every, unmoved, ordered=False, elimination=prepared)
     if arm.n == 5 and (wrist := _with_wrist(arm, task)) is not None:
         return wrist
     link, prismatic = _padded(arm)
@@ -63,24 +58,15 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         missing = np.isnan(own[:, :, 0])
         count = (~missing).sum(axis=1)
         order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
-        return Rows(
-            np.take_along_axis(own, order[:, :, None], axis=1),
-            (hit.sum(axis=1) > count) | (doubt & hit.any(axis=1)) | shaken,
-            settled & prepared.complete & ~shaken,
-            shaken,
-            guesses[:, :, :n],
-        )
+        own = np.take_along_axis(own, order[:, :, None], axis=1)
+        doubt = (hit.sum(axis=1) > count) | (doubt & hit.any(axis=1)) | shaken
+        return Rows(own, doubt, settled & prepared.complete & ~shaken, shaken, guesses[:, :, :n])
 
-    return Geometry(
-        "general elimination",
-        f"{arm.n} joints for a pose of six: {6 - arm.n} virtual joints added at the tool must stay at zero",
-        prepared.complete,
-        rows=rows,
-        ordered=False,
-    )
+    why = f"{arm.n} joints for a pose of six: {6 - arm.n} virtual joints added at the tool must stay at zero"
+    return Geometry(NAME, why, prepared.complete, rows=rows, ordered=False)
 
 
-def _six(prepared: method.Elimination, T: Array, moved: bool = True) -> Rows:
+def _six(prepared: method.Elimination, T: Array, *, moved: bool) -> Rows:
     """Branches of six joints; complete where the elimination settled the pose as it stands, by a regular pencil.
 
     Of a target that had to be moved, self-motions and double roots are not where they were.
@@ -107,9 +93,7 @@ def _with_wrist(arm: Arm, task: Task) -> Geometry | None:
     return None
 
 
-def _of_five(
-    solve: Callable[[list[Entry], Prefer], Candidates], first: bool
-) -> Callable[[list[Entry], Prefer], Candidates]:
+def _of_five(solve: ClosedForm, first: bool) -> ClosedForm:
     """The closed form of five joints from that of six, of which the first or the last is virtual."""
     own = slice(1, 6) if first else slice(0, 5)
 

@@ -18,7 +18,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -42,14 +41,6 @@ NAMED_AT_ONCE = 256  # branches are named: buffers of so many are kept
 SICK = 0.08  # share of poses that a healthy elimination leaves open in its first two passes
 APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
 RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
-
-
-class _Corrected(NamedTuple):
-    """Seeds moved onto the arm: q (N, B, n), good (N, B) if they are branches, doubt (N,)."""
-
-    q: Array
-    good: Bool
-    doubt: Bool
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
@@ -102,15 +93,9 @@ def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geome
         parts = [slice(k, k + NAMED_AT_ONCE) for k in starts]
         return np.concatenate([_places(arm, task, alike, off, q[some], target[some]) for some in parts])
 
-    geometry = Geometry(
-        general_.name,
-        f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class",
-        True,
-        labels=alike.labels,
-        ordered=alike.ordered,
-        branches=math.prod(2 if label else 1 for label in alike.labels) if alike.labels else None,
-        places=places,
-    )
+    why = f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class"
+    branches = math.prod(2 if label else 1 for label in alike.labels) if alike.labels else None
+    geometry = replace(alike, name=general_.name, why=why, pairs=None, branches=branches, places=places)
     return replace(geometry, rows=named(general_.rows, geometry))
 
 
@@ -123,9 +108,8 @@ def named(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array
         found = solve(target)
         numbers = places(found.q, target)
         row, column = np.nonzero(numbers >= 0)
-        q = np.full(
-            (len(target), max(int(numbers.max(initial=-1)) + 1, geometry.branches or 1), found.q.shape[2]), np.nan
-        )
+        width = max(int(numbers.max(initial=-1)) + 1, geometry.branches or 1)
+        q = np.full((len(target), width, found.q.shape[2]), np.nan)
         q[row, numbers[row, column]] = found.q[row, column]
         return found._replace(q=q)
 
@@ -143,9 +127,8 @@ def _places(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target:
         real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
         away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
         nearest, back = away.argmin(axis=2), away.argmin(axis=1)
-        row, place = np.nonzero(
-            (np.take_along_axis(back, nearest, axis=1) == np.arange(B)) & (away.min(axis=2, initial=np.inf) < APART)
-        )
+        mutual = np.take_along_axis(back, nearest, axis=1) == np.arange(B)
+        row, place = np.nonzero(mutual & (away.min(axis=2, initial=np.inf) < APART))
         numbers[row, nearest[row, place]] = place
     rest = there & (numbers < 0)
     return np.where(rest, B - 1 + rest.cumsum(axis=1), numbers)
@@ -188,11 +171,11 @@ def _by_neighbours(
     target: Array,
 ) -> tuple[Array, Bool]:
     """Branches and doubts by the elimination, or by the similar arm's branches at targets around."""
-    found = _correct(arm, task, source, off, off_here, target)
-    q = np.where(found.good[:, :, None], found.q, np.nan)
-    few = np.flatnonzero(found.doubt)
+    seeds, good, doubt = _correct(arm, task, source, off, off_here, target)
+    q = np.where(good[:, :, None], seeds, np.nan)
+    few = np.flatnonzero(doubt)
     if not len(few):
-        return q, found.doubt
+        return q, doubt
     goals = target[few]
     if elimination is not None:
         solver = elimination()
@@ -202,10 +185,10 @@ def _by_neighbours(
     else:
         rings = (around(arm, task, goals, size * off_here[few]) for size in RINGS)
         others = [source.rows(there)[0] for ring in rings for there in ring]
-    more = _settled(arm, task, np.concatenate([found.q[few], *others], axis=1), goals, found.q.shape[1])
+    more = _settled(arm, task, np.concatenate([seeds[few], *others], axis=1), goals, seeds.shape[1])
     out = widened(q, more.shape[1])
     out[few] = more
-    return out, found.doubt
+    return out, doubt
 
 
 def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
@@ -237,8 +220,10 @@ def _packed(q: Array, own: int) -> Array:
     return np.concatenate([q[:, :own], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
 
 
-def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array, target: Array) -> _Corrected:
-    """Move the seeds onto the arm, and find the poses for which that may not be all.
+def _correct(
+    arm: Arm, task: Task, source: Recorded, off: float, off_here: Array, target: Array
+) -> tuple[Array, Bool, Bool]:
+    """Seeds moved onto the arm (N, B, n), which are branches (N, B), and for which poses (N,) that may not be all.
 
     off_here: `off` at each target (N,). The true arm reaches a target as the similar one, `source`, reaches
     another, not much more than that away. Hence a pose is sure only if the similar arm's branches hardly move
@@ -266,4 +251,4 @@ def _correct(arm: Arm, task: Task, source: Recorded, off: float, off_here: Array
         for j in range(i):
             same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < tol.ALIKE
             doubt |= same & good[:, i] & good[:, j]
-    return _Corrected(branch, good, doubt)
+    return branch, good, doubt

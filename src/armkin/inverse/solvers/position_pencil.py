@@ -151,5 +151,4 @@ def _order(away: Array) -> Int:
     """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
     away = np.where(np.isnan(away), np.pi, away)
     cost = away[:, np.arange(4), ALL].sum(axis=2)
-    order: Int = ALL[cost.argmin(axis=1)]
-    return order
+    return np.asarray(ALL[cost.argmin(axis=1)])

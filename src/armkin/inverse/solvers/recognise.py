@@ -30,12 +30,9 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
         return solver(arm, task.name)
     if arm.n > task.constraints:
         surplus = arm.n - task.constraints
-        raise redundant(
-            arm,
-            surplus,
-            f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} leave "
-            f"{surplus} degree{'s' if surplus > 1 else ''} of freedom",
-        )
+        left = f"leave {surplus} degree{'s' if surplus > 1 else ''} of freedom"
+        problem = f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} {left}"
+        raise redundant(arm, surplus, problem)
     effective = rank(arm, task, tol.RANK)
     if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
         usual = default_task(arm)

@@ -1,7 +1,9 @@
-"""Arms with one joint more than their task asks for: which joint is redundant, and what its motion does to a target."""
+"""Arms with one joint more than their task asks for: which joint is redundant, what its motion does to a target; joints
+that are held."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -145,6 +147,29 @@ def moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], own: Pair) -> l
     for k, by in enumerate(free.task.sums[:, 0].tolist(), p):
         out.append(arrays.sub(goal[k], arrays.mul(by, angle)))
     return [*out, *(pose.turn(G, goal[3:6]) if free.task.orientation == "axis" else [])]
+
+
+@lru_cache(maxsize=128)
+def arm_without(arm: Arm, held: tuple[tuple[str, float], ...]) -> Arm:
+    """The arm with joints locked at values [rad | mm]; the same object for the same values: it is prepared once."""
+    return lock(arm, dict(held)) if held else arm
+
+
+def redundant_alone(arm: Arm, task_name: str | None, held: Mapping[str, float]) -> Redundancy | None:
+    """The redundant joint, if that alone is held: for all its values one arm is prepared once, with other targets."""
+    if len(held) != 1 or arm.keep_out or (arm.ratio != 1.0).any():
+        return None
+    free = redundancy(arm, task_name)
+    return free if free is not None and arm.joint_names[free.joint] in held else None
+
+
+def without_held(arm: Arm, task_name: str | None, held: Mapping[str, float], targets: Array) -> tuple[Arm, Array]:
+    """The arm of the joints that are not held [rad | mm], and targets (N, ...) as its own."""
+    free = redundant_alone(arm, task_name, held)
+    if free is None:
+        return arm_without(arm, tuple(held.items())), targets
+    [value] = held.values()
+    return free.rest, moved(arm, free, targets, np.full(len(targets), value))
 
 
 def redundant_joint(arm: Arm, task_name: str | None) -> str:

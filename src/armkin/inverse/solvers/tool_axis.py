@@ -7,6 +7,7 @@ anything: any orientation with the wanted axis will do, and the virtual joint is
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,7 +36,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
             return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
 
         ends = tuple(j for j in inner.ends if j < 5)
-        return Geometry(inner.name, why, inner.complete, pairs, labels=inner.labels, ordered=inner.ordered, ends=ends)
+        return replace(inner, why=why, pairs=pairs, ends=ends, doubts=None)
     solve_rows = inner.rows
     assert solve_rows is not None
 
@@ -48,16 +49,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
         order = projection(arm.prismatic, q).argsort(axis=1)
         return found._replace(q=np.take_along_axis(q, order[:, :, None], axis=1), guesses=guesses)
 
-    return Geometry(
-        inner.name,
-        why,
-        inner.complete,
-        rows=rows,
-        labels=inner.labels,
-        branches=inner.branches,
-        ordered=inner.ordered,
-        elimination=inner.elimination,
-    )
+    return replace(inner, why=why, rows=rows, unmoved=None, places=None)
 
 
 def pose_of(goal: list[Entry]) -> pose.Pose:

@@ -77,5 +77,4 @@ def _rotation_vector(R: Array) -> Array:
         axis = B[np.arange(len(B)), :, k]
         w[near_half] = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), TINY)
         s = np.where(near_half, 1.0, s)
-    out: Array = w * (angle / np.maximum(s, TINY))[:, None]
-    return out
+    return np.asarray(w * (angle / np.maximum(s, TINY))[:, None])

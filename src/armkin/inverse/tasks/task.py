@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,18 +63,6 @@ class Task:
         return self.position + len(self.sums) + {"none": 0, "axis": 2, "full": 3}[self.orientation]
 
 
-class Targets(NamedTuple):
-    """Targets as a flat batch.
-
-    values: (N, m), or (N, 4, 4) for poses, their rotations orthonormal.  lead: the batch's shape.
-    rounding: (N,) how far the columns of a rotation given were from orthonormal.
-    """
-
-    values: Array
-    lead: tuple[int, ...]
-    rounding: Array
-
-
 def read_near(arm: Arm, near: ArrayLike | None, lead: tuple[int, ...]) -> Array:
     """Joint values to stay close to, (n,) or (*lead, n) [rad | mm]; by default home. Raises UsageError for others."""
     close = arm.home if near is None else arrays.real(near, "near")
@@ -85,8 +73,8 @@ def read_near(arm: Arm, near: ArrayLike | None, lead: tuple[int, ...]) -> Array:
     return close
 
 
-def read_targets(task: Task, targets: ArrayLike) -> Targets:
-    """Targets as `ik` takes them: (..., m), or (..., 4, 4) for poses.
+def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...], Array]:
+    """Targets (..., m), or (..., 4, 4) for poses, as a flat batch (N, ...); its shape; how far rotations were off (N,).
 
     A pose whose rotation was rounded, to six decimals or to float32, is answered as the rotation next to
     it. Raises UsageError for a wrong shape, numbers that are not finite or too large, an axis of no
@@ -103,7 +91,7 @@ def read_targets(task: Task, targets: ArrayLike) -> Targets:
             if near is not part:
                 flat = flat.copy() if flat is given else flat
                 flat[rows] = near
-    return Targets(flat, lead, rounding)
+    return flat, lead, rounding
 
 
 def shaped(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
@@ -223,5 +211,4 @@ def around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = AR
 def distance(arm: Arm, task: Task, target: Array) -> Array:
     """How far targets (M, m) or (M, 4, 4) are from the arm's first joint, in reaches: (M,)."""
     p = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
-    away: Array = np.linalg.norm(p - arm.link[0][: p.shape[1], 3], axis=1) / arm.reach
-    return away
+    return np.asarray(np.linalg.norm(p - arm.link[0][: p.shape[1], 3], axis=1) / arm.reach)
