@@ -60,7 +60,7 @@ def compile(arm: Arm, task: str | None = None) -> CompiledArm:
     Raises:
         MissingExtraError: there is no C compiler, or it fails.
         UsageError: the task does not fit the arm.
-        FileError: the folder of compiled arms cannot be written.
+        FileError: there is no room to build in, or no folder from which programs may run.
 
     >>> import armkin
     >>> fast = armkin.compile(armkin.load("robots/three_dof.yaml"))

@@ -70,6 +70,8 @@ def path(
         The plan: `duration` [s], joint values `q(t)` [rad | mm] over time, and what was found about its branches.
 
     Raises:
+        FileError: the path file cannot be read.
+        PathFileError: it is not valid; the message has its line.
         UsageError: moves that make no sense, options out of range, or an arm without max_speed and max_accel.
         NoSolutionError: some part is not carried; its `plan` tells how far every branch goes.
 

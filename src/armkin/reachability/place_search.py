@@ -155,8 +155,10 @@ def place(
         A `Place` for each arm, in their order.
 
     Raises:
-        UsageError: a number is out of range, a target is malformed, or the task does not fit an arm.
-        FileError: a file cannot be read or written, or parts of another run stand beside it.
+        UsageError: a number is out of range, a target is malformed, the task does not fit an arm, out has another
+            ending, or parts of another question stand beside it.
+        FileError: a file cannot be read or written, or another run works on it.
+        RobotFileError: the scene is not valid.
         PathFileError: the path file is not valid.
         MissingExtraError: a cluster without Dask.
         ClusterError: the cluster cannot be reached, or a worker fails.

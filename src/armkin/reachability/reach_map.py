@@ -126,8 +126,9 @@ def reach(
         The map, (cells,) a column.
 
     Raises:
-        UsageError: a number is out of range, no cell is within reach, or no task fits the arm.
-        FileError: the file cannot be written, or parts of another run stand beside it.
+        UsageError: a number is out of range, no cell is within reach, no task fits the arm, out has another ending, or
+            parts of another question stand beside it.
+        FileError: the file cannot be written, or another run works on it.
         MissingExtraError: .parquet without pyarrow, a cluster without Dask.
         ClusterError: the cluster cannot be reached, or a worker fails.
 

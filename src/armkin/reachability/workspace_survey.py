@@ -99,7 +99,8 @@ def workspace(
         measures.
 
     Raises:
-        UsageError: a number is out of range, samples and a grid are both given, or a prismatic joint has no limits.
+        UsageError: a number is out of range, samples and a grid are both given, a prismatic joint has no limits, a
+            measure is unknown, or out has another ending.
         FileError: the file cannot be written; there is none then.
         MissingExtraError: a cluster without Dask.
         ClusterError: the cluster cannot be reached, or a worker fails.
