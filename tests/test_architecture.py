@@ -249,20 +249,28 @@ NOT_SPLIT = {
     "armkin.inverse.run.chunks._keep",
     "armkin.inverse.solvers.nearly_special.recognise",
 }
-BRANCH = ast.If | ast.IfExp | ast.For | ast.While | ast.ExceptHandler | ast.comprehension | ast.match_case
+BRANCHES = {ast.If, ast.IfExp, ast.For, ast.While, ast.ExceptHandler, ast.comprehension, ast.match_case}
 
 
-def _branches(node: ast.AST) -> int:
+def _branches(function: ast.FunctionDef) -> int:
     """Ways through a function, one more than its decisions; functions in it are counted by themselves."""
-    count = isinstance(node, ast.FunctionDef) + isinstance(node, BRANCH)
-    count += len(node.values) - 1 if isinstance(node, ast.BoolOp) else 0
-    count += len(node.ifs) if isinstance(node, ast.comprehension) else 0
-    inner = (child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.FunctionDef | ast.ClassDef))
-    return count + sum(map(_branches, inner))
+    left: list[ast.AST] = [*function.body]
+    count = 1
+    while left:
+        node = left.pop()
+        count += type(node) in BRANCHES
+        if isinstance(node, ast.BoolOp):
+            count += len(node.values) - 1
+        elif isinstance(node, ast.comprehension):
+            count += len(node.ifs)
+        if not isinstance(node, ast.FunctionDef | ast.ClassDef):
+            left += ast.iter_child_nodes(node)
+    return count
 
 
 def test_branches_are_counted_in_full() -> None:
     [node] = ast.parse("def f(x):\n    return [y for y in x if y and (y > 1 or y < 0)] if x else 0").body
+    assert isinstance(node, ast.FunctionDef)
     assert _branches(node) == 6
 
 
@@ -284,6 +292,26 @@ def test_no_two_files_share_a_name() -> None:
             rooms.setdefault(path.stem, []).append(folder)
     twice = {name: folders for name, folders in rooms.items() if len(folders) > 1}
     assert twice.keys() == SAME_THING_TWICE, twice
+
+
+def test_every_class_and_public_function_has_a_docstring() -> None:
+    """Methods, too, those of private classes included; a setter's is its property's."""
+    silent = {
+        f"{module}.{node.name}"
+        for module, path in MODULES.items()
+        for owner in _nodes(path)
+        if isinstance(owner, ast.Module | ast.ClassDef)
+        for node in owner.body
+        if isinstance(node, ast.ClassDef) or (isinstance(node, ast.FunctionDef) and _is_public(node))
+        if ast.get_docstring(node, clean=False) is None
+    }
+    assert not silent
+
+
+def _is_public(node: ast.FunctionDef) -> bool:
+    return not node.name.startswith("_") and not any(
+        ast.unparse(one).endswith(".setter") for one in node.decorator_list
+    )
 
 
 PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))

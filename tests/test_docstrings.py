@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
 import enum
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
-from pathlib import Path
 from runpy import run_path
 from typing import Any
 
@@ -143,26 +141,3 @@ def test_the_reference_has_a_row_for_every_parameter_and_field() -> None:
     for name, member in PUBLIC.items():
         told = {**_entries(member, "Args"), **_entries(member, "Attributes"), **_entries(member, "Raises")}
         assert re.findall(r"^\| `\*{0,2}(\w+)` \| ", text[name], re.M) == list(told), name
-
-
-FILES = sorted(Path(armkin.__file__).parent.rglob("*.py"))
-
-
-def test_every_class_and_public_function_of_the_package_has_a_docstring() -> None:
-    """Methods, too, those of private classes included; a setter's is its property's."""
-    silent = {
-        f"{path.name}: {node.name}"
-        for path in FILES
-        for owner in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(owner, ast.Module | ast.ClassDef)
-        for node in owner.body
-        if isinstance(node, ast.ClassDef) or (isinstance(node, ast.FunctionDef) and _is_public(node))
-        if ast.get_docstring(node) is None
-    }
-    assert not silent
-
-
-def _is_public(node: ast.FunctionDef) -> bool:
-    return not node.name.startswith("_") and not any(
-        ast.unparse(one).endswith(".setter") for one in node.decorator_list
-    )
