@@ -53,5 +53,5 @@ def test_no_folder_is_where_somebody_happens_to_stand(tmp_path: Path, monkeypatc
     monkeypatch.setenv("XDG_STATE_HOME", "state")
     monkeypatch.setenv("XDG_CACHE_HOME", "cache")
     assert Path(user_folders.of_port("abc")).is_absolute()
-    assert (user_folders.compiled() or tmp_path / "home").is_relative_to(tmp_path / "home")
+    assert (user_folders.compiled_folder() or tmp_path / "home").is_relative_to(tmp_path / "home")
     assert not (tmp_path / "state").exists()

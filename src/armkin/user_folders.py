@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 
-def compiled() -> Path | None:
+def compiled_folder() -> Path | None:
     """Where libraries are kept that were built for an arm; None where the user has no such place."""
     from platformdirs import user_cache_path
 

@@ -31,7 +31,7 @@ from armkin.keep_out.shapes.capsule import Capsule
 from armkin.keep_out.shapes.floor import Floor
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan
-from armkin.motion.plan.trajectory_proof import proved
+from armkin.motion.plan.trajectory_proof import prove_trajectory
 from armkin.motion.timing.trajectory import Trajectory
 
 ARMS = ("three_dof", "ur5e", "ar4", "cobra600")
@@ -243,7 +243,7 @@ def motions(count: int, rng: np.random.Generator) -> None:
             q = q[held.least(q)[0] >= 0]
             for a, b in zip(q[0::2][:125], q[1::2][:125], strict=False):
                 b = b if rng.random() < 0.5 else np.clip(a + rng.uniform(0.02, 0.5) * (b - a), arm.lower, arm.upper)
-                found = proved(plan(arm, a, b))
+                found = prove_trajectory(plan(arm, a, b))
                 assert found is not None
                 least = float(held.least(a + share * (b - a))[0].min())
                 done, free = done + 1, free + found.free
@@ -343,11 +343,11 @@ def _path() -> None:
             if len(q) < 13:
                 continue
             way = _curve(arm, np.concatenate([q[:1], q[:1] + 0.25 * (q[1:13] - q[:1])]))
-            found = proved(way, tight=True)
+            found = prove_trajectory(way, tight=True)
             if found is not None and found.free:
                 break
         assert found is not None
-        took = best_time(lambda: proved(way, tight=True))
+        took = best_time(lambda: prove_trajectory(way, tight=True))
         print(f"{name}: a path of 10,000 samples proved in {took * 1e3:.1f} ms, {found.postures} postures")
 
 

@@ -28,7 +28,7 @@ from lines import random_line
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.motion.branches.branch_chains import Chain, chains, fewest
-from armkin.motion.branches.linked_branches import linked
+from armkin.motion.branches.linked_branches import link_branches
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
@@ -66,7 +66,7 @@ def branches(lines: int) -> None:
         for _ in range(lines):
             way = random_line(arm, rng)
             dense = np.linspace(0, way.length, 1001)
-            columns = linked(arm, way.targets, dense[::4], task=None, tolerance=0.05, near=arm.home)
+            columns = link_branches(arm, way.targets, dense[::4], task=None, tolerance=0.05, near=arm.home)
             all_ = chains(arm, columns)
             mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
             whole += mine >= way.length - 1e-9
@@ -85,7 +85,7 @@ def branches(lines: int) -> None:
             began = time.process_time()
             armkin.ik(arm, targets)
             between = time.process_time()
-            fewest(chains(arm, linked(arm, way.targets, s, task=None, tolerance=0.05, near=arm.home)), 10_000)
+            fewest(chains(arm, link_branches(arm, way.targets, s, task=None, tolerance=0.05, near=arm.home)), 10_000)
             own, spent = own + between - began, spent + time.process_time() - between
         per = 1e6 / lines / 10_000
         print(
@@ -118,7 +118,9 @@ def tips(lines: int) -> None:
         worst = far = 0.0
         for _ in range(each):
             way = random_line(arm, rng)
-            columns = linked(arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home)
+            columns = link_branches(
+                arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home
+            )
             all_ = chains(arm, columns)
             steps += sum(len(chain.q) - 1 for chain in all_)
             off = tips_off(arm, all_)

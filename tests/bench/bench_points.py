@@ -28,7 +28,7 @@ from lines import random_line
 
 import armkin
 from armkin.forward import condition
-from armkin.motion.tool_path.drawing_frame import placing
+from armkin.motion.tool_path.drawing_frame import place_drawing
 from armkin.path_file import gcode
 from armkin.path_file.drawing import DrawingOptions
 from armkin.robot_file import catalogue
@@ -92,7 +92,7 @@ def planned(name: str, text: str, at: list[float]) -> None:
     """Read and plan a program; print what it takes."""
     arm = armkin.load("three_dof")
     began = time.process_time()
-    file = gcode.parse(text.encode(), "points.gcode", placing(arm, at), DrawingOptions())
+    file = gcode.parse(text.encode(), "points.gcode", place_drawing(arm, at), DrawingOptions())
     read = time.process_time() - began
     plan = armkin.path(arm, file)
     spent = time.process_time() - began

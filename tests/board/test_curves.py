@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.backend.sent_positions import braking
+from armkin.board.backend.sent_positions import braking_time
 from armkin.board.firmware.segments import curve_segments
 from armkin.board.firmware.segments.counts_to_segments import cycles_of
 from armkin.board.firmware.segments.trajectory_to_counts import cut
@@ -69,10 +69,10 @@ def test_a_board_that_is_sent_positions_slows_down_gently_on_curves() -> None:
         slower = circle.motion.qdd(t) - circle.motion.qd(t) / ramp
         return float((np.abs(slower) / arm.max_accel).max())
 
-    ramp = braking(circle.motion)
+    ramp = braking_time(circle.motion)
     assert asked(ramp) <= 1.63 < asked(0.625 * ramp)
     there = armkin.path(arm, {"moves": [{"joint": {"q1": 60}}]})
-    assert braking(there.motion) == pytest.approx(0.5)  # 60 deg/s at 120 deg/s2
+    assert braking_time(there.motion) == pytest.approx(0.5)  # 60 deg/s at 120 deg/s2
 
 
 def test_segments_follow_the_plan_in_time_and_place() -> None:

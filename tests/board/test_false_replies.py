@@ -25,7 +25,7 @@ from armkin.board_catalogue import BOARDS
 from armkin.errors import LinkError
 from armkin.model import build_arm as arms
 from armkin.model.arm import Arm
-from armkin.motion.rounded_waypoints import rounded
+from armkin.motion.rounded_waypoints import round_waypoints
 from armkin.robot_file import parse
 
 
@@ -114,7 +114,9 @@ CANNOT_KNOW = {
 COMMANDS: dict[str, Callable[[Machine], object]] = {
     "send": lambda one: one.run([one.plan(one.counts(), GOAL)]),
     "batch": lambda one: one.run([one.plan(one.counts(), np.stack([GOAL, GOAL / 2, GOAL]))]),
-    "curve": lambda one: one.run([one.lay(rounded(one.arm, one.joints(), CORNERS, 10.0), np.array(one.counts()))]),
+    "curve": lambda one: one.run(
+        [one.lay(round_waypoints(one.arm, one.joints(), CORNERS, 10.0), np.array(one.counts()))]
+    ),
     "grip": lambda one: gripping.grip(one, gripping.gripper_of("arm", one.configuration), 1500),
     "home": lambda one: homing.home(one),
     "jog": lambda one: jogging.jog(one, jogging.rates(one, 0, 10.0), 0.3),

@@ -289,9 +289,9 @@ def test_values_that_are_no_pose_are_refused(three_dof: Arm) -> None:
 
 def test_a_piece_at_rest_has_one_speed() -> None:
     """A wait on a path begins and ends at rest: 0 / 0 once."""
-    assert counts_to_segments.changing(0.0, 0.0) == 0.0
-    assert counts_to_segments.changing(0.0, 5.0) == 0.0
-    assert counts_to_segments.changing(4.0, 5.0) == pytest.approx(2 / 9)
+    assert counts_to_segments.speed_change(0.0, 0.0) == 0.0
+    assert counts_to_segments.speed_change(0.0, 5.0) == 0.0
+    assert counts_to_segments.speed_change(4.0, 5.0) == pytest.approx(2 / 9)
 
 
 def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:

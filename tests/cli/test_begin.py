@@ -219,10 +219,10 @@ def test_at_a_terminal_a_joint_moves_while_its_key_comes_again_and_again(tmp_pat
     ],
 )
 def test_what_shall_be_seen_is_what_the_joint_does(robot: str, j: int, words: str) -> None:
-    from armkin.board.commissioning import _expected
+    from armkin.board.commissioning import _expected_motion
 
     arm = armkin.load(robot)
-    assert _expected(arm, arm.home, j) == words
+    assert _expected_motion(arm, arm.home, j) == words
     q = arm.home.copy()
     q[j] += 0.01
     turned = armkin.fk(arm, q)[:3, :3] @ armkin.fk(arm, arm.home)[:3, :3].T  # about z of the base

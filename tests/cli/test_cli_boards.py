@@ -17,7 +17,7 @@ from armkin.board.kinds import board_of
 from armkin.board.ports import note_path
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.board.sim.sim_servo_bus import Servo, ServoBus
-from armkin.robot_file.replace_values import replaced
+from armkin.robot_file.replace_values import with_values
 from command_line import ROOT, THREE_DOF, run
 from pty_port import PtyPort
 
@@ -227,7 +227,7 @@ def test_the_jaws_of_the_so_arms_move_as_far_as_their_urdf_says() -> None:
 
 def test_values_are_replaced_where_they_stand() -> None:
     text = "a:\n  - {b: 1, c: [2, 3]}  # one\n  - b: 4\n    d: x\ne: 5\n"
-    found = replaced(text, {("a", 0, "b"): 10, ("a", 0, "z"): 11, ("a", 1, "d"): 12, ("a", 1, "z"): 13, ("e",): 14})
+    found = with_values(text, {("a", 0, "b"): 10, ("a", 0, "z"): 11, ("a", 1, "d"): 12, ("a", 1, "z"): 13, ("e",): 14})
     assert found == "a:\n  - {b: 10, c: [2, 3], z: 11}  # one\n  - b: 4\n    d: 12\n    z: 13\ne: 14\n"
 
 

@@ -55,7 +55,7 @@ def _movable() -> list[Path]:
 @pytest.mark.parametrize("path", _movable(), ids=lambda path: path.stem)
 def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: Path) -> None:
     import armkin
-    from armkin.board.backend.missing_keys import missing
+    from armkin.board.backend.missing_keys import missing_for_motion
 
     arm = armkin.load(path)
     home = ",".join(str(x) for x in armkin.pulses(arm, arm.home))
@@ -64,7 +64,7 @@ def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: 
     goal = [value + 1 if value < 50 else value - 1 for value in values]
     for words in (("--dry-run",), ("--port", "sim")):
         done = run("send", path, *goal, "--json", *words)
-        lacks = missing(arm, board=False)
+        lacks = missing_for_motion(arm, board=False)
         if lacks and "sim" not in words:
             assert done.code == 2
             assert all(lack in done.err for lack in lacks)

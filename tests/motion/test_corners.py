@@ -12,7 +12,7 @@ from armkin.board.firmware.segments.trajectory_to_counts import cut
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan
-from armkin.motion.rounded_waypoints import rounded
+from armkin.motion.rounded_waypoints import round_waypoints
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def wander(arm: Arm, count: int, step: float) -> np.ndarray:
 @pytest.mark.parametrize("hold", [None, 1.5])
 def test_corners_are_rounded_within_their_blend_and_all_limits(three_dof: Arm, hold: float | None) -> None:
     rows = wander(three_dof, 200, 15.0)
-    one = rounded(three_dof, rows[0], rows[1:], 10.0, hold=hold)
+    one = round_waypoints(three_dof, rows[0], rows[1:], 10.0, hold=hold)
     t = np.arange(0, one.duration, 0.001)
     q = one.q(t)
     v, a = np.diff(q, axis=0) / 0.001, np.diff(q, n=2, axis=0) / 1e-6
@@ -50,7 +50,7 @@ def test_corners_are_rounded_within_their_blend_and_all_limits(three_dof: Arm, h
 
 def test_there_and_back_again_turns_round_within_the_limits(three_dof: Arm) -> None:
     rows = np.deg2rad([[0, 90, -90], [40, 90, -90], [0, 90, -90]])
-    one = rounded(three_dof, rows[0], rows[1:], 10.0)
+    one = round_waypoints(three_dof, rows[0], rows[1:], 10.0)
     t = np.arange(0, one.duration, 0.001)
     a = np.diff(one.q(t), n=2, axis=0) / 1e-6
     assert np.abs(a / three_dof.max_accel).max() <= 1.002
@@ -59,18 +59,18 @@ def test_there_and_back_again_turns_round_within_the_limits(three_dof: Arm) -> N
 
 def test_what_makes_no_sense_is_refused(three_dof: Arm) -> None:
     with pytest.raises(UsageError, match="above 0"):
-        rounded(three_dof, three_dof.home, three_dof.home, 0.0)
+        round_waypoints(three_dof, three_dof.home, three_dof.home, 0.0)
     with pytest.raises(NoSolutionError, match="q2 = 130 deg"):
-        rounded(three_dof, three_dof.home, np.deg2rad([[0, 130, 0]]), 5.0)
-    assert rounded(three_dof, three_dof.home, three_dof.home, 5.0).duration == 0
+        round_waypoints(three_dof, three_dof.home, np.deg2rad([[0, 130, 0]]), 5.0)
+    assert round_waypoints(three_dof, three_dof.home, three_dof.home, 5.0).duration == 0
 
 
 def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = wander(three_dof, 60, 20.0)
-    whole = cut(rounded(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
+    whole = cut(round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 50)
     monkeypatch.setattr("armkin.board.firmware.segments.curve_segments._SAMPLES", 700)
-    parts = cut(rounded(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
+    parts = cut(round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
     assert parts.duration == pytest.approx(whole.duration, rel=1e-12)
     [[one], [other]] = ([*map(list, (move.segments for move in laid.moves()))] for laid in (whole, parts))
     assert len(one) == len(other) > 500
@@ -84,7 +84,7 @@ def test_waypoints_cost_little_memory_beyond_the_way_itself(three_dof: Arm, monk
     def peak(count: int) -> int:
         rows = wander(three_dof, count, 20.0)
         tracemalloc.start()
-        rounded(three_dof, rows[0], rows[1:], 2.0, hold=1.5)
+        round_waypoints(three_dof, rows[0], rows[1:], 2.0, hold=1.5)
         _, most = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         return most

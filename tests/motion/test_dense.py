@@ -16,7 +16,7 @@ from armkin.motion.branches import branch_path
 from armkin.motion.plan import playback_times
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.tool_path import fit_points
-from armkin.motion.tool_path.b_spline import banded
+from armkin.motion.tool_path.b_spline import solve_banded
 from armkin.plot import path_picture as picture
 
 CORNER = np.deg2rad(20)
@@ -195,7 +195,7 @@ def test_a_banded_system_is_solved() -> None:
         bands[0] += 3
         A = sum(np.diag(bands[k, : n - k], k) + (np.diag(bands[k, : n - k], -k) if k else 0) for k in range(min(4, n)))
         b = rng.normal(size=(n, 2))
-        np.testing.assert_allclose(banded(bands, b), np.linalg.solve(A, b), atol=1e-12)
+        np.testing.assert_allclose(solve_banded(bands, b), np.linalg.solve(A, b), atol=1e-12)
 
 
 @pytest.mark.parametrize("jerk", [None, 60.0])
@@ -231,7 +231,7 @@ def ragged(seed: int) -> np.ndarray:
 def test_long_chords_beside_short_ones_are_kept_to(seed: int) -> None:
     """A spline with a knot at each place that it is held to swung 9 mm out between them."""
     points = ragged(seed)
-    curve = fit_points.fitted(points, 0.05)
+    curve = fit_points.fit_curves(points, 0.05)
     u = np.unique(np.concatenate([curve.parameters, np.linspace(curve.begin[0], curve.begin[-1], 20_000)]))
     far, excess = worst_miss(points, curve.values(u)[0], 0.05)
     assert far <= 0.051
@@ -323,7 +323,7 @@ def test_a_picture_draws_every_corner_of_very_many_points(three_dof: Arm, monkey
     plan = armkin.path(three_dof, zigzag, corners="tolerance")
     way = picture._way(plan)
     monkeypatch.setattr(picture, "_MANY", 0)
-    thin = picture._thinned(way, 0.1)
+    thin = picture._thin_out(way, 0.1)
     assert len(thin) < len(way)
     for drawn, most in ((way, 0.1), (thin, 0.2)):
         assert np.linalg.norm(zigzag[:, None] - drawn, axis=2).min(axis=1).max() < most

@@ -12,7 +12,7 @@ from lines import random_line
 
 import armkin
 from armkin.motion.branches.branch_chains import chains, fewest
-from armkin.motion.branches.linked_branches import linked
+from armkin.motion.branches.linked_branches import link_branches
 
 
 @pytest.mark.parametrize("name", ["three_dof", "irb120", "ar4", "labvolt_5150"])
@@ -21,7 +21,9 @@ def test_reach_is_that_of_brute_force(name: str) -> None:
     rng = np.random.default_rng(11)
     for _ in range(2):
         way = random_line(arm, rng)
-        columns = linked(arm, way.targets, np.linspace(0, way.length, 150), task=None, tolerance=0.05, near=arm.home)
+        columns = link_branches(
+            arm, way.targets, np.linspace(0, way.length, 150), task=None, tolerance=0.05, near=arm.home
+        )
         all_ = chains(arm, columns)
         mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
         dense = np.linspace(0, way.length, 401)
@@ -39,7 +41,9 @@ def test_the_tip_stays_within_the_tolerance_between_samples(name: str) -> None:
     rng = np.random.default_rng(3)
     for _ in range(8):
         way = random_line(arm, rng)
-        columns = linked(arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home)
+        columns = link_branches(
+            arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home
+        )
         for chain in chains(arm, columns):
             if len(chain.q) < 2:
                 continue

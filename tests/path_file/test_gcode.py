@@ -13,7 +13,7 @@ import armkin
 from armkin.errors import PathFileError, UsageError
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.target_numbers import targets_in
-from armkin.motion.tool_path.drawing_frame import placing
+from armkin.motion.tool_path.drawing_frame import place_drawing
 from armkin.path_file import gcode, gcode_arcs
 from armkin.path_file.drawing import DrawingOptions, Placing
 from command_line import run
@@ -244,7 +244,7 @@ def test_the_plan_draws_what_the_program_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize("robot", ["irb120", "wx250s", "labvolt_5150", "xarm6", "so101"])
 def test_the_tool_points_against_the_drawing(robot: str) -> None:
     arm = armkin.load(robot)
-    place = placing(arm, [300, 0, 50])
+    place = place_drawing(arm, [300, 0, 50])
     definition = task_for(arm, None)
     target = targets_in(definition.labels, [[*(0.25 * arm.reach, 0.0, 0.2 * arm.reach), *place.orientation]])
     found = armkin.ik(arm, target[0])
@@ -254,7 +254,7 @@ def test_the_tool_points_against_the_drawing(robot: str) -> None:
 
 def test_a_tilt_that_a_pitch_cannot_hold_is_refused() -> None:
     with pytest.raises(UsageError, match="without a tilt"):
-        placing(armkin.load("labvolt_5150"), [300, 0, 50, 20, 0, 0], task="xyz_pitch_roll")
+        place_drawing(armkin.load("labvolt_5150"), [300, 0, 50, 20, 0, 0], task="xyz_pitch_roll")
 
 
 def test_lines_that_are_read_in_one_step_are_read_as_word_by_word(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -293,7 +293,7 @@ def test_an_arc_without_radius_draws_nothing() -> None:
 
     def planned(text: str) -> float:
         return armkin.path(
-            arm, gcode.parse(text.encode(), "t.gcode", placing(arm, [330, -10, 250]), DrawingOptions())
+            arm, gcode.parse(text.encode(), "t.gcode", place_drawing(arm, [330, -10, 250]), DrawingOptions())
         ).length
 
     with pytest.raises(UsageError, match=r"t\.gcode:1: .*its points are all the same"):

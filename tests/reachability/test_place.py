@@ -17,7 +17,7 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.motion import path_redundant
 from armkin.reachability import place_path, place_targets, place_upright
 from armkin.reachability import place_search as places
-from armkin.reachability.place_arm import Around, standing
+from armkin.reachability.place_arm import Around, arm_at_place
 from command_line import ROOT, run
 from interrupted import interrupted
 
@@ -223,7 +223,7 @@ def test_a_path_of_seven_joints_is_carried_where_path_plans_it(said: str, step: 
     for some in (np.argwhere(whole), np.argwhere(~whole & (found.reached > 0))):
         assert len(some)
         for i, j, k in rng.permutation(some)[:4].tolist():
-            stands = standing(arm, Around(), (float(found.x[i]), float(found.y[j]), 0.0), float(found.yaw[k]))
+            stands = arm_at_place(arm, Around(), (float(found.x[i]), float(found.y[j]), 0.0), float(found.yaw[k]))
             try:
                 armkin.path(stands, path)
                 planned = True

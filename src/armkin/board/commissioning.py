@@ -61,7 +61,9 @@ def directions(board: Board, person: Operator) -> set[int]:
     _able_to_jog(board, person)
     person.say("Directions: hold + to move a joint by up to 2 degrees (mm), - to take it back; Enter when you saw it.")
     for j, name in enumerate(arm.joint_names):
-        person.say(f"{name}, +: {_expected(arm, board.machine.joints() if _position_text(board) else arm.home, j)}")
+        person.say(
+            f"{name}, +: {_expected_motion(arm, board.machine.joints() if _position_known(board) else arm.home, j)}"
+        )
         board.machine.refresh()
         place = float(board.machine.joints()[j])
         while True:
@@ -93,8 +95,8 @@ def zeros(board: Board, person: Operator, *, forget: bool = False) -> dict[int, 
         return dict(enumerate(np.rint(counts).astype(int).tolist()))
     _able_to_jog(board, person)
     machine.refresh()
-    if _position_text(board):
-        person.say(f"Zeros: the board knows where the arm stands: {_standing(board)}.")
+    if _position_known(board):
+        person.say(f"Zeros: the board knows where the arm stands: {_position_in_words(board)}.")
         if person.ask("Does it stand so? y yes, n no", "yn") == "n":
             raise UsageError(
                 "the board has another position than the arm stands in: home it (armkin home), or switch the board off "
@@ -149,7 +151,7 @@ def pad(board: Board, person: Operator, *, narrower: bool = False) -> dict[int, 
             person.say(f"{arm.joint_names[chosen]} is chosen.")
         elif key in "+-" and (more := person.held(key)) is not None:
             _jog(board, person, chosen, 1 if key == "+" else -1, _LONGEST, more)
-            person.say(_standing(board))
+            person.say(_position_in_words(board))
         elif narrower and key in "[]":
             _narrow(board, person, found, chosen, upper=key == "]")
     return found
@@ -222,11 +224,11 @@ def _jog(board: Board, person: Operator, j: int, sign: int, seconds: float, goes
     board.machine.refresh()
 
 
-def _position_text(board: Board) -> bool:
+def _position_known(board: Board) -> bool:
     return board.machine.position() != "lost"
 
 
-def _standing(board: Board) -> str:
+def _position_in_words(board: Board) -> str:
     """Where the arm stands, in words."""
     q = where_arm_stands(board.machine)["joints"]
     if q is None:
@@ -234,7 +236,7 @@ def _standing(board: Board) -> str:
     return ", ".join(f"{name} = {value:.2f}" for name, value in zip(board.arm.joint_names, q, strict=True))
 
 
-def _expected(arm: Arm, q: Array, j: int) -> str:
+def _expected_motion(arm: Arm, q: Array, j: int) -> str:
     """What 2 degrees (mm) of a joint do, in the base's frame: ``the tool goes 6.9 mm towards +y``."""
     J = jacobian(arm, q)[:, j] * float(units.joints_in(arm, [STEP] * arm.n)[j])
     shift = J[:3]

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from armkin.board.backend import StoppedError
-from armkin.board.ports import LOG, traced
+from armkin.board.ports import LOG, with_log
 from armkin.errors import ArmkinError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def open_board(
 
     stop: asked all the time; when it says yes, the arm is held and StoppedError raised.
     """
-    link = traced(board.open(port, baud, reset=reset))
+    link = with_log(board.open(port, baud, reset=reset))
     try:
         LOG.info("%s opens %s as %s", board.arm.name, port, board.called)
         machine = board.connect(link, stop)

@@ -15,7 +15,7 @@ from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units
 from armkin.motion.path_planner import HOLD
-from armkin.motion.rounded_waypoints import rounded
+from armkin.motion.rounded_waypoints import round_waypoints
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motors import joints, motor_names, pulse_units, pulses
 
@@ -45,7 +45,7 @@ class Planner:
         if not self.blend:
             return self.board.plan(start, q, self.speed)
         counts = np.asarray(start, dtype=np.int64)
-        way = rounded(self.arm, joints(self.arm, counts), q, self.blend, speed=self.speed, hold=HOLD)
+        way = round_waypoints(self.arm, joints(self.arm, counts), q, self.blend, speed=self.speed, hold=HOLD)
         return self.board.lay(way, counts)
 
     def noted(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.calibration import observability
 from armkin.calibration.corrected_chain import KINDS, model
-from armkin.calibration.dropped_rows import dropped
+from armkin.calibration.dropped_rows import dropped_row_numbers
 from armkin.calibration.measurement_checks import check
 from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
 from armkin.calibration.robust_fit import Measured
@@ -130,7 +130,7 @@ def calibrate(
     data = _measured(arm, q, measured)
     check(arm, data)
     corrections = model(arm)
-    hold, held = holding(arm, fixed)
+    hold, held = fixed_corrections(arm, fixed)
     choice = choose(corrections, data, hold, tick)
     _must_explain(data, choice)
     found = choice.fit
@@ -148,10 +148,10 @@ def calibrate(
         level=LEVELS[choice.level],
         before=choice.errors[0],
         after=choice.errors[choice.level],
-        flagged=dropped(found.weights),
+        flagged=dropped_row_numbers(found.weights),
         noise=found.scale[0],
         corrections=listed,
-        unseen=observability.unseen(corrections, found),
+        unseen=observability.unseen_corrections(corrections, found),
         held=held,
     )
 
@@ -162,13 +162,13 @@ def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterabl
     q: (M, n) poses measured already; fix as in `calibrate`.
     """
     corrections = model(arm)
-    hold, _ = holding(arm, _kinds(fix))
+    hold, _ = fixed_corrections(arm, _kinds(fix))
     before = None if q is None else as_joints(arm, q).reshape(-1, arm.n)
     none = Measured(np.zeros((0, arm.n)), np.zeros((0, 3)))
     return observability.suggestions(corrections, count, free_at(corrections, len(LEVELS) - 1, none, hold), before)
 
 
-def holding(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
+def fixed_corrections(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
     """What is not corrected, kinds and single corrections, and the kinds that the arm's task holds, in words."""
     try:
         task = task_for(arm).name

@@ -44,7 +44,7 @@ def scales(position_residuals: Array, rotation_residuals: Array | None, fitted_n
     return max(size, FINEST[0]), max(turn, FINEST[1])
 
 
-def dropped(weights: Array) -> NDArray[np.intp]:
+def dropped_row_numbers(weights: Array) -> NDArray[np.intp]:
     """The rows, from 0, that a fit with these weights (M,) did without."""
     return np.flatnonzero(weights < DROPPED)
 

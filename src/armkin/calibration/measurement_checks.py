@@ -30,12 +30,12 @@ def check(arm: Arm, data: Measured) -> None:
     if len(data) < LEAST_ROWS:
         rows = "1 row is" if len(data) == 1 else f"{len(data)} rows are"
         raise UsageError(f"{rows} too few; measure at least {LEAST_ROWS}, better 20 to 60")
-    _moves(arm, data)
-    _spread(data)
-    _meaning(arm, data)
+    _check_motion(arm, data)
+    _check_spread(data)
+    _check_readings(arm, data)
 
 
-def _moves(arm: Arm, data: Measured) -> None:
+def _check_motion(arm: Arm, data: Measured) -> None:
     least = np.where(arm.prismatic, STILL[1], STILL[0])
     still = np.flatnonzero(np.ptp(data.c, axis=0) < least)
     if len(still):
@@ -53,7 +53,7 @@ def _moves(arm: Arm, data: Measured) -> None:
         )
 
 
-def _spread(data: Measured) -> None:
+def _check_spread(data: Measured) -> None:
     centred = data.position - np.median(data.position, axis=0)
     # The rows nearest the middle of the cloud: a wrong row alone would make a line look thick.
     near = np.argsort(np.linalg.norm(centred, axis=1))[: max(LEAST_ROWS, math.ceil(0.8 * len(centred)))]
@@ -72,7 +72,7 @@ class _Reading(NamedTuple):
     position: Array
 
 
-def _meaning(arm: Arm, data: Measured) -> None:
+def _check_readings(arm: Arm, data: Measured) -> None:
     """Units and columns: whether another reading of the rows fits far better than the one given."""
     expected = position(arm, data.c)
     size = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
@@ -97,7 +97,10 @@ def _axes_in_place(expected: Array, measured: Array, most: float, largest: float
     Measuring frames may stand anywhere, so `_readings` allows any rigid motion; these need none, and are tried first.
     """
     found = [
-        (_median_miss(expected, measured[:, order]), f"columns {_named(order)} of the measured points look like x y z")
+        (
+            _median_miss(expected, measured[:, order]),
+            f"columns {_axis_names(order)} of the measured points look like x y z",
+        )
         for order in itertools.permutations(range(3))
         if order != (0, 1, 2)
     ]
@@ -135,12 +138,12 @@ def _readings(arm: Arm, data: Measured) -> list[_Reading]:
         sign[j] = -1.0
         found.append(_Reading(f"{arm.joint_names[j]} looks commanded with the other sign", c * sign, x))
     for axes in ((0, 2, 1), (2, 1, 0), (1, 0, 2)):
-        says = f"columns {_named(axes)} of the measured points look like x y z"
+        says = f"columns {_axis_names(axes)} of the measured points look like x y z"
         found.append(_Reading(says, c, x[:, axes]))
     return found
 
 
-def _named(order: tuple[int, ...]) -> str:
+def _axis_names(order: tuple[int, ...]) -> str:
     return " ".join("xyz"[k] for k in order)
 
 

@@ -33,7 +33,7 @@ def doubts(model: Model, fit: Fit) -> Array:
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(fit.normal))) * model.prior[fit.free])
 
 
-def unseen(model: Model, fit: Fit) -> list[str]:
+def unseen_corrections(model: Model, fit: Fit) -> list[str]:
     """Corrections that the rows do not show, in words; those of which they show the sum stand together."""
     if not len(fit.free):
         return []

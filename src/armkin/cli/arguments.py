@@ -71,7 +71,7 @@ def standard_input(most: int, instead: str = "") -> bytes:
     return data
 
 
-def named(robot: str | None) -> str:
+def required_robot(robot: str | None) -> str:
     """The robot's name, which must be given."""
     if robot is None:
         raise UsageError("missing argument 'ROBOT': a robot file or the name of a shipped robot (armkin robots)")

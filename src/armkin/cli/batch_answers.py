@@ -12,7 +12,7 @@ from typing import IO, Any, NamedTuple, Protocol
 
 from armkin import __version__, files
 from armkin.cli import output
-from armkin.cli.batch_pieces import Piece, Rows, parsed
+from armkin.cli.batch_pieces import Piece, Rows, parse_piece
 from armkin.cli.render import to_json
 from armkin.cli.row_chunks import Chunk
 from armkin.columns.csv_cells import csv_line
@@ -98,7 +98,7 @@ class Done(NamedTuple):
 def _well_formed(piece: Piece, malformed: list[UsageError]) -> Iterator[Chunk]:
     """The rows of a piece up to a malformed one, what is wrong with which is appended."""
     try:
-        yield from parsed(piece)
+        yield from parse_piece(piece)
     except UsageError as error:
         malformed.append(error)
 

@@ -114,7 +114,7 @@ class Rows:
                 number, first = number + 1, first + csv_to_numbers.count(block)
 
 
-def parsed(piece: Piece) -> Iterator[Chunk]:
+def parse_piece(piece: Piece) -> Iterator[Chunk]:
     """The rows of a piece; a malformed one raises UsageError, after those before it were given out."""
     if piece.values is not None:
         yield from _checked(piece, piece.values)

@@ -99,7 +99,7 @@ def backend(
         try:
             yield one
         except StoppedError:
-            output.warn(f"stopped: {one.standing()}{_goes_on(one)}")
+            output.warn(f"stopped: {one.standing_text()}{_goes_on(one)}")
             raise
 
 
@@ -139,7 +139,7 @@ def progress(plans: Sequence[Planned], note: Callable[[float], None]) -> Iterato
         yield tell
 
 
-def held(board: Board, resume: bool) -> Any:
+def resumed_note(board: Board, resume: bool) -> Any:
     """The note of the motion that `--resume` goes on with; None without that option."""
     return board.recall() if resume else None
 
@@ -151,20 +151,20 @@ def board_of(arm: Arm, *, rehearsal: bool = False) -> Board:
     return kinds.board_of(arm, rehearsal=rehearsal)
 
 
-def rehearsed(arm: Arm, port: str | None, *, quiet: bool = False) -> Arm:
+def arm_for_port(arm: Arm, port: str | None, *, quiet: bool = False) -> Arm:
     """The arm for a port: on `sim` alone with motors and rates that its file does not state, which are named."""
     if port != SIM:
         return arm
-    from armkin.board.backend.assumptions import assumed
+    from armkin.board.backend.assumptions import arm_with_assumptions
 
-    arm, made_up = assumed(arm)
+    arm, made_up = arm_with_assumptions(arm)
     if made_up and not quiet:
         words = "; ".join(made_up)
         output.note(f"assumed for the simulation alone, as {arm.path or arm.name} does not say: {words}")
     return arm
 
 
-def planned(arm: Arm) -> Arm:
+def arm_for_plan(arm: Arm) -> Arm:
     """The arm for a plan that moves nothing: with rates that its file does not state, which are named."""
     from armkin.board.backend.assumptions import with_rates
 
@@ -175,17 +175,17 @@ def planned(arm: Arm) -> Arm:
     return arm
 
 
-def simulated(assume: str | None) -> str:
+def simulation_note(assume: str | None) -> str:
     """What to say of a board in this process, which knows no position before."""
     return AT_HOME if assume in (None, "home") else "the simulated board forgets all at the end"
 
 
-def assumed(arm: Arm, text: str | None) -> Array | None:
+def assumed_joints(arm: Arm, text: str | None) -> Array | None:
     """`--assume`: joint values (n,) [rad | mm] where a lost arm stands, which are within its limits."""
-    return None if text is None else standing(arm, text, "--assume")
+    return None if text is None else standing_joints(arm, text, "--assume")
 
 
-def standing(arm: Arm, text: str, option: str) -> Array:
+def standing_joints(arm: Arm, text: str, option: str) -> Array:
     """Joint values (n,) [rad | mm] where an arm stands or a plan begins; NoSolutionError outside its limits."""
     from armkin.model.limits import check_limits
 

@@ -37,9 +37,9 @@ def marked(arm: Arm, ignore: bool) -> Arm:
         return arm
     from dataclasses import replace
 
-    from armkin.keep_out.clearance import assumed
+    from armkin.keep_out.clearance import assumed_radii
 
-    if guessed := assumed(arm):
+    if guessed := assumed_radii(arm):
         names = ", ".join(name for name, _ in guessed)
         output.note(f"no file states the radius of {names}: {guessed[0][1]:.4g} mm are assumed, 2 % of the reach")
     return replace(arm, ignores_keep_out=True) if ignore else arm

@@ -32,7 +32,7 @@ def record(
     """
     from armkin.robot_file import parse
     from armkin.robot_file.catalogue import locate
-    from armkin.robot_file.replace_values import replaced
+    from armkin.robot_file.replace_values import with_values
 
     arm = board.arm
     q = None if pose is None else units.joints_in(arm, arguments.joint_list(arm, pose, "--pose"))
@@ -45,7 +45,7 @@ def record(
         raise
     port = check(found)
     if out is not None:
-        text = replaced(Path(locate(robot)).read_text(encoding="utf-8"), found.edits)
+        text = with_values(Path(locate(robot)).read_text(encoding="utf-8"), found.edits)
         parse(text, out)  # nothing is written that no command would take
         with output.destination(out) as write:
             write(text)

@@ -84,7 +84,7 @@ def poses(
     """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
     if not words and (found := joint_values(robot, scene, tool)) is not None:
         return found
-    arm = arguments.load(arguments.named(robot), scene, tool)
+    arm = arguments.load(arguments.required_robot(robot), scene, tool)
     return arm, [arguments.joints(arm, words)]
 
 
@@ -120,7 +120,7 @@ def answers(
     """The arm, and the answers on standard input as data; None if there is a robot and nothing on standard input."""
     text = _text()
     if not text.strip():
-        arguments.named(robot)
+        arguments.required_robot(robot)
         return None
     try:
         parsed = [_parsed(part) for part in _parts(text)]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from armkin import forward
 from armkin.formula.arrays import Array
 from armkin.inverse.run.workers import shared
-from armkin.keep_out.clearance import Clearance, clearance, least, named
+from armkin.keep_out.clearance import Clearance, clearance, least, named_clearance
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -44,7 +44,7 @@ class JointFunctions:
         if self._clearances is None or not np.isfinite(values).all():
             return clearance(self.arm, values)
         found = self._run(self._clearances, least, (2,), values, 1).reshape(-1, 2)
-        return named(self.arm, found[:, 0], found[:, 1].astype(np.intp), values.shape[:-1])
+        return named_clearance(self.arm, found[:, 0], found[:, 1].astype(np.intp), values.shape[:-1])
 
     def _run(
         self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int

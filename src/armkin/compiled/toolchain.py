@@ -149,7 +149,7 @@ def _digest(content: bytes) -> str:
 
 def _folder() -> Path | None:
     """The cache folder, made if need be; None if it is not this user's alone."""
-    folder = user_folders.compiled()
+    folder = user_folders.compiled_folder()
     if folder is None:
         return None
     base = folder.parent.parent

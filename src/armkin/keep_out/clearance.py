@@ -63,10 +63,10 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
         return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], nothing[()], nothing[()])
     held = _guard(whole)
     mm, which = held.least(full)
-    return named(whole, mm, which, lead)
+    return named_clearance(whole, mm, which, lead)
 
 
-def named(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
+def named_clearance(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
     """Clearances (N,) of pairs (N,) with their names, in the shape of a batch."""
     held = _guard(arm)
     bodies, others = (np.array([held.pair_names(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
@@ -123,7 +123,7 @@ def _size(mm: float) -> str:
     return f"{mm:.1f} mm" if mm >= 0.05 else "less than 0.1 mm"
 
 
-def assumed(arm: Arm) -> list[tuple[str, float]]:
+def assumed_radii(arm: Arm) -> list[tuple[str, float]]:
     """Bodies whose radius no file states, and the radius [mm] that is taken: none for an arm without keep-outs."""
     whole = whole_arm(arm, np.empty((0, arm.n)))[0]
     if not whole.keep_out:

@@ -44,10 +44,10 @@ def load(
         from armkin.robot_file.scene_file import read
 
         around = read(scene)
-    return checked(file, around, tool)
+    return arm_in_scene(file, around, tool)
 
 
-def checked(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
+def arm_in_scene(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
     """The arm of a robot file and a scene. Raises RobotFileError if a keep-out is hit in every posture."""
     arm = build(file, scene, tool)
     if arm.keep_out:

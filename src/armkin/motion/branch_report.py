@@ -167,7 +167,7 @@ def _motion_fields(plan: PathPlan) -> dict[str, Any]:
 
 def _optional_fields(plan: PathPlan) -> dict[str, Any]:
     """Keys that a plan without such things does not have."""
-    said: dict[str, Any] = {"held": held(plan)} if plan.held else {}
+    said: dict[str, Any] = {"held": held_joint_values(plan)} if plan.held else {}
     if plan.turned is not None:
         said["turned_deg"] = float(np.rad2deg(plan.turned))
     if plan.passed:
@@ -215,7 +215,7 @@ def _singularity_fields(singularity: Passed) -> dict[str, Any]:
     }
 
 
-def held(plan: PathPlan) -> dict[str, float]:
+def held_joint_values(plan: PathPlan) -> dict[str, float]:
     """Joints that are held along a path, and where [deg | mm]."""
     return {name: _in_units(plan.arm, plan.arm.joint_names.index(name), value) for name, value in plan.held.items()}
 
@@ -229,7 +229,7 @@ def _in_units(arm: Arm, joint: int, value: float) -> float:
     return value if arm.prismatic[joint] else value / units.DEGREE
 
 
-def refused(plan: PathPlan, carried: Carried, branch: str | None = None) -> NoSolutionError:
+def path_refusal(plan: PathPlan, carried: Carried, branch: str | None = None) -> NoSolutionError:
     """The error of a path that is not carried, `branch` being asked for; `plan` of it tells the rest."""
     best, at = plan.branches[0] if plan.branches else None, None
     length = carried.route.length

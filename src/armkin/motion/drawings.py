@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
-from armkin.motion.tool_path.drawing_frame import placing
+from armkin.motion.tool_path.drawing_frame import place_drawing
 from armkin.path_file import PathFile, foreign, read_drawing
 from armkin.path_file.drawing import DrawingOptions
 
@@ -54,4 +54,4 @@ def drawing(
         raise UsageError(f"{name}: a drawing's name ends in .gcode, .gco, .nc, .ngc or .svg")
     if len(at) not in (3, 6):
         raise UsageError(f"at: where the drawing's zero lies is x y z, or x y z roll pitch yaw; got {len(at)} numbers")
-    return read_drawing(name, placing(arm, at, task=task, scale=scale), DrawingOptions(feed, lift, grip_by))
+    return read_drawing(name, place_drawing(arm, at, task=task, scale=scale), DrawingOptions(feed, lift, grip_by))

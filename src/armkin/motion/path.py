@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.path_planner import HOLD, PathRequest, planned
+from armkin.motion.path_planner import HOLD, PathRequest, plan_path
 from armkin.motion.path_redundant import path_redundant
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.tool_path import path_numbers
@@ -88,4 +88,4 @@ def path(
     file = path_numbers.moves(arm, moves, task)
     if (spare := redundancy(arm, task or file.task)) is not None and path_numbers.of_tool(file):
         return path_redundant(arm, file, spare, asked)
-    return planned(arm, file, asked)
+    return plan_path(arm, file, asked)

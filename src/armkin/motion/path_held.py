@@ -13,9 +13,9 @@ from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.model.lock_joints import lock, unlock
 from armkin.motion.joint_moves import approach, check_jerk, check_rates, straight
-from armkin.motion.path_planner import PathRequest, planned
+from armkin.motion.path_planner import PathRequest, plan_path
 from armkin.motion.plan.path_plan import PathPlan
-from armkin.motion.plan.trajectory_proof import checked
+from armkin.motion.plan.trajectory_proof import prove_plan
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed
@@ -47,7 +47,7 @@ def path_held(
     )
     of_free = replace(request, start=here[kept], near=near, jerk=jerk)
     try:
-        plan = planned(free, path_numbers.moves(free, moves, request.task), of_free)
+        plan = plan_path(free, path_numbers.moves(free, moves, request.task), of_free)
     except NoSolutionError as error:
         if error.plan is not None:
             error.plan = _of_all(error.plan, arm, held)
@@ -63,7 +63,7 @@ def path_held(
         whole.along(k + shift, made[k + shift], base)
     whole.approach = approach(arm, here, begun, *pace)
     markers = [replace(one, before=one.before + shift) for one in plan.markers]
-    return checked(whole.finished(begun, made, markers))
+    return prove_plan(whole.finished(begun, made, markers))
 
 
 def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:

@@ -13,7 +13,7 @@ from armkin.motion.move_kinds import MOVES
 from armkin.motion.path_planner import TOLERANCE, corners_wished
 from armkin.motion.plan_moves import PathOptions, Walk
 from armkin.motion.tool_path.path_pieces import line
-from armkin.motion.tool_path.route import joined
+from armkin.motion.tool_path.route import join_pieces
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -56,7 +56,7 @@ class _Outline(Walk):
     def _plan_group(self) -> None:
         if self.goal is not None:
             if self.pieces:
-                route, _ = joined(self.task, self.pieces, self.blends, frozenset(self.pauses), self.pace.tolerance)
+                route, _ = join_pieces(self.task, self.pieces, self.blends, frozenset(self.pauses), self.pace.tolerance)
                 even = np.linspace(0.0, route.length, max(int(np.ceil(route.length / self.step)) + 1, 3))
                 s = np.union1d(even, route.breaks)
                 self.targets_per_route.append(route.targets(s))

@@ -15,7 +15,7 @@ from armkin.motion.branches.branch_path import Pace
 from armkin.motion.joint_moves import check_jerk, check_share
 from armkin.motion.move_kinds import MOVES
 from armkin.motion.plan.path_plan import PathPlan
-from armkin.motion.plan.trajectory_proof import checked
+from armkin.motion.plan.trajectory_proof import prove_plan
 from armkin.motion.plan_moves import PathOptions, Walk
 from armkin.motors import legal_with_same_pulses, undriven
 
@@ -51,7 +51,7 @@ class PathRequest:
         return arm.home if self.start is None else np.asarray(self.start, dtype=float)
 
 
-def planned(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
+def plan_path(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
     """`armkin.path` of an arm none of whose joints is redundant, and whose rates are checked: as that says."""
     from armkin.path_file import check_robot
 
@@ -65,7 +65,7 @@ def planned(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
     near = None if request.near is None else np.asarray(request.near, dtype=float)
     wish = corners_wished(file, request.corners, request.blend)
     options = PathOptions(request.task, wish, near, request.branch, request.split, request.samples)
-    return checked(Walk(arm, file, pace, here, options).walked(MOVES))
+    return prove_plan(Walk(arm, file, pace, here, options).walked(MOVES))
 
 
 def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:

@@ -22,8 +22,8 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, outside_text
 from armkin.motion import branch_report
 from armkin.motion.branches.branch_path import Pace, carry, starts_at, stretches
-from armkin.motion.branches.route_grid import Missed, deviation, missed
-from armkin.motion.branches.wrist_window import detoured
+from armkin.motion.branches.route_grid import Missed, deviation, largest_miss
+from armkin.motion.branches.wrist_window import with_detours
 from armkin.motion.joint_moves import approach, straight
 from armkin.motion.plan.path_plan import Marker, PathPlan
 from armkin.motion.timing.curved_stretch import Curve
@@ -34,7 +34,7 @@ from armkin.motion.tool_path import path_numbers, path_pieces
 from armkin.motion.tool_path.dense_points import FIT, PLAN, Polyline
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
 from armkin.motion.tool_path.path_pieces import Piece, Spot
-from armkin.motion.tool_path.route import Reduced, joined
+from armkin.motion.tool_path.route import Reduced, join_pieces
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -244,7 +244,7 @@ class Walk:
             return
         tolerance = self.pace.tolerance
         pauses = frozenset(self.pauses)
-        route, order = joined(self.task, self.pieces, self.blends, pauses, FIT * tolerance, self.plan.reduced)
+        route, order = join_pieces(self.task, self.pieces, self.blends, pauses, FIT * tolerance, self.plan.reduced)
         if route.length < path_pieces.SMALL:
             raise UsageError("the tool's way has no length: its points are all the same")
         free = self.goal is not None
@@ -255,7 +255,7 @@ class Walk:
             curves, given = _curves(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
                 self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
-            self.append_curves(detoured(route, run.chain.windows), curves, order, given)
+            self.append_curves(with_detours(route, run.chain.windows), curves, order, given)
             near = self.q
         for kind, value in self.pauses.get(len(self.pieces), ()):
             self.emit_event(kind, value)
@@ -272,7 +272,7 @@ class Walk:
         )  # fmt: skip
         branch_report.note(self.plan, carried, near)
         if not carried.whole and not (self.options.split and carried.covered):
-            raise branch_report.refused(self.plan, carried, branch)
+            raise branch_report.path_refusal(self.plan, carried, branch)
         return carried.columns.s, carried.moving
 
     def append_curves(
@@ -314,7 +314,7 @@ def _curves(
     for share in PLAN:
         tight = replace(pace, tolerance=share * pace.tolerance)
         made = stretches(arm, route, s, run, near, tight, fixed=fixed)
-        given = missed(arm, route, ways_of(made))
+        given = largest_miss(arm, route, ways_of(made))
         off = 0.0 if given is None else given[0]
         if off <= pace.tolerance:
             return made, given

@@ -11,7 +11,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.model.limits import check_limits
-from armkin.motion.branches.branch_path import coupled
+from armkin.motion.branches.branch_path import coupled_motors
 from armkin.motion.joint_moves import check_rates
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _NODES = 12  # grid points of a line, and of a corner
 
 
-def rounded(
+def round_waypoints(
     arm: Arm,
     start: ArrayLike,
     targets: ArrayLike,
@@ -44,7 +44,7 @@ def rounded(
     >>> import armkin, numpy as np
     >>> arm = armkin.load("three_dof")
     >>> corners = np.deg2rad([[20, 90, -90], [20, 70, -90], [0, 70, -90]])
-    >>> round(rounded(arm, arm.home, corners, 10.0).duration, 2) < 2.0
+    >>> round(round_waypoints(arm, arm.home, corners, 10.0).duration, 2) < 2.0
     True
     """
     check_rates(arm)
@@ -63,7 +63,7 @@ def rounded(
     if hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
         cap = hold_cap(arm, path, hold)
     bounds = Bounds(arm.max_speed * speed, arm.max_accel * accel, cap)
-    x = optimal(path, bounds, coupled(arm, accel))
+    x = optimal(path, bounds, coupled_motors(arm, accel))
     return Trajectory(arm, first, (Curve(path, x, len(goals)),))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints, position
-from armkin.motion.branches.branch_path import coupled
+from armkin.motion.branches.branch_path import coupled_motors
 from armkin.motion.joint_moves import check_rates
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
@@ -76,7 +76,7 @@ def time_law(
     if hold is not None:
         cap = np.minimum(cap, hold_cap(arm, path, hold))
     limits: Array = arm.max_accel * accel
-    curve = Curve(path, optimal(path, Bounds(arm.max_speed * speed, limits, cap), coupled(arm, accel)))
+    curve = Curve(path, optimal(path, Bounds(arm.max_speed * speed, limits, cap), coupled_motors(arm, accel)))
     made: Curve | Smoothed = curve
     if jerk is not None:
         made = Smoothed(curve, window(limits, jerk))

@@ -32,7 +32,7 @@ def parse(raw: bytes, name: str) -> PathFile:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise PathFileError(f"{name}: is not UTF-8 text", file=name) from None
-    rows = _filled(text, name)
+    rows = _filled_rows(text, name)
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
     header, rows = _header_and_rows(rows, name)
@@ -73,7 +73,7 @@ def _header(cells: list[str], name: str) -> list[str]:
     return header
 
 
-def _filled(text: str, name: str) -> list[Row]:
+def _filled_rows(text: str, name: str) -> list[Row]:
     """Rows that are neither empty nor a comment, with their numbers: at most a header, and one too many."""
     lines = csv.reader(io.StringIO(text))
     filled = (
@@ -88,7 +88,7 @@ def _filled(text: str, name: str) -> list[Row]:
         raise PathFileError(f"{name}:{line}: no row of numbers: {error}", file=name, line=line) from None
 
 
-def _named(header: list[str] | None, row: list[str], line: tuple[str, int]) -> dict[str, float]:
+def _numbers_by_column(header: list[str] | None, row: list[str], line: tuple[str, int]) -> dict[str, float]:
     """A row's numbers by their columns, by their places without a header; an empty cell of an option is none."""
     values: dict[str, float] = {}
     for i, cell in enumerate(row):
@@ -106,7 +106,7 @@ def _named(header: list[str] | None, row: list[str], line: tuple[str, int]) -> d
 
 
 def _move(header: list[str] | None, row: list[str], *, first: bool, line: tuple[str, int]) -> Move:
-    named = _named(header, row, line)
+    named = _numbers_by_column(header, row, line)
     extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
     if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < LEAST_TOOL_SPEED:
         raise PathFileError(

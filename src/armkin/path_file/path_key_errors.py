@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from armkin.path_file.path_keys import EXAMPLES, KINDS, Arc, Circle, Move, Offset, PathFile, Start
-from armkin.robot_file.robot_key_errors import shown
+from armkin.robot_file.robot_key_errors import value_text
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
@@ -69,7 +69,7 @@ def _text(place: Place, error: Any) -> str:
     if words is not None:
         return words(names, error)
     example = next((EXAMPLES[name] for name in reversed(names) if name in EXAMPLES), None)
-    return f"is {shown(error['input'])}" + (f"; for example {example}" if example else f": {error['msg'].lower()}")
+    return f"is {value_text(error['input'])}" + (f"; for example {example}" if example else f": {error['msg'].lower()}")
 
 
 def _unknown(names: list[str], error: Any) -> str:
@@ -85,7 +85,7 @@ def _missing(names: list[str], error: Any) -> str:
 
 
 def _bound(sign: str, key: str) -> Words:
-    return lambda names, one: f"must be {sign} {one['ctx'][key]:g}, not {shown(one['input'])}"
+    return lambda names, one: f"must be {sign} {one['ctx'][key]:g}, not {value_text(one['input'])}"
 
 
 def _length(names: list[str], error: Any) -> str:

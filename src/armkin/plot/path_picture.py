@@ -126,7 +126,7 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     way = _way(plan)
     small = float((np.nanmax(way, axis=0) - np.nanmin(way, axis=0)).max()) if len(way) else size
     large = small >= _SMALL * size
-    way = _thinned(way, _FINE * (size if large else small))
+    way = _thin_out(way, _FINE * (size if large else small))
     low, high = (0.03, 0.76) if large else (0.37, 0.44)
     axes = space(figure, (0.0, low, 0.53, high), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
     for name, bone, colour, width, dashes in bones:
@@ -158,7 +158,7 @@ def _way(plan: PathPlan) -> Array:
     return np.concatenate(parts) if parts else np.zeros((0, 3))
 
 
-def _thinned(way: Array, close: float) -> Array:
+def _thin_out(way: Array, close: float) -> Array:
     """A way (N, 3) of very many points without those that lie in the same small box as the one before."""
     if len(way) <= _MANY:
         return way

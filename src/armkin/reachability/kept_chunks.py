@@ -25,7 +25,7 @@ Chunk = TypeVar("Chunk", bound=Numbered)
 
 
 @contextmanager
-def holding(parts: Parts | None, count: int) -> Iterator[None]:
+def hold_parts(parts: Parts | None, count: int) -> Iterator[None]:
     """Hold the parts of a file that is made of `count` chunks: one alone is not worth it."""
     if parts is not None and count > 1:
         parts.begin()
@@ -46,7 +46,7 @@ def tables(
     """Number and columns of all chunks, in any order: those that an earlier run has kept, and the others, kept now."""
     kept: deque[int] = deque()
 
-    def missing() -> Iterator[Chunk]:
+    def missing_chunks() -> Iterator[Chunk]:
         for chunk in chunks:
             if parts is not None and parts.held and parts.about(chunk.number) is not None:
                 kept.append(chunk.number)
@@ -58,7 +58,7 @@ def tables(
             number = kept.popleft()
             yield number, npz.decoded(parts.read(number))
 
-    for number, columns in in_order(engine, work, job, missing()):
+    for number, columns in in_order(engine, work, job, missing_chunks()):
         if parts is not None and parts.held:
             parts.keep(number, {}, npz.encoded(columns))
         yield number, columns

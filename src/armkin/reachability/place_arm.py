@@ -57,7 +57,7 @@ def free(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn
 
     None does where the base's axis goes into an obstacle: a base may stand on one, but not in it.
     """
-    stands = _standing(arm, obstacles, position, turn)
+    stands = _arm_among_obstacles(arm, obstacles, position, turn)
     held = guard(stands)
     base = held.bodies.owner == 0
     begin, end = held.bodies.begin[base].T, held.bodies.end[base].T
@@ -67,12 +67,12 @@ def free(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn
 
 
 @lru_cache(maxsize=4)
-def _standing(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float) -> Arm:
+def _arm_among_obstacles(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, among what stands with the targets."""
     return replace(_moved_arm(arm, position, turn), keep_out=obstacles.keep_out, clearance=obstacles.clearance)
 
 
-def standing(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float) -> Arm:
+def arm_at_place(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, with its own keep-outs, which move with it, and what stands there."""
     mine = tuple(_moved_entry(entry, position, turn) for entry in arm.keep_out)
     clearance = max(arm.clearance, obstacles.clearance)

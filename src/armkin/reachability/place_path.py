@@ -13,7 +13,7 @@ import numpy as np
 from armkin import path_file
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.reachability.place_arm import Around, standing
+from armkin.reachability.place_arm import Around, arm_at_place
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -54,7 +54,7 @@ def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
     return task, [np.asarray(each) for each in found]
 
 
-def held(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
+def joint_to_hold(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
     """The joint that a path's plan holds, and where it may [rad], as `armkin.path` asks them; "": none."""
     from armkin.inverse.solvers.redundant import redundancy
     from armkin.motion.path_redundant import values_to_hold
@@ -63,7 +63,7 @@ def held(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
     return ("", ()) if spare is None else (arm.joint_names[spare.joint], values_to_hold(arm, file, spare))
 
 
-def unplanned(arm: Arm) -> str:
+def rates_lacking(arm: Arm) -> str:
     """Why no path of an arm can be planned: the joints' rates that its file lacks; "" where it has them."""
     from armkin.motion.joint_moves import check_rates
 
@@ -87,6 +87,6 @@ def plan(
 
     anyones = file.model_copy(update={"robot": None})  # another robot may stand in for the one that it was made for
     try:
-        return Planned(index, path(standing(arm, obstacles, position, turn), anyones))
+        return Planned(index, path(arm_at_place(arm, obstacles, position, turn), anyones))
     except NoSolutionError as error:
         return Planned(index, None, str(error).splitlines()[0])

@@ -197,7 +197,7 @@ def place_several(
     work_list = _chunks(asked, [axes for axes, _ in grids])
     parts, done, total = _parts(asked, settings, out), 0, sum(len(chunk.positions) for chunk in work_list)
     counts: dict[int, NDArray[np.int64]] = {}
-    with kept_chunks.holding(parts, len(work_list)):
+    with kept_chunks.hold_parts(parts, len(work_list)):
         for number, columns in kept_chunks.tables(engine, work, asked, work_list, parts):
             counts[number] = np.asarray(columns["reached"])
             done += len(work_list[number].positions)
@@ -256,7 +256,7 @@ def _with_postures(question: Question, place: Place) -> Place:
 
 def _planned(question: Question, place: Place, file: PathFile, room: Room) -> Place:
     """The same with the best places planned; one that cannot be planned does not reach all."""
-    if why := place_path.unplanned(question.arm):
+    if why := place_path.rates_lacking(question.arm):
         return replace(place, unplanned=why)
     tried: list[Planned] = []
     left = place.reached.copy()
@@ -284,7 +284,7 @@ def _question(
     else:
         task, each_way = place_path.ways(arm, file)
         targets, ways = np.concatenate(each_way), tuple(map(len, each_way))
-        spare, held = place_path.held(arm, file)
+        spare, held = place_path.joint_to_hold(arm, file)
     arm, around = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
     values, *_ = read_targets(task, targets)

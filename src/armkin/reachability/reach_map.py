@@ -209,7 +209,7 @@ class _Run:
         kept: dict[int, Table] = {}
         cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
         keep = self.parts is None or cells <= KEEP
-        with kept_chunks.holding(self.parts, len(all_chunks)):
+        with kept_chunks.hold_parts(self.parts, len(all_chunks)):
             for number, columns in kept_chunks.tables(self.engine, work, self.question, all_chunks, self.parts):
                 self._count(all_chunks[number], columns)
                 if keep:

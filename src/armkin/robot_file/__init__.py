@@ -141,5 +141,5 @@ def _place_text(path: strict_yaml.Path, data: dict[str, Any]) -> str:
     while path and isinstance(path[-1], int):  # the line is the item's; its number says nothing
         path = path[:-1]
     if path:
-        words.append(".".join(strict_yaml.shown(str(part)) for part in path))
+        words.append(".".join(strict_yaml.one_line(str(part)) for part in path))
     return "".join(f"{word}: " for word in words)

@@ -10,13 +10,13 @@ import yaml
 Path = tuple[str | int, ...]
 
 
-def replaced(text: str, values: Mapping[Path, float | int | str]) -> str:
+def with_values(text: str, values: Mapping[Path, float | int | str]) -> str:
     """A robot file's text with values replaced, or added at the end of the mapping where the key is missing.
 
     values: where -> what, as ``("joints", 0, "drive", "zero"): 2048``. Raises KeyError for a path whose mapping is
     not there.
 
-    >>> replaced("a: {b: 1}  # one", {("a", "b"): 2, ("a", "c"): 3})
+    >>> with_values("a: {b: 1}  # one", {("a", "b"): 2, ("a", "c"): 3})
     'a: {b: 2, c: 3}  # one'
     """
     root = yaml.compose(text, Loader=yaml.SafeLoader)

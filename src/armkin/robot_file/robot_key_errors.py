@@ -147,9 +147,9 @@ def _text(error: Any) -> str:
     kind, path, value = error["type"], error["loc"], error["input"]
     context = error.get("ctx", {})
     if path and path[-1] in ("sign", "direction"):
-        return f"must be 1 or -1, not {shown(value)}"
+        return f"must be 1 or -1, not {value_text(value)}"
     if kind in _BOUNDS:
-        text = f"{_BOUNDS[kind].format(**context)}, not {shown(value)}"
+        text = f"{_BOUNDS[kind].format(**context)}, not {value_text(value)}"
         other = path[-1] in ("gear", "pulley") and value < 0
         return f"{text}; for the other direction write invert: true" if other else text
     words = _WORDS.get(kind)
@@ -173,7 +173,7 @@ def _too_short(path: Path, value: Any, context: Any) -> str:
 
 
 def _another_type(path: Path, value: Any, context: Any) -> str:
-    return f"must be {_example(path)}, not {shown(value)}"
+    return f"must be {_example(path)}, not {value_text(value)}"
 
 
 def _not_a_number(what: str, path: Path, value: Any) -> str:
@@ -182,7 +182,7 @@ def _not_a_number(what: str, path: Path, value: Any) -> str:
         what += " or teeth {motor: 16, joint: 80}"
     if whole and isinstance(value, float) and value.is_integer():
         return f"must be {what}, not {value}; write {value:.0f}"
-    text = f"must be {what}, not {shown(value)}"
+    text = f"must be {what}, not {value_text(value)}"
     return f"{text}{_instead(path[-1], value)}" if isinstance(value, str) else text
 
 
@@ -289,7 +289,7 @@ def _first_sentence(owner: type[BaseModel], key: str) -> str:
     return first[:1].lower() + first[1:]
 
 
-def shown(value: Any) -> str:
+def value_text(value: Any) -> str:
     """A value as the file's author would recognise it, on one short line."""
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -299,7 +299,7 @@ def shown(value: Any) -> str:
         return "a mapping" if value else "an empty mapping {}"
     if isinstance(value, tuple | list):
         return "a list" if value else "an empty list []"
-    return f"the text '{strict_yaml.shown(str(value))}'"
+    return f"the text '{strict_yaml.one_line(str(value))}'"
 
 
 _BOUNDS = {
@@ -321,14 +321,14 @@ _WORDS: dict[str, Callable[[Path, Any, Any], str]] = {
     "float_type": lambda path, value, _context: _not_a_number("a number", path, value),
     "int_type": lambda path, value, _context: _not_a_number("a whole number", path, value),
     "string_type": lambda _path, value, _context: (
-        f'must be text, not {shown(value)}; write "{shown(value)}" in quotes if that is meant'
+        f'must be text, not {value_text(value)}; write "{value_text(value)}" in quotes if that is meant'
     ),
-    "bool_type": lambda _path, value, _context: f"must be true or false, not {shown(value)}",
+    "bool_type": lambda _path, value, _context: f"must be true or false, not {value_text(value)}",
     "literal_error": lambda _path, value, context: _not_a_choice(
-        str(value), context["expected"].replace("'", ""), shown(value)
+        str(value), context["expected"].replace("'", ""), value_text(value)
     ),
     "string_pattern_mismatch": lambda _path, value, _context: (
-        f"{shown(value)} is not a name: letters, digits, _ . and -, beginning with a letter"
+        f"{value_text(value)} is not a name: letters, digits, _ . and -, beginning with a letter"
     ),
     "string_too_long": lambda _path, _value, context: f"is longer than {context['max_length']} characters",
     "string_too_short": lambda _path, _value, _context: "is empty",

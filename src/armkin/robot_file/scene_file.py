@@ -79,8 +79,8 @@ def _place_text(path: strict_yaml.Path) -> str:
     key, rest = path[0], path[1:]
     if rest and isinstance(rest[0], int):
         key, rest = f"{key} {rest[0] + 1}", rest[1:]
-    inner = ".".join(strict_yaml.shown(str(part)) for part in rest if not isinstance(part, int))
-    return f"{strict_yaml.shown(str(key))}: " + (f"{inner}: " if inner else "")
+    inner = ".".join(strict_yaml.one_line(str(part)) for part in rest if not isinstance(part, int))
+    return f"{strict_yaml.one_line(str(key))}: " + (f"{inner}: " if inner else "")
 
 
 def _refuse(name: str, problems: list[tuple[int, str]]) -> NoReturn:

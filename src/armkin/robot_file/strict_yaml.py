@@ -257,11 +257,11 @@ def _refuse_what_unfolds(event: Any, line: int) -> None:
     """Raise StrictYamlError for an anchor, an alias or a tag."""
     if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
         mark = "*" if isinstance(event, yaml.AliasEvent) else "&"
-        what = f"{mark}{shown(event.anchor)}: anchors and aliases are refused, as they can unfold"
+        what = f"{mark}{one_line(event.anchor)}: anchors and aliases are refused, as they can unfold"
         hint = f"write the value out, or quote text that begins with {mark}"
         raise StrictYamlError(line, f"{what} without bound; {hint}")
     if getattr(event, "tag", None) is not None:
-        what = f"tag {shown(event.tag)} is refused: values are plain numbers, text, lists and mappings"
+        what = f"tag {one_line(event.tag)} is refused: values are plain numbers, text, lists and mappings"
         raise StrictYamlError(line, f"{what}; remove the tag")
 
 
@@ -269,7 +269,7 @@ def _mapping(value: Any, lines: dict[Path, int], kind: Kind) -> dict[str, Any]:
     """The document's value, which is a mapping."""
     if isinstance(value, dict):
         return value
-    found = "a list" if isinstance(value, tuple) else f"only the text {shown(str(value))}"
+    found = "a list" if isinstance(value, tuple) else f"only the text {one_line(str(value))}"
     what = f"{found}; a {kind.name} is a mapping: {kind.mapping}"
     raise StrictYamlError(lines[()], f"{what} (a space follows each colon)")
 
@@ -282,12 +282,12 @@ def _key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
         if not text:
             raise StrictYamlError(line, "a value without a key; write key: value")
         if not isinstance(_resolve(text, line), str):
-            raise StrictYamlError(line, f"key {shown(text)} is not a word; names need a letter, or quotes")
+            raise StrictYamlError(line, f"key {one_line(text)} is not a word; names need a letter, or quotes")
     _check_text(text, line)
     path = (*parent.path, text)
     if text in parent.items:
         first = lines[path]
-        raise StrictYamlError(line, f"key {shown(text)} stands twice, first on line {first}; keep one")
+        raise StrictYamlError(line, f"key {one_line(text)} stands twice, first on line {first}; keep one")
     lines[path] = line
     return text
 
@@ -301,7 +301,7 @@ def _scalar(event: Any, parent: _Node | None, line: int, kind: Kind) -> Any:
         if parent is None:
             raise StrictYamlError(0, kind.empty)
         if parent.mapping:
-            raise StrictYamlError(line, f"{shown(parent.key or '')} has no value; give one, or leave the key out")
+            raise StrictYamlError(line, f"{one_line(parent.key or '')} has no value; give one, or leave the key out")
         raise StrictYamlError(line, f"item {len(parent.items) + 1} of a list has no value; give one")
     value = _resolve(text, line)
     if isinstance(value, str):
@@ -327,12 +327,12 @@ def _resolve(text: str, line: int) -> str | int | float | bool:
 def _number(text: str, line: int) -> str | int | float:
     if re.fullmatch(_INT, text):
         if len(text) > MAX_DIGITS:
-            raise StrictYamlError(line, f"{shown(text)} has more than {MAX_DIGITS} digits; is it a number?")
+            raise StrictYamlError(line, f"{one_line(text)} has more than {MAX_DIGITS} digits; is it a number?")
         return int(text)
     if re.fullmatch(_FLOAT, text):
         value = float(text)
         if not math.isfinite(value):
-            raise StrictYamlError(line, f"{shown(text)} is too large for a number")
+            raise StrictYamlError(line, f"{one_line(text)} is too large for a number")
         return value
     if re.fullmatch(_NOT_FINITE, text):
         raise StrictYamlError(line, f"{text} is not a finite number; write one, or leave the key out for no bound")
@@ -347,22 +347,22 @@ def _refuse_what_misleads(text: str, line: int) -> None:
     if zeros := re.fullmatch(_LEADING_ZERO, text):
         rest = zeros[2].replace("_", "").lstrip("0")
         plain = zeros[1] + (rest if rest[:1].isdigit() else f"0{rest}")
-        what = f"{shown(text)} begins with 0, which YAML may read as octal"
-        raise StrictYamlError(line, f"{what}; write {shown(plain)}, or quotes for text")
+        what = f"{one_line(text)} begins with 0, which YAML may read as octal"
+        raise StrictYamlError(line, f"{what}; write {one_line(plain)}, or quotes for text")
     if re.fullmatch(_OTHER_BASE, text):
-        raise StrictYamlError(line, f"{shown(text)} is not decimal; write it in decimal, or in quotes")
+        raise StrictYamlError(line, f"{one_line(text)} is not decimal; write it in decimal, or in quotes")
     if "_" in text and re.fullmatch(_UNDERSCORE, text):
         plain = text.replace("_", "")
-        raise StrictYamlError(line, f"{shown(text)} has underscores; write {shown(plain)}")
+        raise StrictYamlError(line, f"{one_line(text)} has underscores; write {one_line(plain)}")
     if (near := re.fullmatch(_LIKE_FLOAT, text)) and (near[2] or near[3]):
         sign, whole, part, exponent_sign, exponent = near.groups()
         better = f"{sign.replace('+', '')}{whole or '0'}.{part or '0'}"
         if exponent:
             better += f"e{exponent_sign or '+'}{exponent}"
-        what = f"{shown(text)} is text to YAML, not a number"
-        raise StrictYamlError(line, f"{what}; write {shown(better)}, or quotes for text")
+        what = f"{one_line(text)} is text to YAML, not a number"
+        raise StrictYamlError(line, f"{what}; write {one_line(better)}, or quotes for text")
     if re.fullmatch(_TIMESTAMP, text):
-        raise StrictYamlError(line, f'{shown(text)} is a date to YAML; write "{text}" for text')
+        raise StrictYamlError(line, f'{one_line(text)} is a date to YAML; write "{text}" for text')
 
 
 def _sexagesimal(text: str) -> str:
@@ -372,7 +372,7 @@ def _sexagesimal(text: str) -> str:
         value = str(60 * large + small) if small < 60 else "text"
         motor, joint = sorted((large, small))  # a reduction, most likely
         return f"{text} is {value} to YAML; write teeth as {{motor: {motor}, joint: {joint}}}"
-    return f"{shown(text)} is a base-60 number to YAML; write a plain number, or quotes for text"
+    return f"{one_line(text)} is a base-60 number to YAML; write a plain number, or quotes for text"
 
 
 def _check_text(text: str, line: int) -> None:
@@ -385,7 +385,7 @@ def _check_text(text: str, line: int) -> None:
             raise StrictYamlError(line, f"{what}; remove it")
 
 
-def shown(text: str) -> str:
+def one_line(text: str) -> str:
     """The text as it goes into a message: one short line."""
     text = " ".join(text.split())
     return text if len(text) <= 40 else f"{text[:37]}..."

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from armkin.export.js.es_module import module
 from armkin.teach.arm_description import scene
 from armkin.teach.browser_solver import about
-from armkin.teach.plan_samples import played
+from armkin.teach.plan_samples import playback
 from armkin.teach.reach_slice import reach_slice
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def _data(arm: Arm, task_name: str | None, plan: PathPlan | None, meshes: dict[s
     values = {
         "arm": drawn | {"locks": False, "meshes": meshes},
         "solver": solver,
-        "plan": None if plan is None else played(arm, plan),
+        "plan": None if plan is None else playback(arm, plan),
         "slice": None if task_name else reach_slice(arm),  # of the task that fits the arm
     }
     return "".join(f"export const {name} = {_json(value)};\n" for name, value in values.items())

@@ -18,7 +18,7 @@ SHOWN = 0.2  # [mm] that the tip shown may be off where it is looked at, so that
 MOST = 160_000  # samples of some 80 bytes; a plan that needs more is shown less exactly, and the page says so
 
 
-def played(arm: Arm, plan: PathPlan) -> dict[str, Any]:
+def playback(arm: Arm, plan: PathPlan) -> dict[str, Any]:
     """Joint values over time, the tip's way, speeds as shares of the limits; `shown_mm`: what the tip shown is off.
 
     `approach_s`: of the joint move that comes before it, from where the arm stands to its start.

@@ -11,7 +11,7 @@ from armkin.forward import fk
 from armkin.model import units
 from armkin.motors import joints as joints_of
 from armkin.teach import request_checks
-from armkin.teach.plan_samples import played
+from armkin.teach.plan_samples import playback
 from armkin.teach.recorded_program import Program
 
 if TYPE_CHECKING:
@@ -68,13 +68,13 @@ class ProgramActions:
             with self._lock:
                 program = self.program.copied()
             try:
-                return played(self.arm, program.plan(self.start()))
+                return playback(self.arm, program.plan(self.start()))
             except NoSolutionError as error:
                 if "joints" not in error.fields:
                     raise
                 q = units.joints_in(self.arm, error.fields["joints"])
                 whole = error.plan is not None and error.plan.trajectory is not None
-                way = played(self.arm, error.plan) if whole else {"tips": []}
+                way = playback(self.arm, error.plan) if whole else {"tips": []}
                 return {**way, "refused": str(error), "hit": fk(self.arm, q)[:3, 3].round(3).tolist()}
 
     def end(self, tab: Tab, fields: Fields) -> dict[str, Any]:

@@ -57,14 +57,14 @@ class Server(ThreadingHTTPServer):
                 _shut(oldest)
         super().process_request(request, client_address)
 
-    def known(self, request: Any) -> None:
+    def accept(self, request: Any) -> None:
         """A connection has shown the key: it is not closed for others."""
         with self._lock:
             self._strangers.pop(id(request), None)
 
     def shutdown_request(self, request: Any) -> None:
         """A connection ends."""
-        self.known(request)
+        self.accept(request)
         super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
@@ -129,7 +129,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _post(self) -> None:
         headers = _headers(self)
         self.server.guard.check_action(headers)
-        self.server.known(self.connection)
+        self.server.accept(self.connection)
         if not self.path.startswith("/api/"):
             raise RefusedError(404, "there is no such action")
         fields = request_checks.body(self.rfile.read(request_checks.length(headers)))
@@ -149,7 +149,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Tell a page what happens, until it is closed: its connection ends, which is looked at all the time."""
         tab = self.server.actions.tabs.find(query.removeprefix("tab="))
         self.server.actions.tabs.enter(tab)
-        self.server.known(self.connection)
+        self.server.accept(self.connection)
         self.close_connection = True
         try:
             self._head(200, "text/event-stream", "")

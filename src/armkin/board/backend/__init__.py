@@ -19,7 +19,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from armkin.board.backend.sent_positions import planned
+from armkin.board.backend.sent_positions import plan_targets
 from armkin.motors import joints
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class Backend(ABC):
 
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        return self.lay(*planned(self.arm, start, targets, speed))
+        return self.lay(*plan_targets(self.arm, start, targets, speed))
 
     @abstractmethod
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
@@ -123,7 +123,7 @@ class Backend(ABC):
         """Carry out plans, one after another; None in between: nothing to do yet."""
 
     @abstractmethod
-    def standing(self) -> str:
+    def standing_text(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
 
     @abstractmethod

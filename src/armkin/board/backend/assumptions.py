@@ -24,11 +24,11 @@ _LEAD = 8.0  # mm a turn of a sliding one
 _RATES = {"max_speed": (30.0, 50.0), "max_accel": (60.0, 100.0)}  # deg, mm
 
 
-def assumed(arm: Arm) -> tuple[Arm, list[str]]:
+def arm_with_assumptions(arm: Arm) -> tuple[Arm, list[str]]:
     """The arm with motors and rates where it has none, and in words what was made up; nothing: the same arm.
 
     >>> import armkin
-    >>> assumed(armkin.load("puma560"))[1][1]
+    >>> arm_with_assumptions(armkin.load("puma560"))[1][1]
     'max_speed of q1, q2, q3, q4, q5, q6: 30 deg/s'
     """
     said = []

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.motion_start import check_jog, jog_goal
-from armkin.board.backend.sent_positions import planned
+from armkin.board.backend.sent_positions import plan_targets
 from armkin.board.ports import BAUD, SIM, SerialPort, list_ports
 from armkin.errors import LinkError, UsageError
 from armkin.motion.joint_moves import rate_lines, straight
@@ -133,7 +133,7 @@ class Board(ABC):
 
     def plan(self, start: Sequence[int], targets: Array, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        return self.lay(*planned(self.arm, start, targets, speed))
+        return self.lay(*plan_targets(self.arm, start, targets, speed))
 
     def likely(self) -> list[str]:
         """Names of the ports where such a board may be: Arduinos, and the chips of ESP32s and adapters."""

@@ -31,16 +31,16 @@ def missing_by_command(arm: Arm) -> dict[str, list[str]]:
     >>> found["send"], found["home"]
     ([], ['its joints have no homing'])
     """
-    send = missing(arm)
+    send = missing_for_motion(arm)
     return {
         "pulses": _without_drives(arm),
-        "simulate": missing(arm, board=False),
+        "simulate": missing_for_motion(arm, board=False),
         "send": send,
         "home": send + _without_homing(arm),
     }
 
 
-def missing(arm: Arm, *, board: bool = True) -> list[str]:
+def missing_for_motion(arm: Arm, *, board: bool = True) -> list[str]:
     """What the robot file lacks before the arm can be moved, in words; board: on a board, not in simulation."""
     return [words for words, _ in lacks(arm, board=board)]
 

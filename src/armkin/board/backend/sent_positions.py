@@ -43,13 +43,13 @@ class Job(Laid):
         return np.asarray(np.abs(self.trajectory.arm.motor_gain) @ self.trajectory.top_speed)
 
 
-def planned(arm: Arm, start: Sequence[int], targets: Array, speed: float) -> tuple[Trajectory, NDArray[np.int64]]:
+def plan_targets(arm: Arm, start: Sequence[int], targets: Array, speed: float) -> tuple[Trajectory, NDArray[np.int64]]:
     """Moves from counts through joint targets (w, n) [rad | mm], and the counts (motors,) where they start."""
     counts = np.asarray(start, dtype=np.int64)
     return plan(arm, joints(arm, counts), targets, speed=speed), counts
 
 
-def braking(trajectory: Trajectory) -> float:
+def braking_time(trajectory: Trajectory) -> float:
     """Seconds in which the whole motion is slowed down to a stop, within the joints' max_accel; gently on curves."""
     with np.errstate(invalid="ignore", divide="ignore"):
         needed = trajectory.top_speed / trajectory.arm.max_accel

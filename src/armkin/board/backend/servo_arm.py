@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.motion_start import from_counts
-from armkin.board.backend.sent_positions import Job, braking
+from armkin.board.backend.sent_positions import Job, braking_time
 from armkin.errors import LinkError, NoSolutionError, PositionKnownError, UsageError
 from armkin.model.units import joints_out
 from armkin.motion.timing.trajectory import Straight
@@ -106,7 +106,7 @@ class ServoArm(Backend):
         """Read again where the arm stands."""
         self._read()
 
-    def standing(self) -> str:
+    def standing_text(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
         return f"the arm stands at {list(self.counts())} counts: the next command starts there"
 
@@ -205,7 +205,7 @@ class ServoArm(Backend):
         """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
         begin = last = self.port.now()
         watched, t, pace, stopping = begin, 0.0, 1.0, False
-        ramp = max(braking(trajectory), PERIOD)
+        ramp = max(braking_time(trajectory), PERIOD)
         while t < trajectory.duration and pace > 0.0:
             now = self.port.now()
             if now - last < PERIOD - 1e-4:
@@ -242,7 +242,7 @@ class ServoArm(Backend):
                 self.hold()
                 raise LinkError(
                     f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) stands {off[k]} counts from its goal: is it "
-                    f"blocked or overloaded?\n{self.standing()}"
+                    f"blocked or overloaded?\n{self.standing_text()}"
                 )
             self._heed()
 
@@ -255,7 +255,7 @@ class ServoArm(Backend):
             self.hold()
             raise LinkError(
                 f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) is {off[k]} counts behind: blocked or overloaded?\n"
-                f"{self.standing()}"
+                f"{self.standing_text()}"
             )
         self._check()
 
@@ -265,7 +265,7 @@ class ServoArm(Backend):
             if found := self._faults(number):
                 raise LinkError(
                     f"servo {number} ({name}) reports {', '.join(found)}: switch the power off, find the cause\n"
-                    f"{self.standing()}"
+                    f"{self.standing_text()}"
                 )
 
     def _heed(self) -> None:

@@ -65,7 +65,7 @@ class StepperArm(Backend):
         """Read again where the arm stands."""
         self._read()
 
-    def standing(self) -> str:
+    def standing_text(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
         if self.loss_reason:
             return f"the arm's position is lost ({self.loss_reason}): {self.cure}"
@@ -123,7 +123,7 @@ class StepperArm(Backend):
                     "" if self.loss_reason else ": a line was damaged on its way, or another program has moved the arm"
                 )
                 where = f"the arm stands at {list(self.counts())} steps, the plan ends at {job.end.tolist()}"
-                raise LinkError(f"{where}{cause}\n{self.standing()}")
+                raise LinkError(f"{where}{cause}\n{self.standing_text()}")
             done, seen = total, True
             progress(done, total)
 
@@ -132,9 +132,9 @@ class StepperArm(Backend):
         if not position_read:
             self._read()
         if self.loss_reason:
-            raise LinkError(self.standing())
+            raise LinkError(self.standing_text())
         if self.counts() != tuple(job.start.tolist()):
-            raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing()}")
+            raise LinkError(f"another program has moved the arm since this motion was planned\n{self.standing_text()}")
         self._record.write_motion(job, self.piece)
 
     def _joints_text(self) -> str:

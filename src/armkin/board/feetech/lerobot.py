@@ -107,7 +107,7 @@ def _whole_number(path: str, name: str, values: Any, key: str) -> int:
     return value
 
 
-def calibrated(arm: Arm, path: str, pose: Array | None) -> Calibrated:
+def calibration_edits(arm: Arm, path: str, pose: Array | None) -> Calibrated:
     """What a calibration file says of an arm whose joints have a bus servo each.
 
     pose: (n,) [rad] where the middles of all ranges are; None: every joint's value is 0 there. Raises FileError for
@@ -129,7 +129,7 @@ def calibrated(arm: Arm, path: str, pose: Array | None) -> Calibrated:
         zero.append(at)
         limits.append((low, high))
         edits["joints", j, "limits"] = f"[{low:.6f}, {high:.6f}]"
-        edits["joints", j, "drive", "zero"] = _short_number(at)
+        edits["joints", j, "drive", "zero"] = _int_if_whole(at)
         edits["joints", j, "drive", "invert"] = "true" if motor.drive_mode else "false"
     jaw, ends = _gripper(arm, there, path, edits)
     return Calibrated(tuple(motors), tuple(zero), tuple(limits), jaw, ends, edits)
@@ -172,7 +172,7 @@ def _gripper(
     motor = _calibrated_motor(motors, drive.id, "gripper", path, drive.counts)
     half = (motor.range_max - motor.middle) / drive.pulses_per_unit()
     values: Sequence[tuple[str, float | int | str]] = (
-        ("zero", _short_number(motor.middle)),
+        ("zero", _int_if_whole(motor.middle)),
         ("invert", "true" if motor.drive_mode else "false"),
         ("open", f"{half:.6f}"),
         ("closed", f"{-half:.6f}"),
@@ -181,5 +181,5 @@ def _gripper(
     return motor, (half, -half)
 
 
-def _short_number(count: float) -> int | float:
+def _int_if_whole(count: float) -> int | float:
     return int(count) if count.is_integer() else round(count, 6)

@@ -212,7 +212,7 @@ class Machine(Backend):
     def in_time(self) -> None:
         """Raise LinkError if the board says that ticks came late."""
         if late := self.status.overruns:
-            raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing()}")
+            raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing_text()}")
 
     def run_axis(self, lay: Callable[[int], Move | None], axis: int, clock: int) -> Status:
         """Carry out the move of a single axis, the gripper, that `lay` makes from counts; None: it is there."""
@@ -228,7 +228,7 @@ class Machine(Backend):
         """Where it stands, in words: ``q1 = 0, q2 = 90, q3 = -90 deg``."""
         return describe(self.arm, self.joints())
 
-    def standing(self) -> str:
+    def standing_text(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
         if self.position() == "lost":
             return "the arm's position is lost"

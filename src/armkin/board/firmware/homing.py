@@ -115,7 +115,7 @@ def home(
     for group in sorted(_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
         for search in (s for s in todo if s.joint in group):
             announce(arm.joint_names[search.joint])
-            status, edge = _searched(machine, search)
+            status, edge = _run_search(machine, search)
             found.append(_lost(machine, search, edge, known=arm.joint_names[search.joint] not in lost_before))
             beyond = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
             q[search.joint] = _switch_value(arm, search.joint) + per_count[search.joint] @ beyond
@@ -139,7 +139,7 @@ def _lost(machine: Machine, search: Search, edge: Status, *, known: bool) -> Los
     return LostSteps(arm.joint_names[j], steps, steps / float(leader))
 
 
-def _searched(machine: Machine, search: Search) -> tuple[Status, Status]:
+def _run_search(machine: Machine, search: Search) -> tuple[Status, Status]:
     """Carry out one search; status at rest, and at the switch's edge (page 1)."""
     session = machine.session
     try:

@@ -46,7 +46,7 @@ class Machine(Protocol):
     def describe(self) -> str:
         """Where it stands, in words."""
 
-    def standing(self) -> str:
+    def standing_text(self) -> str:
         """The same, and what it means for the next command."""
 
 
@@ -66,7 +66,7 @@ def explain(machine: Machine, error: DeviceError) -> LinkError:
     except LinkError:
         return LinkError(f"{why}; then the board did not answer any more: armkin status tells where it stands")
     if machine.position() == "lost":
-        return lost(machine, f"{why}\n{machine.standing()}")
+        return lost(machine, f"{why}\n{machine.standing_text()}")
     return HeldError(
         f"{why}\nthe arm stands at {machine.describe()}, its position is known",
         advice="the next motion starts there",

@@ -60,10 +60,10 @@ def stream(session: Session, frames: Iterator[Batch | None], report_left: Callab
         report_left(session.under_way + session.queued / 1000)
     for seconds in session.arrivals():
         report_left(seconds)
-    return _standing(session)
+    return _status_at_rest(session)
 
 
-def _standing(session: Session) -> Status:
+def _status_at_rest(session: Session) -> Status:
     """The status of an arm that has come to rest: as just heard, if it was one that said so."""
     last = session.last
     if isinstance(last, Status) and last.page == 0 and last.state == State.IDLE:

@@ -178,10 +178,10 @@ class GrblMachine(StepperArm):
                 self.hold()
             except LinkError:
                 return error
-            return LinkError(f"{error}; the arm was stopped\n{self.standing()}")
+            return LinkError(f"{error}; the arm was stopped\n{self.standing_text()}")
         if error.alarm == 0 or error.alarm in replies.LOSES_POSITION:
             self._place.forget(str(error))
-        return LinkError(f"{error}\n{self.standing()}")
+        return LinkError(f"{error}\n{self.standing_text()}")
 
     def home(self, counts: Sequence[float]) -> None:
         """Run GRBL's homing cycle; counts: counts where each motor's switch closes.

@@ -12,7 +12,7 @@ from armkin.board.backend.board import Board, Gripped
 from armkin.board.feetech import registers, servo_gripper
 from armkin.board.feetech.bus import Bus
 from armkin.board.feetech.feetech_machine import ServoMachine, job, servo_ids
-from armkin.board.feetech.lerobot import Calibrated, calibrated
+from armkin.board.feetech.lerobot import Calibrated, calibration_edits
 from armkin.board_catalogue import ForeignBoard
 from armkin.motors import pulses
 
@@ -82,7 +82,7 @@ class ServoBusBoard(Board):
 
     def calibration(self, path: str, pose: Array | None) -> Calibrated:
         """What a LeRobot calibration file says of the arm."""
-        return calibrated(self.arm, path, pose)
+        return calibration_edits(self.arm, path, pose)
 
 
 BOARD = ServoBusBoard

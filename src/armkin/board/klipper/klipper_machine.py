@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from armkin.board.backend.motion_start import unbelievable
 from armkin.board.backend.position_record import Record
-from armkin.board.backend.sent_positions import Job, braking
+from armkin.board.backend.sent_positions import Job, braking_time
 from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.klipper import trajectory_to_g1_lines
 from armkin.board.klipper.api import Api
@@ -127,7 +127,7 @@ class KlipperMachine(StepperArm):
 
     def _follow(self, job: Job, report: Callable[[float], None]) -> bool:
         """Send a job's lines a little ahead of their time; False if a stop was asked for and the arm brakes."""
-        ramp = braking(job.trajectory)
+        ramp = braking_time(job.trajectory)
         lines = trajectory_to_g1_lines.Lines(job, self.axes)
         source = iter(lines)
         self.api.run(trajectory_to_g1_lines.HEAD)
@@ -161,7 +161,7 @@ class KlipperMachine(StepperArm):
             except LinkError:
                 return error
         shut = f"Klipper went into state {self.state} in the motion: {self._message}"
-        return LinkError(f"{error if self.state == 'ready' else shut}\n{self.standing()}")
+        return LinkError(f"{error if self.state == 'ready' else shut}\n{self.standing_text()}")
 
     def _read(self) -> None:
         """Read where the arm stands: known while that is where armkin left it."""

@@ -11,7 +11,7 @@ socket_port.py  the Unix socket of a program on this computer
 """
 
 from armkin.board.ports.boot_loader import leave_boot_loader
-from armkin.board.ports.logged_port import LOG, traced
+from armkin.board.ports.logged_port import LOG, with_log
 from armkin.board.ports.port import BAUD, SIM, Port
 from armkin.board.ports.port_lock import ask_to_stop, holder, holder_rate, note_path, record_path
 from armkin.board.ports.port_notes import read_note, remove_note, write_note
@@ -36,6 +36,6 @@ __all__ = [
     "read_note",
     "record_path",
     "remove_note",
-    "traced",
+    "with_log",
     "write_note",
 ]

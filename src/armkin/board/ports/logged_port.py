@@ -37,6 +37,6 @@ class Traced:
         self.inner.close()
 
 
-def traced(port: Port) -> Port:
+def with_log(port: Port) -> Port:
     """The port, with its bytes logged where somebody listens."""
     return Traced(port) if LOG.isEnabledFor(logging.DEBUG) else port

@@ -79,7 +79,7 @@ class Velocity:
         """Raise RefusedError if an axis of the segment is too fast or changes its velocity too much."""
         image, size, sign = self.image.axes[axis], abs(rate) >> 8, 1 if rate >= 0 else -1
         first, last = sign * size * self._pace.first, sign * size * self._pace.last
-        if max(abs(first), abs(last)) > min(int(image.max_rate * self._ticks_per_second), 2**31 - 1):
+        if max(abs(first), abs(last)) > min(int(image.max_rate * self._time_unit), 2**31 - 1):
             raise RefusedError(Error.RATE, axis)
         self._accelerate(axis, first, last, rate)
         self._last_ends[axis] = first, last, rate
@@ -91,14 +91,12 @@ class Velocity:
         behind._accelerate(axis, 0, 0, 0)
 
     @property
-    def _ticks_per_second(self) -> float:
+    def _time_unit(self) -> float:
         return float((1 << 15 + self._bits) / self.board.clock)
 
     def _budget(self, axis: int, time: int) -> int:
         """What 5/4 of max_accel makes in a time; _UNCHECKED: it is not checked."""
-        step = (
-            min(int(self.image.axes[axis].max_accel * 5 / 4 * 0.05 / 256 * self._ticks_per_second), _UNCHECKED - 1) + 1
-        )
+        step = min(int(self.image.axes[axis].max_accel * 5 / 4 * 0.05 / 256 * self._time_unit), _UNCHECKED - 1) + 1
         low, high = step & _ALL, step >> 16
         return (low * time >> 8) + (high * time << 8) if step < _UNCHECKED else _UNCHECKED << 16
 

@@ -99,22 +99,22 @@ class _Session:
 
     def _board(self, found: Found) -> tuple[Board, Arm]:
         """The board of the file as it is corrected so far."""
-        from armkin.keep_out.load_with_scene import checked
+        from armkin.keep_out.load_with_scene import arm_in_scene
         from armkin.robot_file import parse
         from armkin.robot_file.scene_file import read
 
         file = parse(self.corrected(found), self.path)
-        arm = checked(file, None if self.scene is None else read(self.scene))
+        arm = arm_in_scene(file, None if self.scene is None else read(self.scene))
         if not self.assumptions_told:
             keep_outs.marked(arm, ignore=False)
-        arm = board_link.rehearsed(arm, self.port, quiet=self.assumptions_told)
+        arm = board_link.arm_for_port(arm, self.port, quiet=self.assumptions_told)
         self.assumptions_told = True
         return board_link.board_of(arm, rehearsal=self.port == board_link.SIM), arm
 
     def corrected(self, found: Found) -> str:
         """The file's text with what was found."""
         from armkin.robot_file import parse
-        from armkin.robot_file.replace_values import replaced
+        from armkin.robot_file.replace_values import with_values
         from armkin.robot_file.robot_file_text import flow
 
         file = parse(self.text, self.path)
@@ -129,7 +129,7 @@ class _Session:
                 where[*at, "zero"] = flow(found.zeros[k])
         for j, pair in found.limits.items():
             where["joints", j, "limits"] = flow(list(pair))
-        return replaced(self.text, where)
+        return with_values(self.text, where)
 
     def write(self, found: Found, out: str | None, person: Keys) -> None:
         """The corrected file, shown as a diff and asked for first."""

@@ -50,7 +50,7 @@ def fk(
     """Where the tool is for given joint values."""
     if batch is not None:
         arguments.no_numbers(q)
-        arm, values = arguments.load(arguments.named(robot), scene, tool), list[list[float]]()
+        arm, values = arguments.load(arguments.required_robot(robot), scene, tool), list[list[float]]()
     else:
         arm, values = _poses(robot, q, scene, tool)
         if len(values) == 1:
@@ -103,7 +103,7 @@ def _poses(
 ) -> tuple[Arm, list[list[float]]]:
     """As `piped_answers.poses`; that module is imported for an answer on standard input alone, so fk starts sooner."""
     if q:
-        arm = arguments.load(arguments.named(robot), scene, tool)
+        arm = arguments.load(arguments.required_robot(robot), scene, tool)
         return arm, [arguments.joints(arm, q)]
     from armkin.cli import piped_answers
 

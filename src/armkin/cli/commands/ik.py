@@ -89,7 +89,7 @@ def ik(
 
     _check_together(batch, sweep, position_first=position_first, compiled=compiled, continuous=continuous)
     given = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
-    arm = arguments.load(arguments.named(robot), scene, tool) if given is None else given[0]
+    arm = arguments.load(arguments.required_robot(robot), scene, tool) if given is None else given[0]
     what = task_for(arm, task)
     reached = None if given is None else _reached(arm, what, given[1])
     held = lock_and_sweep.locks(arm, lock)

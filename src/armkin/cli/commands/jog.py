@@ -39,7 +39,7 @@ def jog(
     from armkin.board.planner import where_arm_stands
     from armkin.model.lock_joints import joint_index
 
-    arm = board_link.rehearsed(keep_outs.moving(robot, scene, ignore_keep_out), port)
+    arm = board_link.arm_for_port(keep_outs.moving(robot, scene, ignore_keep_out), port)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     j = joint_index(arm, joint)
     rate = number(speed, "SPEED")

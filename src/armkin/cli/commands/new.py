@@ -89,10 +89,10 @@ def new(
 
 def _check(text: str, path: str) -> None:
     """Raise RobotFileError for a file that is not valid, or whose floor is hit in every posture."""
-    from armkin.keep_out.load_with_scene import checked
+    from armkin.keep_out.load_with_scene import arm_in_scene
     from armkin.robot_file import parse
 
-    checked(parse(text, path))
+    arm_in_scene(parse(text, path))
 
 
 def _table_of_options(

@@ -143,7 +143,7 @@ def path(
             {"a plan": port is None, "--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM}
         )
     if port is None or dry_run:
-        plan = _start_of(start, "--start", arm, moves, locked, options, json=json)
+        plan = _plan_from(start, "--start", arm, moves, locked, options, json=json)
         found = _answer(plan, _rehearsed(plan, rehearsal=dry_run))
         _files(plan, out, plot)
         _print(plan, found, json=json, out=out)
@@ -170,13 +170,13 @@ def sent(
     if not dry_run:
         _carried_out(arm, moves, {}, options, link, trace, None, json=json)
         return
-    plan = _start_of(start, "--from", arm, moves, {}, options, json=json)
+    plan = _plan_from(start, "--from", arm, moves, {}, options, json=json)
     found = {**_answer(plan, _rehearsed(plan)), "dry_run": True}
     _files(plan, trace, None)
     _print(plan, found, json=json, out=trace)
 
 
-def _start_of(
+def _plan_from(
     start: str | None,
     option: str,
     arm: Arm,
@@ -187,9 +187,9 @@ def _start_of(
     json: bool,
 ) -> PathPlan:
     """The plan from where an option says that the arm stands: nothing moves."""
-    arm = board_link.planned(arm)
+    arm = board_link.arm_for_plan(arm)
     if start is not None:
-        options["start"] = board_link.standing(arm, start, option)
+        options["start"] = board_link.standing_joints(arm, start, option)
     return _planned(arm, moves, locked, options, json=json)
 
 
@@ -210,13 +210,13 @@ def _carried_out(
     from armkin.board.stop_signals import planning
     from armkin.motors import joints as joints_of
 
-    arm = board_link.rehearsed(arm, link.port)
-    board, stands = board_link.board_of(arm, rehearsal=link.port == SIM), board_link.assumed(arm, link.assume)
-    simulated = board_link.simulated(link.assume)
+    arm = board_link.arm_for_port(arm, link.port)
+    board, stands = board_link.board_of(arm, rehearsal=link.port == SIM), board_link.assumed_joints(arm, link.assume)
+    simulated = board_link.simulation_note(link.assume)
     with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
         board_link.prepare(arm, machine, link.assume, stands)
         keep_outs.check_start(machine, arm, link.no_scene)
-        held = board_link.held(board, link.resume)
+        held = board_link.resumed_note(board, link.resume)
         began = machine.counts() if held is None else held.start
         with planning():
             plan = _planned(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)

@@ -68,7 +68,7 @@ def plot(
     if target is None and batch is None and not q:
         _piped(robot, scene, out, **style)
         return
-    arm = arguments.load(arguments.named(robot), scene)
+    arm = arguments.load(arguments.required_robot(robot), scene)
     if target is not None and q:
         arguments.check_commas(arm, task, target, q)
     if sum((bool(q), target is not None, batch is not None)) > 1:
@@ -120,7 +120,7 @@ def _piped(robot: str | None, scene: str | None, out: str | None, **style: Any) 
 
     found = piped_answers.answers(robot, scene)
     if found is None:
-        arm = arguments.load(arguments.named(robot), scene)
+        arm = arguments.load(arguments.required_robot(robot), scene)
         names = " ".join(arm.joint_names)
         raise UsageError(f"nothing to draw: give joint values ({names}), a pose's name, --target or --batch")
     arm, answers = found

@@ -47,7 +47,7 @@ def pulses(
     """
     if batch is not None:
         arguments.no_numbers(q)
-        arm, values = arguments.load(arguments.named(robot), scene), list[list[float]]()
+        arm, values = arguments.load(arguments.required_robot(robot), scene), list[list[float]]()
     else:
         arm, values = piped_answers.poses(robot, q, scene)
     origin = units.home_out(arm) if start is None else arguments.joint_list(arm, start, "--from")

@@ -128,9 +128,9 @@ def send(
     output.check(trace, "a plan is", ".csv")
     arm = keep_outs.marked(arm, ignore_keep_out)
     arm = _accelerated(arm, accel)
-    arm = arm if dry_run else board_link.rehearsed(arm, port)
+    arm = arm if dry_run else board_link.arm_for_port(arm, port)
     planner = Planner(_board(arm, rehearsal=rehearsal), fraction, radius)
-    stands = board_link.assumed(arm, assume)
+    stands = board_link.assumed_joints(arm, assume)
     if dry_run:
         _dry_run(planner, goals, start, trace, json)
     else:
@@ -185,11 +185,11 @@ def _move(
     from armkin.board.planner import Stream, where_arm_stands
     from armkin.board.stop_signals import planning
 
-    arm, board, simulated = planner.arm, planner.board, board_link.simulated(link.assume)
+    arm, board, simulated = planner.arm, planner.board, board_link.simulation_note(link.assume)
     with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
         board_link.prepare(arm, machine, link.assume, start)
         keep_outs.check_start(machine, arm, link.no_scene)
-        held = board_link.held(board, link.resume)
+        held = board_link.resumed_note(board, link.resume)
         began = machine.counts() if held is None else held.start
         if isinstance(goals, Stream):
             with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
@@ -232,7 +232,7 @@ def _dry_run(planner: Planner, goals: Goals | Stream, start: str | None, trace: 
     from armkin.board.planner import Total
 
     arm = planner.arm
-    begin = arm.home if start is None else board_link.standing(arm, start, "--from")
+    begin = arm.home if start is None else board_link.standing_joints(arm, start, "--from")
     plans = _all_plans(planner, goals, planner.counts(begin))
     _write_trace(arm, plans, trace)
     summed = Total(arm, plans).summary()

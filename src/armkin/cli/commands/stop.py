@@ -63,7 +63,7 @@ def stop(
 
 def _port(port: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
-    from armkin.board.firmware.wire.find_boards import answering, likely
+    from armkin.board.firmware.wire.find_boards import answering_ports, likely
     from armkin.board.ports import holder
     from armkin.board.stop_signals import stoppable
 
@@ -72,7 +72,7 @@ def _port(port: str | None, baud: int, reset: bool) -> str:
         if len(held) == 1:
             return held[0]
         with stoppable() as stop:
-            return only_port(answering(None, baud, stop, reset=reset), "a board")
+            return only_port(answering_ports(None, baud, stop, reset=reset), "a board")
     return port
 
 

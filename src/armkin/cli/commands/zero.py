@@ -97,7 +97,7 @@ def _write(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[int, int] | 
     from armkin.motors import motor_names
     from armkin.robot_file import parse
     from armkin.robot_file.catalogue import locate
-    from armkin.robot_file.replace_values import replaced
+    from armkin.robot_file.replace_values import with_values
 
     where: dict[tuple[str | int, ...], int] = {
         ("joints", arm.joint_names.index(name), "drive", "zero"): count
@@ -105,7 +105,7 @@ def _write(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[int, int] | 
     }
     if grips is not None:
         where["gripper", "zero"] = grips[1]
-    text = replaced(Path(locate(robot)).read_text(encoding="utf-8"), where)
+    text = with_values(Path(locate(robot)).read_text(encoding="utf-8"), where)
     parse(text, out)  # nothing is written that no command would take
     with output.destination(out) as write:
         write(text)

@@ -43,7 +43,7 @@ def through_boundaries(
         to = [one for c in found for one in _arriving(s, c, j, postures, tolerance)]
         # Beyond it, what was joined at one before it is what its last part was: `chains` has that.
         on = [one for c in chains for one in _leaving(s, c, j, postures, tolerance)]
-        ways = (_joined(a, b) for a, b in product(to, on) if _continue(a, b))
+        ways = (_joined(a, b) for a, b in product(to, on) if _are_consecutive(a, b))
         found += islice(ways, max(_WAYS - len(found), 0))
     postures = columns.q[end][columns.valid[end]]
     return _added_once(found, [one for c in found for one in _arriving(s, c, end, postures, tolerance)])
@@ -117,7 +117,7 @@ def _steps(c: Chain, q: Array, postures: Array, tolerance: float) -> list[Array]
     return [step for step in steps if float(chord_bound(lever, step)) <= tolerance]
 
 
-def _continue(a: Chain, b: Chain) -> bool:
+def _are_consecutive(a: Chain, b: Chain) -> bool:
     """Whether a chain begins where another ends, and is not its own continuation."""
     step = change(a.arm, a.q[-1], b.q[0])
     same = np.shares_memory(a.q, b.q)  # parts of one chain

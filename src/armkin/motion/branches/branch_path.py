@@ -19,10 +19,10 @@ from armkin.motion.branches.boundary_chains import through_boundaries
 from armkin.motion.branches.branch_chains import Chain, Run, chains, fewest
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import change
-from armkin.motion.branches.linked_branches import ENDS, linked
+from armkin.motion.branches.linked_branches import ENDS, link_branches
 from armkin.motion.branches.route_grid import Way, fine_enough
 from armkin.motion.branches.wrist_turn import ASIDE, has_wrist, through_wrists
-from armkin.motion.branches.wrist_window import detoured
+from armkin.motion.branches.wrist_window import with_detours
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
@@ -108,7 +108,7 @@ def carry(
     of the branch to start on. Raises UsageError, which lists the names, if there is no branch of that name.
     """
     name = route.task.name
-    columns = linked(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
+    columns = link_branches(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
     all_ = chains(arm, columns)
     all_ = through_boundaries(arm, columns, all_, fixed, tolerance)
     if route.task.orientation == "full" and has_wrist(arm):
@@ -174,7 +174,7 @@ def stretches(
 ) -> list[Curve | Smoothed]:
     """A run as curves from rest to rest, one between each two stops of the route; s: the route's samples."""
     q = run.chain.run(run.first, run.last, near, fixed)
-    route = detoured(route, run.chain.windows)
+    route = with_detours(route, run.chain.windows)
     s = s[run.first : run.last + 1]
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
@@ -222,7 +222,7 @@ def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | Smoo
         mean = window(accel, pace.jerk)
         cap = np.minimum(cap, _narrow(arm, path, mean, pace.tolerance))
     speed = fraction[:, None] * arm.max_speed
-    x = optimal(path, Bounds(speed, accel, cap), coupled(arm, pace.accel))
+    x = optimal(path, Bounds(speed, accel, cap), coupled_motors(arm, pace.accel))
     made: list[Curve | Smoothed] = []
     for a, b in pairwise([0, *(path.rests + 1).tolist(), len(x)]):
         curve = Curve(Knots(path.s[a:b], path.q[a:b], path.d[a:b]), x[a:b])
@@ -243,7 +243,7 @@ def _caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array, Array
     return cap, least
 
 
-def coupled(arm: Arm, share: float) -> tuple[Array, Array] | None:
+def coupled_motors(arm: Arm, share: float) -> tuple[Array, Array] | None:
     """Motors that turn several joints: their weights and greatest accelerations, in counts; None: there is none."""
     shared = np.flatnonzero(np.count_nonzero(arm.motor_gain, axis=1) > 1)
     return (np.asarray(arm.motor_gain[shared]), motor_accel(arm)[shared] * share) if len(shared) else None

@@ -32,7 +32,7 @@ _MOST = 50_000  # samples added
 _BLOCK = 16_384  # steps that are looked at together
 
 
-def linked(
+def link_branches(
     arm: Arm, targets: Callable[[Array], Array], s: Array, *, task: str | None, tolerance: float, near: Array
 ) -> Columns:
     """All branches at samples s of a route, every step certified or divided as far as it makes sense.

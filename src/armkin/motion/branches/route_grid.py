@@ -9,7 +9,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.motion.branches.joint_steps import chord_bound, levers
-from armkin.motion.branches.solve_on_route import DAMPING, corrected, exact_cubics
+from armkin.motion.branches.solve_on_route import DAMPING, corrected_to_route, exact_cubics
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_scan import Int
 from armkin.motion.timing.time_optimal import knots
@@ -176,7 +176,7 @@ def _solved(arm: Arm, way: Way, points: Array, damping: float, coarser: Knots | 
         guess = np.stack([np.interp(points[new], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
     else:  # they are nearer than chords of samples
         guess, _ = coarser.evaluate(points[new])
-    values[new] = corrected(arm, route.task, guess, route.targets(points[new]), damping)
+    values[new] = corrected_to_route(arm, route.task, guess, route.targets(points[new]), damping)
     for one in windows:
         if one.detour is not None:  # the route is detoured itself
             continue
@@ -223,7 +223,7 @@ def _steps(arm: Arm, path: Knots) -> Array:
     return np.asarray(off)
 
 
-def missed(arm: Arm, route: Route, path: Knots) -> Missed:
+def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
     """Greatest distance of a given point from the tip's motion on a grid, and where [mm]; None: there is none."""
     s, points = route.given_points
     here = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)

@@ -27,7 +27,9 @@ _TELLING = 0.02  # [mm/rad] damping of slopes: rounding is multiplied little
 _LOST = 1e-5  # of a slope: where damping takes more a singularity is near
 
 
-def corrected(arm: Arm, task: Task, q: Array, target: Array, damping: float = DAMPING[0], steps: int = 6) -> Array:
+def corrected_to_route(
+    arm: Arm, task: Task, q: Array, target: Array, damping: float = DAMPING[0], steps: int = 6
+) -> Array:
     """Joint values near the right ones, made exact by damped Newton steps; those of free joints stay: (N, n).
 
     damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
@@ -43,7 +45,7 @@ def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps
     for _ in range(steps):
         q = out[open_]
         T, J = _scaled(arm, task, q)
-        r = _missed(arm, task, T, q, target[open_])
+        r = _residuals(arm, task, T, q, target[open_])
         step = _damped_steps(J, r, (damping / arm.reach) ** 2)
         size = np.abs(step).max(axis=0)
         step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
@@ -72,7 +74,7 @@ def _scaled(arm: Arm, task: Task, q: Array) -> tuple[Array, Array]:
     return T, np.multiply(task_jacobian(task, J, T).transpose(2, 1, 0), each, order="C")
 
 
-def _missed(arm: Arm, task: Task, T: Array, q: Array, target: Array) -> Array:
+def _residuals(arm: Arm, task: Task, T: Array, q: Array, target: Array) -> Array:
     """What is missing to the targets, without units: (k, M)."""
     return np.multiply(residual(task, T, q * arm.ratio, target).T, _scale(arm, task)[:, None], order="C")
 
@@ -131,7 +133,7 @@ def _slopes(arm: Arm, route: Route, s: Array, q: Array, detour_slope: Array) -> 
         return None
     T, J = _scaled(arm, route.task, q)
     there = s + detour_slope
-    here, beside = (_missed(arm, route.task, T, q, route.targets(x)) for x in (s, there))
+    here, beside = (_residuals(arm, route.task, T, q, route.targets(x)) for x in (s, there))
     rate = (beside - here) / (there - s)
     d = _damped_steps(J, rate, (_TELLING / arm.reach) ** 2)
     lost = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)

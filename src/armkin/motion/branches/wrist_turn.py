@@ -21,8 +21,8 @@ from armkin.forward import fk, jacobian
 from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import LEAST_LEVER, change
-from armkin.motion.branches.solve_on_route import corrected
-from armkin.motion.branches.wrist_window import Window, detoured
+from armkin.motion.branches.solve_on_route import corrected_to_route
+from armkin.motion.branches.wrist_window import Window, with_detours
 from armkin.motion.tool_path.route import Detour
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array
     q = window.joints(arm, route, s)
     if window.detour is None or not len(s):
         return q
-    q = corrected(arm, route.task, q, detoured(route, (window,)).targets(s), steps=12)
+    q = corrected_to_route(arm, route.task, q, with_detours(route, (window,)).targets(s), steps=12)
     known = np.abs(_bent(arm, q)) > _TOLD  # nearer to straight joints 4 and 6 go on as they do beside it
     at = np.concatenate([[window.begin], s[known], [window.end]])
     beside = np.concatenate([window.q[:1], q[known], window.q[1:]])
@@ -211,7 +211,7 @@ def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None
 def _passes(arm: Arm, route: Route, window: Window) -> bool:
     """Whether the joints follow a window's detour, all along."""
     s = np.linspace(window.begin, window.end, _LOOKED)
-    T, goal = fk(arm, _joints_in_window(arm, route, window, s)), detoured(route, (window,)).targets(s)
+    T, goal = fk(arm, _joints_in_window(arm, route, window, s)), with_detours(route, (window,)).targets(s)
     missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_rotation(T, goal)).max()
     return bool(missed < _EXACT)
 
@@ -228,7 +228,7 @@ def _window(arm: Arm, route: Route, lengths: Array, start: Array, end: Array) ->
     slopes = []
     for s, one in zip(lengths.tolist(), q, strict=True):
         both = np.clip([s - _STEP, s + _STEP], 0.0, route.length)
-        exact = corrected(arm, route.task, np.stack([one, one]), route.targets(both), steps=12)
+        exact = corrected_to_route(arm, route.task, np.stack([one, one]), route.targets(both), steps=12)
         slopes.append((exact[1] - exact[0]) / (both[1] - both[0]))
     window = Window(float(lengths[0]), float(lengths[1]), q, np.array(slopes), np.inf)
     s = np.linspace(window.begin, window.end, _LOOKED)

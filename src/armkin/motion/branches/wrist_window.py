@@ -63,7 +63,7 @@ class Window:
         return np.asarray(turns * np.rint((q - self.q.mean(axis=0)) / turns))
 
 
-def detoured(route: Route, windows: tuple[Window, ...]) -> Route:
+def with_detours(route: Route, windows: tuple[Window, ...]) -> Route:
     """A route with the detours of its windows."""
     found = tuple(one.detour for one in windows if one.detour is not None)
     return replace(route, detours=found) if found else route

@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import condition, jacobian
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, way_of
-from armkin.motion.timing.trajectory import Stretch, Trajectory, grouped
+from armkin.motion.timing.trajectory import Stretch, Trajectory, group_numbers
 from armkin.motion.tool_path.route import Reduced
 
 if TYPE_CHECKING:
@@ -232,7 +232,7 @@ class PathPlan:
         numbers = sorted(self.on_path)
         begins = self.motion.begins[numbers]
         last = np.searchsorted(begins, when, side="right") - 1  # on the way, or behind it
-        for i, here in grouped(last):
+        for i, here in group_numbers(last):
             if i >= 0:
                 stretch, base = self.on_path[numbers[i]]
                 assert isinstance(stretch, Curve | Smoothed)

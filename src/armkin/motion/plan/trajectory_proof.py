@@ -94,7 +94,7 @@ def _points(stretch: Stretch) -> Array:
     return np.asarray(stretch.start + share * (stretch.end - stretch.start)).reshape(4, 1, -1)
 
 
-def proved(trajectory: Trajectory, *, tight: bool = False) -> Found | None:
+def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Found | None:
     """What a proof finds of a trajectory; None for an arm without keep-outs. tight: see `prove`."""
     arm = trajectory.arm
     whole, _ = whole_arm(arm, trajectory.start[None])
@@ -127,17 +127,17 @@ def check_free(trajectory: Trajectory, place: str = "") -> None:
     Costs nothing for an arm without keep-outs, or one that ignores them.
     """
     if trajectory.arm.keep_out and not trajectory.arm.ignores_keep_out:
-        found = proved(trajectory)
+        found = prove_trajectory(trajectory)
         if found is not None and not found.free:
             raise refusal(trajectory, found, place)
 
 
-def checked(plan: PathPlan) -> PathPlan:
+def prove_plan(plan: PathPlan) -> PathPlan:
     """A planned path with its clearance noted. Raises NoSolutionError, with the plan, if it is not proved free.
 
     Nor may its approach hit anything.
     """
-    found = proved(plan.motion, tight=True)
+    found = prove_trajectory(plan.motion, tight=True)
     if found is None:
         return plan
     s = float(plan.s(seconds(plan.motion, found)))
@@ -169,7 +169,7 @@ def free_way(arm: Arm, q: Array, goal: Array) -> tuple[float, NoSolutionError | 
     if not arm.keep_out or arm.ignores_keep_out or np.array_equal(q, goal):
         return 1.0, None
     way = Trajectory(arm, q, (Straight(q, goal, trapezoid(1.0, 1.0, 1.0)),))
-    found = proved(way)
+    found = prove_trajectory(way)
     if found is None or found.free:
         return 1.0, None
     return found.cell, refusal(way, found)

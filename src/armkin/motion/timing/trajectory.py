@@ -193,12 +193,12 @@ class Trajectory:
         out = np.tile(self.start if derivative == 0 else np.zeros(self.arm.n), (len(flat), 1))
         which = np.searchsorted(self.begins, flat, side="right") - 1
         which = np.clip(which, 0, max(len(self.stretches) - 1, 0))
-        for k, here in grouped(which) if self.stretches else ():
+        for k, here in group_numbers(which) if self.stretches else ():
             out[here] = self.stretches[k].evaluate(flat[here] - self.begins[k], derivative)
         return out.reshape(*when.shape, self.arm.n)
 
 
-def grouped(numbers: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:
+def group_numbers(numbers: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:
     """Numbers (N,) that occur, each once, and where it stands: in time that grows with N alone."""
     order = np.argsort(numbers, kind="stable")
     edges = [0, *(np.flatnonzero(np.diff(numbers[order])) + 1).tolist(), len(numbers)]

@@ -88,7 +88,7 @@ def least_squares(layout: Layout, y: Array, weight: Array, ends: Bool) -> Array:
         for d, column in enumerate(columns):
             right[:, d] += np.bincount(at, wj * column, layout.count)
     _add_ridge(layout, bands)
-    return banded(bands, right)
+    return solve_banded(bands, right)
 
 
 def _add_ridge(layout: Layout, bands: Array) -> None:
@@ -126,7 +126,7 @@ def _basis(t: Array, u: Array) -> Array:
     return np.stack(N)
 
 
-def banded(bands: Array, right: Array) -> Array:
+def solve_banded(bands: Array, right: Array) -> Array:
     """Solve A x = right for a symmetric positive A of few diagonals: bands (b + 1, n), right (n, d) -> (n, d).
 
     bands[k, i] = A[i, i + k]. As blocks of b rows, A is block tridiagonal.

@@ -15,8 +15,8 @@ from armkin.model.target_numbers import targets_in
 from armkin.motion.tool_path import path_numbers
 from armkin.motion.tool_path.b_spline import Int
 from armkin.motion.tool_path.chords import distinct, turns
-from armkin.motion.tool_path.fit_points import REVERSAL, Fitted, fitted
-from armkin.motion.tool_path.path_pieces import Dense, Piece, Spot, between, line, unit_speed, vector, weights
+from armkin.motion.tool_path.fit_points import REVERSAL, Fitted, fit_curves
+from armkin.motion.tool_path.path_pieces import Dense, Piece, Spot, line, turn_between, unit_speed, vector, weights
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -131,7 +131,7 @@ class _Spots:
                     if k and np.linalg.norm(other - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
                         w[k] = other
             else:
-                w = np.array([between(self.task, self.spot(a), self.spot(k)) for k in range(a, b + 1)])
+                w = np.array([turn_between(self.task, self.spot(a), self.spot(k)) for k in range(a, b + 1)])
             if np.linalg.norm(w, axis=1).max() > _FARTHEST_TURN:
                 return None
         return np.concatenate([self.p[a : b + 1], self.sums[a : b + 1], w], axis=1)
@@ -154,7 +154,7 @@ def _block(
         return [_line(task, spots, numbers, speeds)]
     moving = (y != y[0]).any(axis=0)  # the others stay
     scale, stop = weights(task)[moving], np.isin(np.arange(len(y)), ends)
-    curve: Fitted = fitted(y[:, moving], FIT * tolerance, stop)
+    curve: Fitted = fit_curves(y[:, moving], FIT * tolerance, stop)
     still = np.where(moving, 0.0, y[0] / weights(task))
 
     def at(v: Array) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _IN_PLANE = 1e-6  # sine of the angle between the tool's axis and the arm's plane
 
 
-def placing(arm: Arm, origin: Sequence[float], *, task: str | None = None, scale: float = 1.0) -> Placing:
+def place_drawing(arm: Arm, origin: Sequence[float], *, task: str | None = None, scale: float = 1.0) -> Placing:
     """The frame of a drawing whose zero is `origin`: x y z [mm], or with roll pitch yaw [deg].
 
     The tool points against the drawing's z: its rotation is that of `origin`, then half a turn about x. Raises

@@ -76,7 +76,7 @@ def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
     return found
 
 
-def fitted(y: Array, tolerance: float, stop: Bool | None = None) -> Fitted:
+def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> Fitted:
     """Points (N, d) [mm], no two neighbours the same, as cubics within `tolerance` of each, in order.
 
     stop: (N,) where the way rests, the ends among them: there it stays a corner.

@@ -21,7 +21,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import quaternion
-from armkin.motion.tool_path.b_spline import banded
+from armkin.motion.tool_path.b_spline import solve_banded
 
 PER_RADIAN = 30.0  # [mm/rad]
 SMALL = 1e-9  # [mm] shorter pieces are no pieces
@@ -68,7 +68,7 @@ def spot(task: Task, target: ArrayLike) -> Spot:
     return Spot(p, rest[:k], axis)
 
 
-def between(task: Task, a: Spot, b: Spot) -> Array:
+def turn_between(task: Task, a: Spot, b: Spot) -> Array:
     """Rotation vector from one orientation to another."""
     if a.turned is None or b.turned is None:
         return np.zeros(3)
@@ -143,7 +143,7 @@ class Piece:
         h = min(1e-5 * self.length, 1e-3)
         a, b = max(s - h, 0.0), min(s + h, self.length)
         here, there = (spot(self.task, t) for t in self.targets(np.array([a, b])))
-        w = between(self.task, here, there)
+        w = turn_between(self.task, here, there)
         change = np.concatenate([there.p - here.p, PER_RADIAN * (there.sums - here.sums), PER_RADIAN * w])
         return np.asarray(change / (b - a))
 
@@ -284,7 +284,7 @@ def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: flo
 
 def _uniform(task: Task, a: Spot, b: Spot, position: Callable[[Array], Array], length: float) -> Piece:
     """A piece whose position, sums and turning all are passed at constant speed; position: fraction -> position."""
-    w = between(task, a, b)
+    w = turn_between(task, a, b)
     change = b.sums - a.sums
     angle = math.hypot(float(np.linalg.norm(change)), float(np.linalg.norm(w)))
     whole = math.hypot(length, PER_RADIAN * angle)
@@ -357,7 +357,7 @@ def _places(u: Array, parts: NDArray[np.intp] | int) -> Array:
 
 def relative(task: Task, a: Spot, b: Spot) -> Array:
     """A spot as y of a piece that starts at `a`."""
-    return np.concatenate([b.p, b.sums, between(task, a, b)])
+    return np.concatenate([b.p, b.sums, turn_between(task, a, b)])
 
 
 def weights(task: Task) -> Array:
@@ -379,6 +379,6 @@ def _natural(u: Array, y: Array) -> tuple[Array, Array, Array, Array]:
     second = np.zeros_like(y)
     if len(u) > 2:
         bands = np.stack([2 * (h[:-1] + h[1:]), np.append(h[1:-1], 0.0)])
-        second[1:-1] = banded(bands, 3 * np.diff(slope, axis=0))
+        second[1:-1] = solve_banded(bands, 3 * np.diff(slope, axis=0))
     hh = h[:, None]
     return y[:-1], slope - hh * (2 * second[:-1] + second[1:]) / 3, second[:-1], np.diff(second, axis=0) / (3 * hh)

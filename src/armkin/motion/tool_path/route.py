@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
-from armkin.motion.timing.trajectory import grouped
+from armkin.motion.timing.trajectory import group_numbers
 from armkin.motion.tool_path.fit_points import REVERSAL
 from armkin.motion.tool_path.path_pieces import SMALL, Dense, Piece, blend
 
@@ -60,7 +60,7 @@ class Route:
     def targets(self, s: Array) -> Array:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,), increasing or not."""
         out: Array | None = None
-        for k, here in grouped(self.piece_number(s)):
+        for k, here in group_numbers(self.piece_number(s)):
             values = self.pieces[k].targets(s[here] - self.ends[k])
             if out is None:
                 out = np.empty((len(s), *values.shape[1:]))
@@ -141,7 +141,7 @@ class Reduced:
             self.wished, self.became = wished, became
 
 
-def joined(
+def join_pieces(
     task: Task,
     pieces: Sequence[Piece],
     blends: Sequence[float | None],
@@ -197,7 +197,7 @@ def _angle(last_piece: Piece, piece: Piece) -> float:
 
 
 def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wish: float | None, tolerance: float) -> float:
-    """The radius of a corner's blend [mm]; 0: none, and the arm rests there. wish: see `joined`'s blends."""
+    """The radius of a corner's blend [mm]; 0: none, and the arm rests there. wish: see `join_pieces`'s blends."""
     # a cubic blend passes its corner at r |a - b| / 4
     radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wish is None else wish
     sharpest = REVERSAL if wish is None else np.pi - _SMOOTH

@@ -249,7 +249,7 @@ def _bends(ticks: int, quick: bool) -> int:
     return (BLOCK // 2 * blocks + rest) * (blocks + 1)
 
 
-def changing(begin: float, end: float) -> float:
+def speed_change(begin: float, end: float) -> float:
     """`Cutter.piece`'s change of speed, from `begin` to `end`; next to rest a piece has one speed."""
     if min(begin, end) <= (begin + end) / 8:
         return 0.0

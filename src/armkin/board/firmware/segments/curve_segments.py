@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.board.firmware.segments.counts_to_segments import Counts, Cutter, changing
+from armkin.board.firmware.segments.counts_to_segments import Counts, Cutter, speed_change
 from armkin.board.firmware.wire.protocol import STEP, Segment
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian
@@ -123,7 +123,7 @@ class CurveSegments:
         """
         gain = self.arm.motor_gain.T
         speed = np.linalg.norm(self.stretch.evaluate(t, 1) @ gain, axis=1).tolist()
-        change = np.array([changing(a, b) for a, b in pairwise(speed)])
+        change = np.array([speed_change(a, b) for a, b in pairwise(speed)])
         h = np.diff(t)[:, None]
         most = _JUMP * motor_accel(self.arm)
         ramp = change[:, None] * steps / h**2  # what the segment makes of each motor's acceleration

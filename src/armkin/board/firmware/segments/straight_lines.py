@@ -21,8 +21,8 @@ from armkin.board.firmware.segments.counts_to_segments import (
     Counts,
     Cutter,
     Move,
-    changing,
     cycles_of,
+    speed_change,
 )
 from armkin.board.firmware.wire.protocol import STEP, Segment
 from armkin.motion.timing.profile import Profile, trapezoid
@@ -101,7 +101,7 @@ class LineSegments:
             if ending:
                 done[-1] = 1.0
             for k, (a, b) in enumerate(pairwise(times.tolist())):
-                change = changing(float(speed[k]), float(speed[k + 1]))
+                change = speed_change(float(speed[k]), float(speed[k + 1]))
                 counts = (self.start + span * done[k + 1]).tolist()
                 drift = _SPARE * steps * float(done[k + 1] - done[k])
                 last = ending and k + 2 == len(times)

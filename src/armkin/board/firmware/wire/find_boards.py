@@ -9,7 +9,7 @@ from armkin.board.ports import BAUD, SerialPort, list_ports
 from armkin.errors import LinkError
 
 
-def answering(
+def answering_ports(
     number: int | None = None, baud: int = BAUD, stop: Callable[[], bool] = lambda: False, *, reset: bool = True
 ) -> list[str]:
     """Names of the ports behind which a board with armkin's firmware answers.
