@@ -64,7 +64,7 @@ def least(work: Callable[[], Any], runs: int = RUNS) -> float:
 
 def c_alone(fast: Any, T: np.ndarray) -> float:
     """Seconds within the machine code of one batch."""
-    inner, spent = fast._of(None), [0.0]
+    inner, spent = fast._library_for(None), [0.0]
     call = inner._batch
 
     def timed(*arguments: Any) -> int:
