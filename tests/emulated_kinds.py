@@ -101,10 +101,10 @@ def dynamixel(board: Board, sim: Any) -> Emulated:
 
     def reset() -> None:
         for servo in sim.servos.values():
-            servo.table[torque], servo.table[goal] = b"\0", round(servo.at).to_bytes(4, "little")
+            servo.table[torque], servo.table[goal] = b"\0", round(servo.position).to_bytes(4, "little")
 
     def nudge() -> None:
-        sim.servos[1].table[goal] = round(sim.servos[1].at + 60).to_bytes(4, "little")
+        sim.servos[1].table[goal] = round(sim.servos[1].position + 60).to_bytes(4, "little")
 
     def stick() -> None:
         sim.servos[2].advance = lambda seconds: None
@@ -113,7 +113,7 @@ def dynamixel(board: Board, sim: Any) -> Emulated:
     return Emulated(
         board,
         sim,
-        lambda: [servo.at for servo in pins],
+        lambda: [servo.position for servo in pins],
         reset=reset,
         foreign=[nudge, reset],
         stall=stick,

@@ -105,7 +105,7 @@ def test_a_path_from_elsewhere_lost_and_damaged_answers(tmp_path: Path) -> None:
     plan = armkin.path(arm, moves, start=board.machine.joints())
     assert plan.approach is not None
     path_run.follow(board, plan, path_run.parts(plan, board.machine.counts(), board.lay), lambda done, total: None)
-    off = np.array([servo.at for servo in port.servos.values()]) - armkin.pulses(arm, plan.motion.end)
+    off = np.array([servo.position for servo in port.servos.values()]) - armkin.pulses(arm, plan.motion.end)
     assert np.abs(off).max() <= 12
 
 
@@ -119,11 +119,11 @@ def test_the_servos_own_limits_zero_and_relax(tmp_path: Path) -> None:
     board.connect(port).prepare()
     with pytest.raises(NoSolutionError, match="outside its own limits 0 to 2500"):
         board.machine.run([board.machine.plan(board.machine.counts(), np.deg2rad([60, 0, 0, 0, 0, 0]))])
-    assert port.servos[1].at == 2048
+    assert port.servos[1].position == 2048
     assert board.can("relax")
     assert not board.can("home")
     board.relax()
-    port.servos[1].at = 2100
+    port.servos[1].position = 2100
     port.advance(0.001)
     board.machine.refresh()
     assert board.zero(None) == ([2100, 2048, 2048, 2048, 2048, 2048], None)

@@ -17,9 +17,9 @@ PING, READ, WRITE, STATUS, SYNC_READ, SYNC_WRITE, ALL = 0x01, 0x02, 0x03, 0x55, 
 class Servo:
     """A control table, and a shaft."""
 
-    def __init__(self, at: float) -> None:
-        self.at, self.table = at, bytearray(1024)
-        for register, value in ((MOST, 4095), (LEAST, 0), (GOAL, round(at)), (Register(144, 2), 120)):
+    def __init__(self, position: float) -> None:
+        self.position, self.table = position, bytearray(1024)
+        for register, value in ((MOST, 4095), (LEAST, 0), (GOAL, round(position)), (Register(144, 2), 120)):
             self.set(register, value)
         self.advance(0.0)
 
@@ -37,8 +37,8 @@ class Servo:
         """Let time pass."""
         if self.get(TORQUE):
             goal = min(max(self.get(GOAL), self.get(LEAST)), self.get(MOST))
-            self.at += max(-FASTEST * seconds, min(FASTEST * seconds, goal - self.at))
-        self.set(Register(132, 4), round(self.at))
+            self.position += max(-FASTEST * seconds, min(FASTEST * seconds, goal - self.position))
+        self.set(Register(132, 4), round(self.position))
 
 
 class Emulator(SimulatedTime):
@@ -71,7 +71,7 @@ class Emulator(SimulatedTime):
         self._now += seconds
         for servo in self.servos.values():
             servo.advance(seconds)
-        self.log.append({number: servo.at for number, servo in self.servos.items()})
+        self.log.append({number: servo.position for number, servo in self.servos.items()})
 
     def _obey(self, number: int, kind: int, data: bytes) -> None:
         address = int.from_bytes(data[:2], "little")
