@@ -93,17 +93,18 @@ def test_a_surface_that_goes_through_limits_is_listed_within() -> None:
     np.testing.assert_allclose(np.abs(s.q[0]).sum(), np.pi / 2, atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", [56, 59, 143])
-def test_a_joint_that_rests_on_a_surface_at_a_double_root_is_not_free(seed: int) -> None:
+def test_a_joint_that_rests_on_a_surface_at_a_double_root_is_not_free() -> None:
     """A Thor stretched along joint 1: from 4,000 random starts joints 1, 4 and 6 alone come to different values."""
     arm = armkin.load("thor")
     target = armkin.fk(arm, np.deg2rad([90.0, 0, -180, 135, 0, 135]))
-    s = armkin.ik(arm, _rounded(target, seed, 3e-16))
     starts = np.random.default_rng(1).uniform(-np.pi, np.pi, (4000, 6))
     found, size = newton.correct(arm, task_for(arm, None), starts, np.tile(target, (4000, 1, 1)), steps=60)
     solved = newton.difference(arm, found[size < 1e-12], np.deg2rad([0.0, 0, -180, 0, 0, 0]))
     assert len(solved) > 500
-    assert s.free.tolist() == (np.abs(solved).max(axis=0) > 0.1).tolist() == [True, False, False, True, False, True]
+    moves = (np.abs(solved).max(axis=0) > 0.1).tolist()
+    assert moves == [True, False, False, True, False, True]
+    for seed in (56, 59, 143):
+        assert armkin.ik(arm, _rounded(target, seed, 3e-16)).free.tolist() == moves
 
 
 @pytest.mark.parametrize("seed", [25, 94, 284])

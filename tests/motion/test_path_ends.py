@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Samples
 
 
+@cache  # what is prepared of an arm is kept by arm
 def moving(name: str) -> Arm:
     """An arm with rates, ours where its file has none."""
     arm = armkin.load(name)
