@@ -24,7 +24,7 @@ sys.path.append(str(Path(__file__).parents[1]))
 import armkin
 from armkin import board_catalogue
 from armkin.board.backend.board import Board
-from armkin.board.backend.motion_start import Laid
+from armkin.board.backend.motion_start import StartedTrajectory
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.kinds import board_of
 from armkin.board.kinds.firmware import FirmwareBoard
@@ -178,13 +178,13 @@ def arms() -> Iterator[Arms]:
         board_catalogue._entry_points.cache_clear()
         stack.callback(board_catalogue._entry_points.cache_clear)
         stack.enter_context(mock.patch.dict("os.environ", XDG_STATE_HOME=str(folder)))
-        found, checked = Arms(folder), Laid.__post_init__
+        found, checked = Arms(folder), StartedTrajectory.__post_init__
 
-        def note(laid: Laid) -> None:
+        def note(laid: StartedTrajectory) -> None:
             checked(laid)
             found.given.append(laid.trajectory)
 
-        stack.enter_context(mock.patch.object(Laid, "__post_init__", note))
+        stack.enter_context(mock.patch.object(StartedTrajectory, "__post_init__", note))
         stack.enter_context(mock.patch.object(Stop, "__call__", lambda stop: found.stops(stop)))
         for one in (Board, FirmwareBoard, KlipperBoard):
             stack.enter_context(mock.patch.object(one, "open", lambda *words, **more: found.open(*words, **more)))

@@ -17,7 +17,7 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.motion import path_redundant
 from armkin.reachability import place_path, place_targets, place_upright
 from armkin.reachability import place_search as places
-from armkin.reachability.place_arm import Around, arm_at_place
+from armkin.reachability.place_arm import Obstacles, arm_at_place
 from command_line import ROOT, run
 from interrupted import interrupted
 
@@ -193,7 +193,7 @@ def test_a_path_is_carried_from_the_places_that_plan_it(name: str, tmp_path: Pat
         assert len(some)
         for i, j, k in rng.permutation(some)[:3].tolist():
             at = (float(found.x[i]), float(found.y[j]), 0.0)
-            asked = place_path.plan(arm, Around(), (i, j, k), at, float(found.yaw[k]), file)
+            asked = place_path.plan(arm, Obstacles(), (i, j, k), at, float(found.yaw[k]), file)
             assert (asked.plan is not None) == whole[i, j, k], asked.refused
 
 
@@ -223,7 +223,7 @@ def test_a_path_of_seven_joints_is_carried_where_path_plans_it(said: str, step: 
     for some in (np.argwhere(whole), np.argwhere(~whole & (found.reached > 0))):
         assert len(some)
         for i, j, k in rng.permutation(some)[:4].tolist():
-            stands = arm_at_place(arm, Around(), (float(found.x[i]), float(found.y[j]), 0.0), float(found.yaw[k]))
+            stands = arm_at_place(arm, Obstacles(), (float(found.x[i]), float(found.y[j]), 0.0), float(found.yaw[k]))
             try:
                 armkin.path(stands, path)
                 planned = True

@@ -1,7 +1,7 @@
 """The first hour of an arm on its board: directions, zeros, limits, and a first move that comes back home.
 
 Every motion before the last one is a jog that lasts as long as a key is held, at a tenth of the joint's speed. What is
-found is not applied here: it is `Found`, for the robot file.
+found is not applied here: it is `Findings`, for the robot file.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Operator(Protocol):
 
 
 @dataclass
-class Found:
+class Findings:
     """What the robot file does not say, or says otherwise."""
 
     inverted: set[int] = field(default_factory=set)  # motors whose direction is the other one

@@ -14,7 +14,7 @@ from armkin.calibration.corrected_chain import KINDS, model
 from armkin.calibration.dropped_rows import dropped_row_numbers
 from armkin.calibration.measurement_checks import check
 from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
-from armkin.calibration.robust_fit import Measured
+from armkin.calibration.robust_fit import Measurements
 from armkin.errors import UsageError
 from armkin.export import conventions
 from armkin.formula import arrays
@@ -164,7 +164,7 @@ def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterabl
     corrections = model(arm)
     hold, _ = fixed_corrections(arm, _kinds(fix))
     before = None if q is None else as_joints(arm, q).reshape(-1, arm.n)
-    none = Measured(np.zeros((0, arm.n)), np.zeros((0, 3)))
+    none = Measurements(np.zeros((0, arm.n)), np.zeros((0, 3)))
     return observability.suggestions(corrections, count, free_at(corrections, len(LEVELS) - 1, none, hold), before)
 
 
@@ -193,7 +193,7 @@ def _kinds(fix: Iterable[str]) -> set[str]:
     return wanted
 
 
-def _measured(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measured:
+def _measured(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
     c = as_joints(arm, q)
     values = arrays.real(measured, "measured")
     if c.ndim != 2:
@@ -204,11 +204,11 @@ def _measured(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measured:
     if not (np.isfinite(c).all() and np.isfinite(values).all()):
         raise UsageError("a row holds nan or infinity; every number must be finite")
     if values.ndim == 2:
-        return Measured(c, values)
-    return Measured(c, values[:, :3, 3], values[:, :3, :3])
+        return Measurements(c, values)
+    return Measurements(c, values[:, :3, 3], values[:, :3, :3])
 
 
-def _must_explain(data: Measured, choice: Choice) -> None:
+def _must_explain(data: Measurements, choice: Choice) -> None:
     spread = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
     left = float(np.median(choice.errors[choice.level]))
     enough = HOPELESS if len(data) >= MANY else 1.0  # few rows say little of rows they have not seen

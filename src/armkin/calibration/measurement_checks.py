@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.calibration.robust_fit import Measured
+from armkin.calibration.robust_fit import Measurements
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import position
@@ -25,7 +25,7 @@ FITS = 0.1  # of the rows' spread, a miss that needs no explanation
 EXPLAINS = 0.35  # of the miss as given, what another reading must leave to be the explanation
 
 
-def check(arm: Arm, data: Measured) -> None:
+def check(arm: Arm, data: Measurements) -> None:
     """Raise UsageError, naming what is wrong, if the rows cannot calibrate this arm."""
     if len(data) < LEAST_ROWS:
         rows = "1 row is" if len(data) == 1 else f"{len(data)} rows are"
@@ -35,7 +35,7 @@ def check(arm: Arm, data: Measured) -> None:
     _check_readings(arm, data)
 
 
-def _check_motion(arm: Arm, data: Measured) -> None:
+def _check_motion(arm: Arm, data: Measurements) -> None:
     least = np.where(arm.prismatic, STILL[1], STILL[0])
     still = np.flatnonzero(np.ptp(data.c, axis=0) < least)
     if len(still):
@@ -53,7 +53,7 @@ def _check_motion(arm: Arm, data: Measured) -> None:
         )
 
 
-def _check_spread(data: Measured) -> None:
+def _check_spread(data: Measurements) -> None:
     centred = data.position - np.median(data.position, axis=0)
     # The rows nearest the middle of the cloud: a wrong row alone would make a line look thick.
     near = np.argsort(np.linalg.norm(centred, axis=1))[: max(LEAST_ROWS, math.ceil(0.8 * len(centred)))]
@@ -72,7 +72,7 @@ class _Reading(NamedTuple):
     position: Array
 
 
-def _check_readings(arm: Arm, data: Measured) -> None:
+def _check_readings(arm: Arm, data: Measurements) -> None:
     """Units and columns: whether another reading of the rows fits far better than the one given."""
     expected = position(arm, data.c)
     size = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
@@ -118,7 +118,7 @@ def _axes_in_place(expected: Array, measured: Array, most: float, largest: float
 _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "z"))
 
 
-def _readings(arm: Arm, data: Measured) -> list[_Reading]:
+def _readings(arm: Arm, data: Measurements) -> list[_Reading]:
     c, x = data.c, data.position
     degree = units.scale(arm)
     found = [

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from armkin.calibration.corrected_chain import KINDS, Model
 from armkin.calibration.observability import left_open
-from armkin.calibration.robust_fit import Fit, Measured, fit, residuals
+from armkin.calibration.robust_fit import Fit, Measurements, fit, residuals
 from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
@@ -41,7 +41,7 @@ class Choice:
 
 
 def choose(
-    model: Model, data: Measured, fixed: Collection[str] = (), tick: Callable[[int, int], object] | None = None
+    model: Model, data: Measurements, fixed: Collection[str] = (), tick: Callable[[int, int], object] | None = None
 ) -> Choice:
     """The level that the rows justify, fitted to all of them; tick: how many fits are done, and of how many."""
     sets = [free_at(model, level, data, fixed) for level in range(len(LEVELS))]
@@ -59,7 +59,7 @@ def choose(
 
 
 def _cross_validated(
-    model: Model, data: Measured, sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
+    model: Model, data: Measurements, sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
 ) -> tuple[list[Fit], Array]:
     """Every level fitted to all rows, and how far each row is off where it was left out: (levels, N) [mm].
 
@@ -86,7 +86,7 @@ def _cross_validated(
     return fits, errors
 
 
-def free_at(model: Model, level: int, data: Measured, fixed: Collection[str]) -> NDArray[np.intp]:
+def free_at(model: Model, level: int, data: Measurements, fixed: Collection[str]) -> NDArray[np.intp]:
     """The free parameters of a level: its own kind's and the simpler levels'."""
     kinds = KINDS[: level + 1 if level else 0]  # level 1 frees the first two
     wanted = [

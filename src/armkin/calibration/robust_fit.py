@@ -19,7 +19,7 @@ STEPS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Measurements:
     """Commanded joint values and measured tips."""
 
     c: Array  # (M, n) [rad | mm]
@@ -29,9 +29,9 @@ class Measured:
     def __len__(self) -> int:
         return len(self.c)
 
-    def rows(self, selected: NDArray[np.intp] | NDArray[np.bool_]) -> Measured:
+    def rows(self, selected: NDArray[np.intp] | NDArray[np.bool_]) -> Measurements:
         """Some of the rows."""
-        return Measured(
+        return Measurements(
             self.c[selected], self.position[selected], None if self.rotation is None else self.rotation[selected]
         )
 
@@ -47,7 +47,7 @@ class Fit:
     free: NDArray[np.intp]  # (F,)
 
 
-def residuals(model: Model, p: Array, data: Measured) -> tuple[Array, Array | None, Array]:
+def residuals(model: Model, p: Array, data: Measurements) -> tuple[Array, Array | None, Array]:
     """What the model misses: (M, 3) [mm], (M, 3) [rad] or None, and the Jacobian (M, 6, P)."""
     T, J = model.poses(p, data.c)
     off = data.position - T[:, :3, 3]
@@ -60,7 +60,7 @@ def residuals(model: Model, p: Array, data: Measured) -> tuple[Array, Array | No
 
 def fit(
     model: Model,
-    data: Measured,
+    data: Measurements,
     free: NDArray[np.intp],
     start: Array | None = None,
     steps: int = STEPS,

@@ -30,7 +30,7 @@ def traceable(command: Callable[..., Any]) -> Callable[..., Any]:
     def run(*words: Any, log: bool = False, **options: Any) -> Any:
         if not log:
             return command(*words, **options)
-        with Listening():
+        with BoardLog():
             return command(*words, **options)
 
     option = Log if "trace" in asked.parameters else Trace
@@ -40,7 +40,7 @@ def traceable(command: Callable[..., Any]) -> Callable[..., Any]:
     return run
 
 
-class Listening:
+class BoardLog:
     """The logger `armkin.board` on stderr, all of it, within a block."""
 
     def __enter__(self) -> None:

@@ -19,7 +19,7 @@ _NO_JSON = "standard input is no JSON: give --json to the command before the pip
 
 
 @dataclass(frozen=True)
-class Piped:
+class PipedPoses:
     """Poses for one robot file."""
 
     robot_file: str
@@ -38,7 +38,7 @@ class Pose:
     pulses: list[int] | None
 
 
-def read(robot: str | None) -> Piped:
+def read(robot: str | None) -> PipedPoses:
     """What a command before the pipe has printed: one JSON object, or one a line.
 
     robot: a robot file given as well, which must be the same. Raises UsageError if there is nothing to send,
@@ -61,7 +61,7 @@ def read(robot: str | None) -> Piped:
     _check_alike(answers, "tools", "tool")
     poses = [_pose(answer) for answer in answers]
     scene = first.get("scene"), first.get("scene_sha256")
-    return Piped(first["robot_file"], first["robot_sha256"], poses, *scene, _tool(first.get("tool")))
+    return PipedPoses(first["robot_file"], first["robot_sha256"], poses, *scene, _tool(first.get("tool")))
 
 
 def _check_alike(answers: Sequence[dict[str, Any]], what: str, *keys: str) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-class Wanted(NamedTuple):
+class TargetOptions(NamedTuple):
     """`--target`, and the options that belong to it."""
 
     target: str | None
@@ -31,7 +31,12 @@ class Wanted(NamedTuple):
 
 
 def goals(
-    robot: str | None, q: list[str] | None, wanted: Wanted, batch: str | None, scene: str | None, tool: str | None
+    robot: str | None,
+    q: list[str] | None,
+    wanted: TargetOptions,
+    batch: str | None,
+    scene: str | None,
+    tool: str | None,
 ) -> tuple[Arm, Goals | Stream]:
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
     target = wanted.target
@@ -54,7 +59,7 @@ def goals(
     return arm, _checked(arm, [], [arguments.joints(arm, q)])
 
 
-def _of_target(arm: Arm, target: str, wanted: Wanted) -> Goals:
+def _of_target(arm: Arm, target: str, wanted: TargetOptions) -> Goals:
     """`--target`, which is solved when it is known where the arm stands."""
     import numpy as np
 

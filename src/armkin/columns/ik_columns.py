@@ -28,7 +28,7 @@ BLOCK = 2_048  # targets of which all arrays fit the cache
 _STATUS = tuple(status.name.lower() for status in Status)
 
 
-class Listed(NamedTuple):
+class BranchTable(NamedTuple):
     """Columns of the branches of some targets, and which targets have no best branch (N,)."""
 
     table: Table
@@ -42,7 +42,7 @@ def columns(
     all_branches: bool,
     quick: Callable[..., tuple[NDArray[np.intp], Array] | None] | None = None,
     **more: Any,
-) -> Listed:
+) -> BranchTable:
     """The columns of ik: targets (N, ...) [mm, rad], rows (N,) their numbers; all_branches: not the best alone.
 
     more: of `armkin.ik`. The request sweeps no joint. quick: `nearest` by machine code, None where it does not serve.
@@ -58,13 +58,13 @@ def columns(
     free = within & s.clear if arm.keep_out else within
     names = () if request.branch is None else find(s.names, request.branch)
     parts = [
-        _listed(request, _Found(s, slice(i, i + BLOCK), q, within, free, near, names), rows, all_branches, quick)
+        _listed(request, _Answers(s, slice(i, i + BLOCK), q, within, free, near, names), rows, all_branches, quick)
         for i in range(0, max(len(q), 1), BLOCK)
     ]
-    return Listed(joined([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
+    return BranchTable(joined([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
 
 
-class _Found(NamedTuple):
+class _Answers(NamedTuple):
     """Some targets of a batch: q (N, B, n) of the whole arm, within limits, and free besides (N, B); near (n,).
 
     names: the branches that may be taken, none for all.
@@ -80,8 +80,8 @@ class _Found(NamedTuple):
 
 
 def _listed(
-    request: choose_branch.Request, answers: _Found, rows: NDArray[np.integer], all_branches: bool, quick: Any
-) -> Listed:
+    request: choose_branch.Request, answers: _Answers, rows: NDArray[np.integer], all_branches: bool, quick: Any
+) -> BranchTable:
     s, some, scale = answers.s, answers.rows, units.scale(request.arm)
     q, within, free, valid = answers.q[some], answers.within_limits[some], answers.free[some], s.valid[some]
     wanted = free if request.branch is None else free & np.isin(s.branch[some], answers.names)
@@ -101,7 +101,7 @@ def _listed(
         unsolved, branch, motion = ~there, best[there], motion[there]
     chosen = target[there], branch
     values = _Lines(target, there, q[chosen], within[chosen], motion, *chosen)
-    return Listed(_table(request, s, rows[some], some, values), unsolved)
+    return BranchTable(_table(request, s, rows[some], some, values), unsolved)
 
 
 def nearest(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:

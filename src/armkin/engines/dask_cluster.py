@@ -134,24 +134,24 @@ def versions() -> dict[str, str]:
 
 
 def _run_chunk(data: bytes, name: str, chunk: Any) -> Any:
-    work, job = _unpacked(_Packed(data, name))
+    work, job = _unpacked(_PackedJob(data, name))
     return work(job, chunk)
 
 
-class _Packed:
+class _PackedJob:
     """A job's bytes, told apart by their name alone."""
 
     def __init__(self, data: bytes, name: str) -> None:
         self.data, self.name = data, name
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Packed) and self.name == other.name
+        return isinstance(other, _PackedJob) and self.name == other.name
 
     def __hash__(self) -> int:
         return hash(self.name)
 
 
 @lru_cache(maxsize=4)
-def _unpacked(packed: _Packed) -> tuple[Callable[[Any, Any], Any], Any]:
+def _unpacked(packed: _PackedJob) -> tuple[Callable[[Any, Any], Any], Any]:
     work, job = pickle.loads(packed.data)
     return work, job

@@ -9,6 +9,6 @@ upload_firmware.py  which of them a board takes, and the board's own word at the
 """
 
 from armkin.flash.firmware_images import Image, image
-from armkin.flash.upload_firmware import Flashed, upload
+from armkin.flash.upload_firmware import FlashResult, upload
 
-__all__ = ["Flashed", "Image", "image", "upload"]
+__all__ = ["FlashResult", "Image", "image", "upload"]

@@ -33,7 +33,7 @@ Loader = Stk500v1 | Stk500v2
 Tick = Callable[[int, int], None]
 
 
-class Flashed(NamedTuple):
+class FlashResult(NamedTuple):
     """What was written, and what the board then said."""
 
     port: str | None  # where the board answers; None: a Pico whose port has not come yet
@@ -42,7 +42,7 @@ class Flashed(NamedTuple):
     firmware: str | None  # version, as the board says it
 
 
-def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> Flashed:
+def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> FlashResult:
     """Write a board's image through a port (a Pico: or the folder of its boot drive), and ask the board what it is.
 
     tick: is told the bytes written and read back so far, 0 when the boot loader has been found, and how many these
@@ -68,7 +68,7 @@ def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> Fl
         except LinkError as error:
             raise _interrupted(str(error), "some") from None
         tick(total, total)
-    return Flashed(port, len(flash), "avrdude" if program else "armkin", _answered_version(image.kind, port))
+    return FlashResult(port, len(flash), "avrdude" if program else "armkin", _answered_version(image.kind, port))
 
 
 def _loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
@@ -138,7 +138,7 @@ def _interrupted(reason: str, progress: str) -> LinkError:
     )
 
 
-def _to_boot_drive(image: Image, port: str, tick: Tick) -> Flashed:
+def _to_boot_drive(image: Image, port: str, tick: Tick) -> FlashResult:
     folder = Path(port)
     if not folder.is_dir():
         SerialPort(port, _TO_BOOT_DRIVE).close()
@@ -150,9 +150,9 @@ def _to_boot_drive(image: Image, port: str, tick: Tick) -> Flashed:
     while time.monotonic() < end:
         new = [found.device for found in list_ports() if found.device == port or found.device not in before]
         if new:
-            return Flashed(new[0], len(image.data), "UF2", _answered_version(image.kind, new[0]))
+            return FlashResult(new[0], len(image.data), "UF2", _answered_version(image.kind, new[0]))
         time.sleep(0.1)
-    return Flashed(None, len(image.data), "UF2", None)
+    return FlashResult(None, len(image.data), "UF2", None)
 
 
 def _answered_version(kind: str, port: str) -> str:

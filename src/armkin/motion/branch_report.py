@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.branches.branch_chains import Run
     from armkin.motion.branches.branch_columns import Columns
-    from armkin.motion.branches.branch_path import Carried
+    from armkin.motion.branches.branch_path import CarriedRoute
     from armkin.motion.timing.trajectory import Trajectory
 
 _SAME = 1e-6  # [rad | mm] of two postures that are one
@@ -30,7 +30,7 @@ _WHY = {
 }
 
 
-def note(plan: PathPlan, carried: Carried, near: Array) -> None:
+def note(plan: PathPlan, carried: CarriedRoute, near: Array) -> None:
     """Add runs, branches and breaks of a group of moves to the plan."""
     c, base, arm = carried.columns, plan.length, plan.arm
     plan.samples += len(c.s)
@@ -56,7 +56,7 @@ def _names(c: Columns, run: Run, base: float) -> list[tuple[float, str]]:
     return [(base + float(c.s[run.first + i]), _name(c, int(labels[i]))) for i in changes]
 
 
-def _branches(arm: Arm, carried: Carried, near: Array) -> list[Branch]:
+def _branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch]:
     """The branches at the start, the one that carries farthest first; of equals the one that is taken."""
     c, found, chosen = carried.columns, [], None
     for chain in carried.chains:
@@ -229,7 +229,7 @@ def _in_units(arm: Arm, joint: int, value: float) -> float:
     return value if arm.prismatic[joint] else value / units.DEGREE
 
 
-def path_refusal(plan: PathPlan, carried: Carried, branch: str | None = None) -> NoSolutionError:
+def path_refusal(plan: PathPlan, carried: CarriedRoute, branch: str | None = None) -> NoSolutionError:
     """The error of a path that is not carried, `branch` being asked for; `plan` of it tells the rest."""
     best, at = plan.branches[0] if plan.branches else None, None
     length = carried.route.length

@@ -34,7 +34,7 @@ from armkin.motion.tool_path import path_numbers, path_pieces
 from armkin.motion.tool_path.dense_points import FIT, PLAN, Polyline
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
 from armkin.motion.tool_path.path_pieces import Piece, Spot
-from armkin.motion.tool_path.route import Reduced, join_pieces
+from armkin.motion.tool_path.route import ReducedBlends, join_pieces
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -365,7 +365,7 @@ def _no_posture(solutions: Solutions, goal: Spot, branches: str | None, free: Bo
 
 def _copied_state(state: dict[str, Any]) -> dict[str, Any]:
     """A state whose lists do not change with the original's."""
-    return {key: copy(each) if isinstance(each, list | dict | Reduced) else each for key, each in state.items()}
+    return {key: copy(each) if isinstance(each, list | dict | ReducedBlends) else each for key, each in state.items()}
 
 
 def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.plot.canvas import INK, SOFT, flat, picture
-from armkin.reachability.place_arm import Around, arm_at_place
+from armkin.reachability.place_arm import Obstacles, arm_at_place
 from armkin.view.skeleton import skeleton
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def _arm(axes: Any, place: Place) -> None:
     """The targets, and the arm from above at its best place: on a target in the middle, paler on the first and last."""
     count = len(place.postures)
     at = (float(place.xyz[0]), float(place.xyz[1]), place.z)
-    stands = arm_at_place(place.arm, Around(), at, float(place.yaw[place.best[2]]))
+    stands = arm_at_place(place.arm, Obstacles(), at, float(place.yaw[place.best[2]]))
     few = len(place.positions) < 50
     axes.plot(*place.positions[:, :2].T, ".", color=TARGETS, mec="white", mew=0.5 * few, ms=7 if few else 3)
     middle = count // 2

@@ -13,7 +13,7 @@ from armkin.columns.table import Table
 from armkin.engines.ordered_chunks import Engine, in_order
 
 
-class Numbered(Protocol):
+class NumberedChunk(Protocol):
     """A piece of the work."""
 
     @property
@@ -21,7 +21,7 @@ class Numbered(Protocol):
         """Its place among all, from 0."""
 
 
-Chunk = TypeVar("Chunk", bound=Numbered)
+Chunk = TypeVar("Chunk", bound=NumberedChunk)
 
 
 @contextmanager

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 INSIDE = 1e-6  # [mm] of a base that stands on an obstacle, by rounding
 
 
-class Around(NamedTuple):
+class Obstacles(NamedTuple):
     """What stands with the targets: keep-outs, and how far arms stay away from them [mm]."""
 
     keep_out: tuple[Entry, ...] = ()
@@ -33,7 +33,7 @@ class Around(NamedTuple):
     sha256: str = ""
 
 
-def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm, Around]:
+def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm, Obstacles]:
     """An arm with its own keep-outs alone, and those of its scene and of another.
 
     What the arm's bodies keep from each other is the arm's own, wherever it is asked for.
@@ -44,15 +44,17 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
         more = read(os.fspath(scene))
         there, clearance, sha256 = [*there, *more.keep_out], max(clearance, more.clearance), more.sha256
     if not there:
-        return arm, Around()
+        return arm, Obstacles()
     selves = tuple(entry for entry in there if entry.kind == "self")
     if not any(entry.kind == "self" for entry in mine):
         mine += selves[:1]
     still = tuple(entry for entry in there if entry.kind != "self")
-    return replace(arm, keep_out=mine, clearance=clearance, of_scene=0), Around(still, clearance, sha256)
+    return replace(arm, keep_out=mine, clearance=clearance, of_scene=0), Obstacles(still, clearance, sha256)
 
 
-def free(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float, q: Array) -> NDArray[np.bool_]:
+def free(
+    arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float, q: Array
+) -> NDArray[np.bool_]:
     """Which postures (..., n) of an arm at a place hit nothing of what stands there; nan: none.
 
     None does where the base's axis goes into an obstacle: a base may stand on one, but not in it.
@@ -67,12 +69,12 @@ def free(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn
 
 
 @lru_cache(maxsize=4)
-def _arm_among_obstacles(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float) -> Arm:
+def _arm_among_obstacles(arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, among what stands with the targets."""
     return replace(_moved_arm(arm, position, turn), keep_out=obstacles.keep_out, clearance=obstacles.clearance)
 
 
-def arm_at_place(arm: Arm, obstacles: Around, position: tuple[float, float, float], turn: float) -> Arm:
+def arm_at_place(arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, with its own keep-outs, which move with it, and what stands there."""
     mine = tuple(_moved_entry(entry, position, turn) for entry in arm.keep_out)
     clearance = max(arm.clearance, obstacles.clearance)

@@ -13,7 +13,7 @@ import numpy as np
 from armkin import path_file
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.reachability.place_arm import Around, arm_at_place
+from armkin.reachability.place_arm import Obstacles, arm_at_place
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -25,7 +25,7 @@ STEP = 0.01  # of the arm's reach, from target to target along a path
 
 
 @dataclass(frozen=True)
-class Planned:
+class PathFromPlace:
     """A place from which a path was planned. index: in the arrays of `Place`; plan: None where it is refused."""
 
     index: tuple[int, int, int]
@@ -76,17 +76,17 @@ def rates_lacking(arm: Arm) -> str:
 
 def plan(
     arm: Arm,
-    obstacles: Around,
+    obstacles: Obstacles,
     index: tuple[int, int, int],
     position: tuple[float, float, float],
     turn: float,
     file: PathFile,
-) -> Planned:
+) -> PathFromPlace:
     """The path's plan from a place, or why there is none."""
     from armkin.motion.path import path
 
     anyones = file.model_copy(update={"robot": None})  # another robot may stand in for the one that it was made for
     try:
-        return Planned(index, path(arm_at_place(arm, obstacles, position, turn), anyones))
+        return PathFromPlace(index, path(arm_at_place(arm, obstacles, position, turn), anyones))
     except NoSolutionError as error:
-        return Planned(index, None, str(error).splitlines()[0])
+        return PathFromPlace(index, None, str(error).splitlines()[0])

@@ -37,7 +37,7 @@ from armkin.model.lock_joints import unlock
 from armkin.reachability import kept_chunks, place_path
 from armkin.reachability.cell_answers import TURN, limit_margin
 from armkin.reachability.place_arm import split_keep_outs
-from armkin.reachability.place_path import Planned
+from armkin.reachability.place_path import PathFromPlace
 from armkin.reachability.place_targets import (
     Question,
     Solve,
@@ -94,7 +94,7 @@ class Place:
     best: tuple[int, int, int]
     positions: Array
     postures: Array
-    planned: tuple[Planned, ...] = ()
+    planned: tuple[PathFromPlace, ...] = ()
     unplanned: str = ""
     held: Mapping[str, float] = field(default_factory=dict)
 
@@ -258,7 +258,7 @@ def _planned(question: Question, place: Place, file: PathFile, room: Room) -> Pl
     """The same with the best places planned; one that cannot be planned does not reach all."""
     if why := place_path.rates_lacking(question.arm):
         return replace(place, unplanned=why)
-    tried: list[Planned] = []
+    tried: list[PathFromPlace] = []
     left = place.reached.copy()
     while left.max() == place.of and len(tried) < TRIES and sum(one.plan is not None for one in tried) < FEW:
         i, j, k = _best(room, left, place.margin)

@@ -18,7 +18,7 @@ from armkin.model.lock_joints import lock, unlock
 from armkin.model.rotation import rotation_about
 from armkin.reachability import place_branches
 from armkin.reachability.cell_answers import TURN, arc, packed, some_copy_legal
-from armkin.reachability.place_arm import Around, free
+from armkin.reachability.place_arm import Obstacles, free
 from armkin.reachability.place_upright import RADII, by_radius
 from armkin.reachability.reach_cells import STRAIGHT
 
@@ -33,7 +33,7 @@ BLOCK = 8_192  # targets that are asked together: what is known of them stays in
 BEYOND = 1e-6  # reaches: farther away nothing solves a target
 
 
-class Held(NamedTuple):
+class HeldArm(NamedTuple):
     """An arm, and which of its joints are held at which values [rad]."""
 
     arm: Arm
@@ -49,11 +49,11 @@ class Question(NamedTuple):
     yaws: int
     step: float  # [rad] of the yaw
     z: float
-    obstacles: Around = Around()
+    obstacles: Obstacles = Obstacles()
     ways: tuple[int, ...] = ()  # of a path: how many targets each way has that one branch is to carry
     spare: str = ""  # the redundant joint, which a path's plan holds,
     values: tuple[float, ...] = ()  # and where it may [rad], the best first
-    full_arm: Held | None = None  # where one of the values is chosen
+    full_arm: HeldArm | None = None  # where one of the values is chosen
     solve: Solve = ik  # a function of a module, as it travels
 
     @property
@@ -103,7 +103,7 @@ def _most_of_values(question: Question, positions: Array) -> NDArray[np.int64]:
     """
     counts = np.zeros((len(positions), question.yaws), np.int64)
     blocked = question.arm.keep_out or question.obstacles.keep_out
-    bare = question._replace(arm=_without_keep_outs(question.arm), obstacles=Around())
+    bare = question._replace(arm=_without_keep_outs(question.arm), obstacles=Obstacles())
     left = np.arange(len(positions))
     for one, without in zip(each_value(question), each_value(bare), strict=True):
         some, found = left, reached_counts(without, positions[left])
@@ -122,7 +122,7 @@ def each_value(question: Question) -> Iterator[Question]:
     if not question.values:
         yield question
     for value in question.values:
-        whole = Held(question.arm, {question.spare: value})
+        whole = HeldArm(question.arm, {question.spare: value})
         rest = _with_held_joint(question.arm, question.spare, value)  # one of many arms: not worth being compiled
         yield question._replace(arm=rest, values=(), full_arm=whole, solve=ik)
 
@@ -336,7 +336,7 @@ def free_from(
         legal = legal & s.clear
     if question.obstacles.keep_out and legal.any():
         place, q = (float(position[0]), float(position[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
-        arm, joints = question.full_arm or Held(question.arm, {})
+        arm, joints = question.full_arm or HeldArm(question.arm, {})
         legal = legal & free(arm, question.obstacles, place, turn, unlock(arm, joints, q))
     return s, np.asarray(legal)
 

@@ -43,7 +43,7 @@ Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Imported:
+class UrdfRobot:
     """A robot file's keys and values, and what a reader of the result should know."""
 
     data: dict[str, Any]
@@ -54,7 +54,7 @@ class Imported:
 
 def read(
     path: str | os.PathLike[str], *, base: str | None = None, tip: str | None = None, snap: bool = False
-) -> Imported:
+) -> UrdfRobot:
     """Read a URDF file; see `parse`. Raises FileError if it cannot be read."""
     name = os.fspath(path)
     return parse(load(name), name, base=base, tip=tip, snap=snap)
@@ -72,7 +72,7 @@ def load(path: str) -> bytes:
 
 def parse(
     raw: bytes, name: str = "robot.urdf", *, base: str | None = None, tip: str | None = None, snap: bool = False
-) -> Imported:
+) -> UrdfRobot:
     """The chain from link `base` to link `tip` as a robot file with convention screws.
 
     base: by default the link without a parent; tip: by default the one link in which the chain can end.
@@ -109,7 +109,7 @@ def _radius(solids: list[tuple[str, dict[str, str]]]) -> float | None:
     return greatest if 0 < greatest <= 1e6 else None
 
 
-def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap: bool) -> Imported:
+def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap: bool) -> UrdfRobot:
     """The chain as a robot file."""
     if "${" in "".join(str(joint.parts) for joint in chain):
         raise is_xacro(path)
@@ -141,7 +141,7 @@ def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap:
         "zero_pose": pose(T.tolist()),
         "joints": joints,
     }
-    return Imported(data, tuple(notes), base, tip)
+    return UrdfRobot(data, tuple(notes), base, tip)
 
 
 def _check_chain(path: str, base: str, tip: str, joints: int, reach: float) -> None:

@@ -34,7 +34,7 @@ class StartError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Laid:
+class StartedTrajectory:
     """A trajectory that begins at counts `start` (motors,) of a board. Raises as `check_start` does."""
 
     trajectory: Trajectory

@@ -32,7 +32,7 @@ _STEP = 1.0 + 1e-9  # [counts] that every motor of an arm on its plan is within;
 
 
 @dataclass(frozen=True)
-class Left:
+class BoardNote:
     """What was left on a board."""
 
     arm: str  # digest of what makes joint values of counts
@@ -53,13 +53,13 @@ class Record:
     def write_position(self, marks: Marks, counts: Sequence[int], offset: Sequence[int]) -> None:
         """The arm stands there, by armkin's own doing or somebody's word."""
         kept = {name: value if isinstance(value, str) else list(value) for name, value in marks.items()}
-        self._write(Left(_digest(self._arm), kept, list(map(int, offset)), list(map(int, counts))))
+        self._write(BoardNote(_digest(self._arm), kept, list(map(int, offset)), list(map(int, counts))))
 
     def write_motion(self, job: Job, piece: float) -> None:
         """A motion begins, of which curves are sent in pieces of so many seconds."""
         assert self.note is not None
         left = self.note
-        self._write(Left(left.arm, left.marks, left.offset, job.start.tolist(), path_corners(job, piece)))
+        self._write(BoardNote(left.arm, left.marks, left.offset, job.start.tolist(), path_corners(job, piece)))
 
     def forget(self) -> None:
         """Nobody knows where the arm stands."""
@@ -93,7 +93,7 @@ class Record:
         )
         return f"it stands at {at.tolist()} steps, and armkin left it {where}: another program has moved it"
 
-    def _write(self, note: Left) -> None:
+    def _write(self, note: BoardNote) -> None:
         self.note = note
         if self._path is not None:
             plan = None if note.plan is None else _packed(note.plan)
@@ -154,7 +154,7 @@ def _unpacked(text: str, motors: int) -> NDArray[np.int64]:
     return np.cumsum(rows, axis=0).astype(np.int64)
 
 
-def _read(path: str) -> Left | None:
+def _read(path: str) -> BoardNote | None:
     """What a record says, if it is one."""
     told = read_note(path, _MOST)
     if told is None:
@@ -168,6 +168,6 @@ def _read(path: str) -> Left | None:
             for name, value in told["marks"].items()
         }
         rows = None if plan is None else _unpacked(plan, len(counts))
-        return Left(str(told["arm"]), marks, offset, counts, rows)
+        return BoardNote(str(told["arm"]), marks, offset, counts, rows)
     except (ValueError, KeyError, TypeError, AttributeError, zlib.error):
         return None

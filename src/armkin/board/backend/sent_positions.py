@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.motion_start import Laid
+from armkin.board.backend.motion_start import StartedTrajectory
 from armkin.motion.joint_moves import plan
 from armkin.motion.timing.trajectory import brake
 from armkin.motors import joints, pulses
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Job(Laid):
+class Job(StartedTrajectory):
     """A trajectory that starts at counts `start` (motors,), sent in so many `segments`: lines or positions."""
 
     segments: int

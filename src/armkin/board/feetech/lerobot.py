@@ -53,7 +53,7 @@ class Motor:
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class ServoCalibration:
     """What a calibration file says of an arm."""
 
     motors: tuple[Motor, ...]  # in the arm's order
@@ -107,7 +107,7 @@ def _whole_number(path: str, name: str, values: Any, key: str) -> int:
     return value
 
 
-def calibration_edits(arm: Arm, path: str, pose: Array | None) -> Calibrated:
+def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibration:
     """What a calibration file says of an arm whose joints have a bus servo each.
 
     pose: (n,) [rad] where the middles of all ranges are; None: every joint's value is 0 there. Raises FileError for
@@ -132,7 +132,7 @@ def calibration_edits(arm: Arm, path: str, pose: Array | None) -> Calibrated:
         edits["joints", j, "drive", "zero"] = _int_if_whole(at)
         edits["joints", j, "drive", "invert"] = "true" if motor.drive_mode else "false"
     jaw, ends = _gripper(arm, there, path, edits)
-    return Calibrated(tuple(motors), tuple(zero), tuple(limits), jaw, ends, edits)
+    return ServoCalibration(tuple(motors), tuple(zero), tuple(limits), jaw, ends, edits)
 
 
 def _calibrated_motor(

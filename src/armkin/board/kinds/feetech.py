@@ -12,7 +12,7 @@ from armkin.board.backend.board import Board, Gripped
 from armkin.board.feetech import registers, servo_gripper
 from armkin.board.feetech.bus import Bus
 from armkin.board.feetech.feetech_machine import ServoMachine, job, servo_ids
-from armkin.board.feetech.lerobot import Calibrated, calibration_edits
+from armkin.board.feetech.lerobot import ServoCalibration, calibration_edits
 from armkin.board_catalogue import ForeignBoard
 from armkin.motors import pulses
 
@@ -80,7 +80,7 @@ class ServoBusBoard(Board):
         jaw = None if gripper is None else servo_gripper.zero(self.machine.bus, self.gripper(), gripper)
         return list(self.machine.counts()), jaw
 
-    def calibration(self, path: str, pose: Array | None) -> Calibrated:
+    def calibration(self, path: str, pose: Array | None) -> ServoCalibration:
         """What a LeRobot calibration file says of the arm."""
         return calibration_edits(self.arm, path, pose)
 

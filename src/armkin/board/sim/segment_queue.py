@@ -27,7 +27,7 @@ def intervals(s: Segment) -> Iterator[int]:
 
 
 @dataclass
-class Queued:
+class QueuedSegment:
     """A segment with a step for every axis of the board."""
 
     segment: Segment
@@ -47,7 +47,7 @@ class Queue:
         self.axes, self.clock, self.slots = axes, clock, slots
         self.plan = [HALF] * len(axes.base)  # places where the queue ends, 2^-23 step
         self._fraction = [HALF] * len(axes.base)  # how far the axes are beyond their base, 2^-23 step
-        self._queue: deque[Queued] = deque()
+        self._queue: deque[QueuedSegment] = deque()
         self._units = 0  # length of all of them, in units of 256 cycles: asked for every millisecond
         self._cycles_run = 0.0  # cycles since the running segment's start
 
@@ -67,7 +67,7 @@ class Queue:
     def append(self, segments: list[Segment], at_rest: bool) -> None:
         """Queue segments (a step for every axis), the last one ending at rest or not."""
         for i, segment in enumerate(segments):
-            self._queue.append(Queued(segment, at_rest and i + 1 == len(segments)))
+            self._queue.append(QueuedSegment(segment, at_rest and i + 1 == len(segments)))
             self._units += segment.units()
             self.plan = [p + segment.ticks * r for p, r in zip(self.plan, segment.rates, strict=True)]
         if at_rest:
@@ -98,7 +98,7 @@ class Queue:
         """Every axis's velocity just now, in any unit."""
         return [float(r) for r in self._queue[0].segment.rates] if self._queue else [0.0] * len(self.axes.base)
 
-    def run(self, seconds: float) -> Queued | None:
+    def run(self, seconds: float) -> QueuedSegment | None:
         """Let time pass; the last segment, if its end has been passed. Axes stopped too abruptly are lost."""
         self._cycles_run += seconds * self.clock
         while self._queue and self._cycles_run >= self._queue[0].times[-1]:

@@ -23,7 +23,7 @@ _SILENCE = 0.5  # [s]
 
 
 @dataclass(frozen=True)
-class _Retained:
+class _RetainedState:
     """What a reset leaves of an arm that stood still."""
 
     image: bytes  # of the configuration, empty if there was none
@@ -83,11 +83,11 @@ class SimBoard:
         still = motors.state == State.IDLE
         motors.cut()
         known, counts = motors.axes.known & ~self.board.servo_mask, motors.axes.base
-        retained = _Retained(setup.packed(), setup.drivers, known, counts) if still and not power else None
+        retained = _RetainedState(setup.packed(), setup.drivers, known, counts) if still and not power else None
         self._boots = 0 if power else self._boots
         self._power_up(0 if self.hidden_cause else 1 if power else 2, motors.axes.net, retained)
 
-    def _power_up(self, cause: int, net: list[int], retained: _Retained | None) -> None:
+    def _power_up(self, cause: int, net: list[int], retained: _RetainedState | None) -> None:
         self._splitter = protocol.Splitter(self.board.frame)
         self._error, self._detail, self._next, self._nonce = Error.NO_SESSION, 0, 0, -1
         self._digest = 0

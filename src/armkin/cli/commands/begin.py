@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from armkin.board.backend import Backend
     from armkin.board.backend.board import Board
-    from armkin.board.commissioning import Found
+    from armkin.board.commissioning import Findings
     from armkin.model.arm import Arm
 
 
@@ -49,7 +49,7 @@ def begin(
         raise FileError(f"{out} is there already; give another name", file=out)
     link = board_link.Link(port, baud, None, resume=False, reset=not no_reset, no_scene=no_scene)
     session = _Session(robot, path, scene, link)
-    found = commissioning.Found()
+    found = commissioning.Findings()
     with keys() as person:
         try:
             session.run(found, person)
@@ -73,7 +73,7 @@ class _Session:
         self.text = _read(path)
         self.assumptions_told = False
 
-    def run(self, found: Found, person: Keys) -> None:
+    def run(self, found: Findings, person: Keys) -> None:
         """All steps, in their order."""
         from armkin.board import commissioning
 
@@ -97,7 +97,7 @@ class _Session:
     def _open(self, board: Board) -> AbstractContextManager[Backend]:
         return board_link.backend(board, self.port, self.link.baud, reset=self.link.reset)
 
-    def _board(self, found: Found) -> tuple[Board, Arm]:
+    def _board(self, found: Findings) -> tuple[Board, Arm]:
         """The board of the file as it is corrected so far."""
         from armkin.keep_out.load_with_scene import arm_in_scene
         from armkin.robot_file import parse
@@ -111,7 +111,7 @@ class _Session:
         self.assumptions_told = True
         return board_link.board_of(arm, rehearsal=self.port == board_link.SIM), arm
 
-    def corrected(self, found: Found) -> str:
+    def corrected(self, found: Findings) -> str:
         """The file's text with what was found."""
         from armkin.robot_file import parse
         from armkin.robot_file.replace_values import with_values
@@ -131,7 +131,7 @@ class _Session:
             where["joints", j, "limits"] = flow(list(pair))
         return with_values(self.text, where)
 
-    def write(self, found: Found, out: str | None, person: Keys) -> None:
+    def write(self, found: Findings, out: str | None, person: Keys) -> None:
         """The corrected file, shown as a diff and asked for first."""
         from armkin.files import write_whole
         from armkin.robot_file import parse

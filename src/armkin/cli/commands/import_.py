@@ -15,7 +15,7 @@ from armkin.errors import UsageError
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.robot_file.urdf_reader import Imported
+    from armkin.robot_file.urdf_reader import UrdfRobot
 
 
 def import_(
@@ -64,7 +64,7 @@ def import_(
         output.note(gain)
 
 
-def _gain(raw: bytes, imported: Imported, arm: Arm) -> str | None:
+def _gain(raw: bytes, imported: UrdfRobot, arm: Arm) -> str | None:
     """What --snap would buy: another solver class, and how far the tip would move for it."""
     import numpy as np
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armkin.engines.ordered_chunks import Engine
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.reachability.place_path import Planned
+    from armkin.reachability.place_path import PathFromPlace
     from armkin.reachability.place_search import Place
 
 RobotsAndFile = Annotated[
@@ -165,7 +165,7 @@ def _held(place: Place) -> dict[str, float]:
     return {name: round(float(value / DEGREE), 9) for name, value in place.held.items()}
 
 
-def _planned(place: Place, plan: Planned) -> PlannedPlace:
+def _planned(place: Place, plan: PathFromPlace) -> PlannedPlace:
     from armkin.model.units import DEGREE
 
     i, j, k = plan.index

@@ -14,7 +14,7 @@ from armkin.cli.default_port import PortName
 from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.number_parsing import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
-from armkin.cli.send_goals import Wanted
+from armkin.cli.send_goals import TargetOptions
 from armkin.cli.send_goals import goals as read_goals
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -124,7 +124,7 @@ def send(
         sent(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
         return
     radius = _blend(blend, batch)
-    arm, goals = read_goals(robot, q, Wanted(target, task, branch, lock, near), batch, scene, tool)
+    arm, goals = read_goals(robot, q, TargetOptions(target, task, branch, lock, near), batch, scene, tool)
     output.check(trace, "a plan is", ".csv")
     arm = keep_outs.marked(arm, ignore_keep_out)
     arm = _accelerated(arm, accel)

@@ -56,7 +56,7 @@ class Pace:
 
 
 @dataclass(frozen=True)
-class Carried:
+class CarriedRoute:
     """A route on branches: the runs, and what was found on the way."""
 
     route: Route
@@ -101,7 +101,7 @@ def carry(
     fixed: Array | None = None,
     branch: str | None = None,
     count: int | None = None,
-) -> Carried:
+) -> CarriedRoute:
     """The branches that carry a route, and the best way along them.
 
     near: where the arm comes from; fixed: where it stands at the route's start, if it has no choice; branch: name
@@ -122,7 +122,7 @@ def carry(
     complete = [Run(c, 0, end) for c in starts if c.carries(0) == end]
     if len(complete) > 1:
         complete = [_fastest(arm, route, columns.s, complete, near, pace, fixed)]
-    return Carried(route, columns, all_, complete or fewest(all_, end + 1, starts))
+    return CarriedRoute(route, columns, all_, complete or fewest(all_, end + 1, starts))
 
 
 def _starts(arm: Arm, chains: list[Chain], fixed: Array | None) -> list[Chain]:

@@ -15,7 +15,7 @@ from armkin.forward import condition, jacobian
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, way_of
 from armkin.motion.timing.trajectory import Stretch, Trajectory, group_numbers
-from armkin.motion.tool_path.route import Reduced
+from armkin.motion.tool_path.route import ReducedBlends
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -117,7 +117,7 @@ class PathPlan:
     complete: bool = True
     deviation: float = 0.0
     rounded_most: float | None = None
-    reduced: Reduced = field(default_factory=Reduced)
+    reduced: ReducedBlends = field(default_factory=ReducedBlends)
     passed: list[Passed] = field(default_factory=list)
     runs: list[PathRun] = field(default_factory=list)
     branches: list[Branch] = field(default_factory=list)

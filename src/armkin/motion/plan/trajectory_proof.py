@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Found:
+class TrajectoryProof:
     """What a proof has found of a trajectory.
 
     proof: of the part with the first hit, or with the least clearance; stretch: its number there, share: how far into
-    that stretch's cells; joints: (n,) [rad | mm] there; body, other: names of the pair, empty where nothing counts;
+    that stretch's cells; joints: (n,) [rad | mm] there; body, keep_out: names of the pair, empty where nothing counts;
     escaping: pairs that were too near at the start.
     """
 
@@ -94,7 +94,7 @@ def _points(stretch: Stretch) -> Array:
     return np.asarray(stretch.start + share * (stretch.end - stretch.start)).reshape(4, 1, -1)
 
 
-def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Found | None:
+def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> TrajectoryProof | None:
     """What a proof finds of a trajectory; None for an arm without keep-outs. tight: see `prove`."""
     arm = trajectory.arm
     whole, _ = whole_arm(arm, trajectory.start[None])
@@ -105,7 +105,7 @@ def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Found | 
     held, allowed, found, postures = guard(whole), None, None, 0
     escaping: tuple[int, ...] = ()
     for first, way in _geometries(trajectory):
-        lifted = _Lifted(arm, way)
+        lifted = _UnlockedWay(arm, way)
         proof = prove(held, lifted, tight=tight, ignored_pairs=allowed)
         postures += proof.postures
         if allowed is None:
@@ -118,7 +118,7 @@ def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Found | 
             found = here
     if found is None:  # no stretch: the arm stays where it is
         return None
-    return Found(**{**vars(found), "postures": postures})
+    return TrajectoryProof(**{**vars(found), "postures": postures})
 
 
 def check_free(trajectory: Trajectory, place: str = "") -> None:
@@ -152,7 +152,7 @@ def prove_plan(plan: PathPlan) -> PathPlan:
     raise error
 
 
-def refusal(trajectory: Trajectory, hit: Found, place: str = "", **fields: object) -> NoSolutionError:
+def refusal(trajectory: Trajectory, hit: TrajectoryProof, place: str = "", **fields: object) -> NoSolutionError:
     """Why a motion is refused; place: where on a path."""
     arm = trajectory.arm
     values = units.joints_out(arm, hit.joints).tolist()
@@ -192,7 +192,7 @@ def hits_said(arm: Arm, q: Array) -> str:
 
 
 @dataclass(frozen=True)
-class _Lifted:
+class _UnlockedWay:
     """The way of the whole arm, where joints are held."""
 
     arm: Arm
@@ -231,7 +231,7 @@ def _geometries(trajectory: Trajectory) -> list[tuple[int, Way]]:
 
 def _proof_on_trajectory(
     trajectory: Trajectory, held: Guard, first: int, proof: Proof, escaping: tuple[int, ...], postures: int, way: Way
-) -> Found:
+) -> TrajectoryProof:
     """A proof in the terms of the trajectory."""
     stretch, cell = first, proof.place
     if isinstance(way, Cubics):
@@ -244,14 +244,14 @@ def _proof_on_trajectory(
     body, other = ("", "") if proof.pair is None else held.pair_names(proof.pair)
     joints = way.joints_at(np.array([proof.place]))[0]
     pairs = tuple(held.pair_names(k) for k in escaping)
-    return Found(proof.free, proof.mm, stretch, cell, joints, body, other, pairs, postures)
+    return TrajectoryProof(proof.free, proof.mm, stretch, cell, joints, body, other, pairs, postures)
 
 
 def _cells(stretch: Stretch) -> int:
     return len(stretch.path.h) if isinstance(stretch, Curve) else 1
 
 
-def seconds(trajectory: Trajectory, hit: Found) -> float:
+def seconds(trajectory: Trajectory, hit: TrajectoryProof) -> float:
     """When, after the beginning, a trajectory is at the place that a proof has found [s]."""
     stretch = trajectory.stretches[hit.stretch]
     begin = float(trajectory.begins[hit.stretch])

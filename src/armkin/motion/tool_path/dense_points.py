@@ -15,7 +15,7 @@ from armkin.model.target_numbers import targets_in
 from armkin.motion.tool_path import path_numbers
 from armkin.motion.tool_path.b_spline import Int
 from armkin.motion.tool_path.chords import distinct, turns
-from armkin.motion.tool_path.fit_points import REVERSAL, Fitted, fit_curves
+from armkin.motion.tool_path.fit_points import REVERSAL, FittedCurves, fit_curves
 from armkin.motion.tool_path.path_pieces import Dense, Piece, Spot, line, turn_between, unit_speed, vector, weights
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def _block(
         return [_line(task, spots, numbers, speeds)]
     moving = (y != y[0]).any(axis=0)  # the others stay
     scale, stop = weights(task)[moving], np.isin(np.arange(len(y)), ends)
-    curve: Fitted = fit_curves(y[:, moving], FIT * tolerance, stop)
+    curve: FittedCurves = fit_curves(y[:, moving], FIT * tolerance, stop)
     still = np.where(moving, 0.0, y[0] / weights(task))
 
     def at(v: Array) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ _TRIES = 5  # after which a curve that leaves its chords is given up
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedCurves:
     """Cubics one after another over a parameter that is nearly their length; where the given points are passed."""
 
     begin: Array  # (M + 1,) parameter at which each cubic begins, and the end
@@ -76,7 +76,7 @@ def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
     return found
 
 
-def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> Fitted:
+def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCurves:
     """Points (N, d) [mm], no two neighbours the same, as cubics within `tolerance` of each, in order.
 
     stop: (N,) where the way rests, the ends among them: there it stays a corner.
@@ -171,13 +171,13 @@ def _astray_chords(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
 
 def _rounded(
     chords: Chords, stop: Bool, begin: Array, end: Array, powers: Array, curve: Int, tolerance: float
-) -> Fitted:
+) -> FittedCurves:
     """Curves with their corners, but for stops, rounded by cubics, within the tolerance and half of the sides."""
     corner = np.flatnonzero(chords.corner)
     at, u = chords.u.copy(), chords.u
     if not len(corner):
-        return Fitted(np.append(begin, end[-1]), powers, at, np.zeros(0))
-    whole = Fitted(np.append(begin, end[-1]), powers, at, np.zeros(0))
+        return FittedCurves(np.append(begin, end[-1]), powers, at, np.zeros(0))
+    whole = FittedCurves(np.append(begin, end[-1]), powers, at, np.zeros(0))
     most = np.where(stop[corner], 0.0, 0.5 * np.minimum(chords.length[corner - 1], chords.length[corner]))
     tiny = 1e-9 * most
     before, after = (whole.values(u[corner] + way)[1] for way in (-tiny, tiny))
@@ -203,7 +203,7 @@ def _rounded(
     starts = np.append(x, u[corner] - r)
     order = np.argsort(starts, kind="stable")
     bends = np.sort(np.concatenate([u[corner] - r, u[corner] + r]))
-    return Fitted(np.append(starts[order], u[-1]), np.concatenate([cut, blends[round_]])[order], at, bends)
+    return FittedCurves(np.append(starts[order], u[-1]), np.concatenate([cut, blends[round_]])[order], at, bends)
 
 
 def _part(c: Array, a: Array, b: Array) -> Array:

@@ -125,7 +125,7 @@ class Route:
 
 
 @dataclass
-class Reduced:
+class ReducedBlends:
     """Blends that did not fit: how many, and of the smallest what was wished and what it became [mm]."""
 
     count: int = 0
@@ -147,7 +147,7 @@ def join_pieces(
     blends: Sequence[float | None],
     pauses: frozenset[int],
     tolerance: float = 0.0,
-    reduced: Reduced | None = None,
+    reduced: ReducedBlends | None = None,
 ) -> tuple[Route, dict[int, int]]:
     """Pieces as a route: corners rounded by their blends (one for each piece's end), rests where there is none.
 
@@ -155,7 +155,7 @@ def join_pieces(
     the arm has to stand in any case. Returns the route, and for each of them the number of the piece in it; blends
     that do not fit are made smaller, and noted in `reduced`.
     """
-    reduced = Reduced() if reduced is None else reduced
+    reduced = ReducedBlends() if reduced is None else reduced
     made: list[Piece] = []
     side = 0.0  # of the last piece, before it was cut
     stops, order = {0}, {}

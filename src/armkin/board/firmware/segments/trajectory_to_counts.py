@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armkin.board.backend.motion_start import Laid
+from armkin.board.backend.motion_start import StartedTrajectory
 from armkin.board.firmware.segments.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
 from armkin.board.firmware.segments.curve_segments import CurveSegments, rates
 from armkin.board.firmware.segments.straight_lines import Pieces, count, line_segments
@@ -44,7 +44,7 @@ class RateError(UsageError):
 
 
 @dataclass(frozen=True)
-class Cut(Laid):
+class Cut(StartedTrajectory):
     """A trajectory on this board."""
 
     ends: Counts  # (stretches, motors) where each stretch ends
