@@ -208,7 +208,7 @@ def progress(task: str, total: int | Callable[[], int | None] | None = None) -> 
             from armkin.cli.progress_bar import start_bar
 
             shown = start_bar(task)
-        shown.tell(done, known, now - began)
+        shown.update(done, known, now - began)
 
     try:
         yield tick
