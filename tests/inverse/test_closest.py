@@ -20,7 +20,7 @@ def cost(arm: armkin.Arm, task: str | None, target: np.ndarray, q: np.ndarray) -
     """What `closest` minimises, from the oracle's kinematics: squared distance and angle at a quarter of the reach."""
     definition = task_for(arm, task)
     T = forward(screws(arm.file), q)
-    goal = read_targets(definition, target).values
+    goal = read_targets(definition, target)[0]
     r = residual(definition, T, q, np.repeat(goal, len(q), axis=0))
     p = definition.position
     return np.asarray((r[:, :p] ** 2).sum(axis=1) + (arm.reach / 4) ** 2 * (r[:, p:] ** 2).sum(axis=1))

@@ -50,6 +50,16 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
     named = int(np.prod(sizes)) if geometry.labels else 0
     if not named or named != (geometry.branches or count) or named > count:
         return tuple(f"branch {i + 1}" for i in range(count))
+    swap = _swapped(arm, task, geometry, sizes)
+    names = []
+    for index in itertools.product(*(range(s) for s in sizes)):
+        words = [WORDS[k][i ^ int(swap[k][index])] for k, i in zip(geometry.labels, index, strict=True) if k]
+        names.append(", ".join(words))
+    return (*names, *(f"branch {i + 1}" for i in range(named, count)))
+
+
+def _swapped(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -> dict[str, Bool]:
+    """Of each word of the class on which branches (b0, b1, b2) the second of its two names is the first sign's."""
     postures, q, valid = _look(arm, task, geometry)
     shape = (len(q), *sizes)
     own = _own_branch(arm, postures, q, valid)
@@ -66,18 +76,21 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
         if positive.any():
             swap["wrist"][...] = signs[np.argmax(positive), 2] == 1
     if "elbow" in swap:
-        heights, level = _elbow_heights(arm, q)
-        heights = np.where(valid, heights, np.nan).reshape(shape)
-        level = np.where(valid, level, np.inf).reshape(shape)
-        for b0, b2 in itertools.product(range(shape[1]), range(shape[3])):
-            up, down = heights[:, b0, 0, b2], heights[:, b0, 1, b2]
-            tilt = level[:, b0, :, b2].max(axis=1) + np.where(np.isnan(up - down), np.inf, 0.0)
-            swap["elbow"][b0, :, b2] = down[np.argmin(tilt)] > up[np.argmin(tilt)]
-    names = []
-    for index in itertools.product(*(range(s) for s in sizes)):
-        words = [WORDS[k][i ^ int(swap[k][index])] for k, i in zip(geometry.labels, index, strict=True) if k]
-        names.append(", ".join(words))
-    return (*names, *(f"branch {i + 1}" for i in range(named, count)))
+        swap["elbow"][...] = _elbow_swapped(arm, q, valid, shape)
+    return swap
+
+
+def _elbow_swapped(arm: Arm, q: Array, valid: Bool, shape: tuple[int, ...]) -> Bool:
+    """Of branches (M, B, n), on axes (M, b0, b1, b2), where the second of two elbows is the upper one: (b0, b1, b2)."""
+    heights, level = _elbow_heights(arm, q)
+    heights = np.where(valid, heights, np.nan).reshape(shape)
+    level = np.where(valid, level, np.inf).reshape(shape)
+    out = np.zeros(shape[1:], bool)
+    for b0, b2 in itertools.product(range(shape[1]), range(shape[3])):
+        up, down = heights[:, b0, 0, b2], heights[:, b0, 1, b2]
+        tilt = level[:, b0, :, b2].max(axis=1) + np.where(np.isnan(up - down), np.inf, 0.0)
+        out[b0, :, b2] = down[np.argmin(tilt)] > up[np.argmin(tilt)]
+    return out
 
 
 def find(names: tuple[str, ...], wanted: str) -> list[int]:
@@ -91,6 +104,15 @@ def find(names: tuple[str, ...], wanted: str) -> list[int]:
     text = " ".join(wanted.lower().replace(",", " ").replace("/", " ").replace("-", " ").split())
     if text in (name.replace(",", "") for name in names):
         return [i for i, name in enumerate(names) if name.replace(",", "") == text]
+    parts, unknown = _parts(text)
+    hits = [i for i, name in enumerate(names) if parts and all(p in name.split(", ") for p in parts)]
+    if unknown or not hits:
+        raise UsageError(f"no branch is called '{wanted}'; this arm's are: {'; '.join(names)}")
+    return hits
+
+
+def _parts(text: str) -> tuple[list[str], list[str]]:
+    """The words of branch names that a text holds, or synonyms of them, and what it holds besides."""
     for said, meant in _SYNONYMS.items():
         text = f" {text} ".replace(f" {said} ", f" {meant} ").strip()
     parts = []
@@ -99,12 +121,7 @@ def find(names: tuple[str, ...], wanted: str) -> list[int]:
             parts.append(word)
             text = f" {text} ".replace(f" {word} ", " ").strip()
     rest = [w for w in text.split() if w in ("up", "down")]
-    parts += [f"elbow {w}" for w in rest]
-    unknown = [w for w in text.split() if w not in rest]
-    hits = [i for i, name in enumerate(names) if parts and all(p in name.split(", ") for p in parts)]
-    if unknown or not hits:
-        raise UsageError(f"no branch is called '{wanted}'; this arm's are: {'; '.join(names)}")
-    return hits
+    return parts + [f"elbow {w}" for w in rest], [w for w in text.split() if w not in rest]
 
 
 def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]:

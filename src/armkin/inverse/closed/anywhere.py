@@ -20,6 +20,8 @@ the loop is a planar arm of three joints, or a wrist: 8 branches.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -54,26 +56,33 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     """Six revolute joints and a full pose, three neighbouring axes parallel or meeting in a point."""
     if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
         return None
-    for backward in (False, True):
-        own = Chain(arm.link, arm.prismatic)
-        chain = reverse(own) if backward else own
-        for first in (1, 3):
-            loop = _Loop.of(chain, first, tolerance, arm.reach)
-            if loop is None or loop.ends.close:
-                continue
-            axes = sorted(6 - i if backward else i + 1 for i in range(first, first + 3))
-            c = 6 - loop.joints[2] if backward else loop.joints[2] + 1
-            what = "are parallel" if loop.three_link else "meet in a point"
-            how = f"a quartic gives joint {c}" if loop.ends.regular else f"special axes give joint {c} by itself"
-            why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {what}; {how}"
-            name = "three parallel axes" if loop.three_link else "three axes that meet"
-            solve = walked_back(loop.solve) if backward else loop.solve
-            # where one of these is free, its values at which the rest reaches may be few, and other motions cross there
-            ends = tuple(5 - j if backward else j for j in loop.joints)
-            geometry = Geometry(name, why, True, solve, ordered=not loop.ends.regular, ends=ends)
+    own = Chain(arm.link, arm.prismatic)
+    for backward, first in product((False, True), (1, 3)):
+        loop = _Loop.of(reverse(own) if backward else own, first, tolerance, arm.reach)
+        if loop is not None and not loop.ends.close:
+            geometry = _backward(loop) if backward else _forward(loop)
             if is_sound(arm, task, geometry):
                 return geometry
     return None
+
+
+def _forward(loop: _Loop, names: Sequence[int] = range(6)) -> Geometry:
+    """The class of a loop, of a chain whose joints have these names (0..5)."""
+    axes = sorted(names[i] + 1 for i in range(loop.first, loop.first + 3))
+    what, name = "meet in a point", "three axes that meet"
+    if loop.three_link:
+        what, name = "are parallel", "three parallel axes"
+    c = names[loop.joints[2]] + 1
+    how = f"a quartic gives joint {c}" if loop.ends.regular else f"special axes give joint {c} by itself"
+    why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {what}; {how}"
+    # where one of these is free, its values at which the rest reaches may be few, and other motions cross there
+    ends = tuple(names[j] for j in loop.joints)
+    return Geometry(name, why, True, loop.solve, ordered=not loop.ends.regular, ends=ends)
+
+
+def _backward(loop: _Loop) -> Geometry:
+    """The class of a loop of the chain walked from the tool to the base."""
+    return replace(_forward(loop, range(5, -1, -1)), pairs=walked_back(loop.solve))
 
 
 class _Ends:

@@ -61,7 +61,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
                 room = [buffer[..., : len(goal)] for buffer in workspace]
                 found = list(runner.code.run(entries(task, goal) if columns is None else columns, room))
             first = goal[:, 0] if columns is None else cast("Array", columns[9])
-            there = None
+            there = np.empty(0, np.intp)
             if examine:
                 there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
             edge = _keep(Goals(arm, task, goal, near[some]), runner.axes, rows_of(out, some), found, close, there)
@@ -84,13 +84,11 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
     return out, math.prod(runner.axes), target, rounding, edge
 
 
-def _keep(
-    goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], near: Array, there: Int | None
-) -> Doubted:
+def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], near: Array, there: Int) -> Doubted:
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
     targets on an edge.
 
-    there: `near_itself.reached`, if that is asked.
+    there: `near_itself.reached`, none where that is not asked.
     """
     arm = goals.arm
     doubt: Any  # flags
@@ -116,13 +114,11 @@ def _keep(
     part.within[...] = part.valid if within is valid else within.T
     part.branch[...] = _every_branch(B, arrays.CHUNK)[:N]
     on_edge = _on_edge(doubt, miss, None if full else valid)
-    if there is not None and len(there):
+    if len(there):
         on_edge = np.union1d(on_edge, near_itself.take(goals, part, there))
     flags = (np.broadcast_to(x, shape)[..., on_edge].reshape(B, -1).T for x in (miss.reshape(shape), doubt, free))
     off, edge, loose = flags if len(on_edge) else np.empty((3, 0, B))
-    plain: Bool = np.asarray(~(loose > 0.0).any(axis=1))
-    if there is not None and len(there):
-        plain &= np.isin(on_edge, there, invert=True)
+    plain: Bool = np.asarray(~(loose > 0.0).any(axis=1) & np.isin(on_edge, there, invert=True))
     doubted = Doubted(on_edge, part.q[on_edge], off, edge > 0.0, plain)
     if not full:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)

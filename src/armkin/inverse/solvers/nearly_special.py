@@ -43,17 +43,21 @@ APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
 RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
 
 
-def recognise(arm: Arm, task: Task) -> Geometry | None:
-    """Arms that a closed form would fit if their axes moved by `NEAR`, or by more if nothing else fits."""
-    if task.orientation == "axis":
-        return None  # see `armkin.inverse.solvers.tool_axis`
+def _nearest_class(arm: Arm, task: Task) -> tuple[float, Geometry] | None:
+    """The class that the arm is nearest to, of those that would fit if its axes moved by `NEAR`, and how far it is."""
     wide, narrow = (planar, elbow, three_joints), (spherical, three_parallel)
     limit = tol.NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
     classes = [*((module, limit) for module in wide), *((module, tol.NEAR) for module in narrow)]
     found = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
-    if not found:
+    return min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0], default=None)
+
+
+def recognise(arm: Arm, task: Task) -> Geometry | None:
+    """Arms that a closed form would fit if their axes moved by `NEAR`, or by more if nothing else fits."""
+    # of an axis see `armkin.inverse.solvers.tool_axis`
+    if task.orientation == "axis" or (nearest := _nearest_class(arm, task)) is None:
         return None
-    off, alike = min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0])
+    off, alike = nearest
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
     if (
         elimination is not None
@@ -71,14 +75,18 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
 
     steps = newton_steps.steps(arm, task, off, alike.pairs) if alike.pairs is not None else None
     corrected, counted = steps or (None, False)
-    sizes = [2 if label else 1 for label in alike.labels]
-    named = {"labels": alike.labels, "ordered": alike.ordered}
     why = f"{alike.why}, but for {off:.0e} of the reach: closed-form seeds, corrected on the true arm"
-    slow = Geometry(f"near {alike.name}", why, False, rows=rows, branches=math.prod(sizes) if sizes else None, **named)
+    name, width = f"near {alike.name}", _named_columns(alike)
+    slow = replace(alike, name=name, why=why, complete=False, pairs=None, rows=rows, branches=width)
     if corrected is None:
         return slow
-    pencil = position_pencil.recognise(arm, task, alike, slow.why) if counted else None
-    return Geometry(slow.name, why, counted, corrected, doubts=pencil or slow, **named)
+    pencil = position_pencil.recognise(arm, task, alike, why) if counted else None
+    return replace(alike, name=name, why=why, complete=counted, pairs=corrected, doubts=pencil or slow)
+
+
+def _named_columns(alike: Geometry) -> int | None:
+    """How many branches a class has names for; None of one that has no names."""
+    return math.prod(2 if label else 1 for label in alike.labels) if alike.labels else None
 
 
 def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geometry | None) -> Geometry | None:
@@ -94,8 +102,7 @@ def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geome
         return np.concatenate([_places(arm, task, alike, off, q[some], target[some]) for some in parts])
 
     why = f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class"
-    branches = math.prod(2 if label else 1 for label in alike.labels) if alike.labels else None
-    geometry = replace(alike, name=general_.name, why=why, pairs=None, branches=branches, places=places)
+    geometry = replace(alike, name=general_.name, why=why, pairs=None, branches=_named_columns(alike), places=places)
     return replace(geometry, rows=named(general_.rows, geometry))
 
 
