@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import ROOT, THREE_DOF, process
+from command_line import ROOT, THREE_DOF, process, run
 
 ARMKIN = [sys.executable, "-m", "armkin"]
 MANY = b"1,2,3\n" * 20_000
@@ -136,11 +136,11 @@ def test_nobody_reads(words: list[str]) -> None:
 
 
 def test_bare_and_help_print_the_help() -> None:
-    for words in ([], ["help"]):
-        assert process(*words) == process("--help")
-    assert process("help", "fk") == process("fk", "--help")
-    assert process("help").code == 0
-    assert "Commands:" in process().out
+    bare = process()
+    assert "Commands:" in bare.out
+    assert bare == run() == run("help") == run("--help")
+    assert bare.code == 0
+    assert run("help", "fk") == run("fk", "--help")
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
@@ -159,6 +159,6 @@ def test_a_terminal_of_any_encoding(encoding: str, tmp_path: Path) -> None:
 def test_out_dash_is_standard_output(tmp_path: Path) -> None:
     for words in (["fk", "1", "2", "3", "--json"], ["pulses", "1", "2", "3"], ["info"]):
         words.insert(1, str(ROOT / THREE_DOF))
-        assert process(*words, "--out", "-", cwd=tmp_path) == process(*words, cwd=tmp_path)
+        assert run(*words, "--out", "-", cwd=tmp_path) == run(*words, cwd=tmp_path)
     assert process("schema", "-o", "-", cwd=tmp_path).out.startswith("{")
     assert not list(tmp_path.iterdir())
