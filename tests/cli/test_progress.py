@@ -22,7 +22,7 @@ class _Told:
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def tell(self, done: int, total: int | None, seconds: float) -> None:
+    def update(self, done: int, total: int | None, seconds: float) -> None:
         self.lines.append(progress_bar.progress_text("bytes", done, total, seconds))
 
     def end(self) -> None:
