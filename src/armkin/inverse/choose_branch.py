@@ -115,9 +115,9 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
     near = units.joints_in(arm, request.near_out)
     found = [_Found() for _ in targets]
     more: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
-    for held in _holds(request):
+    for held in _held_combinations(request):
         one, goals = without_held(arm, request.task, held, targets)
-        s = request.ik(one, goals, request.task, near=near[_kept(arm, held)], **more)
+        s = request.ik(one, goals, request.task, near=near[_kept_joints(arm, held)], **more)
         wanted = set(s.names)
         if request.branch is not None:
             wanted = {s.names[i] for i in find(s.names, request.branch)}
@@ -141,7 +141,7 @@ def most_targets(request: Request) -> int:
 def locked(request: Request) -> Arm:
     """The arm that is solved: the joints that are neither held nor swept."""
     held = {**request.held, **{name: values[0] for name, values in request.swept.items()}}
-    return arm_without(request.arm, tuple(_in(request.arm, held).items()))
+    return arm_without(request.arm, tuple(_held_values(request.arm, held).items()))
 
 
 def prepared(request: Request) -> Arm:
@@ -186,12 +186,12 @@ def closest(request: Request, targets: Array) -> list[Closest]:
     """The poses within limits nearest to targets (N, ...) [mm, rad], with swept joints free."""
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
-    held = _in(arm, request.held)
+    held = _held_values(arm, request.held)
     one = arm_without(arm, tuple(held.items()))
     if request.position_first:
-        found = nearest_positions(one, targets, near[_kept(arm, held)])
+        found = nearest_positions(one, targets, near[_kept_joints(arm, held)])
     else:
-        found = nearest_poses(one, targets, request.task, near=near[_kept(arm, held)])
+        found = nearest_poses(one, targets, request.task, near=near[_kept_joints(arm, held)])
     return [replace(nearest, q=unlock(arm, held, nearest.q)) for nearest in found] if held else found
 
 
@@ -240,19 +240,19 @@ def _best(request: Request, branches: Sequence[Branch], wanted: Sequence[bool]) 
     return next(free, next(hit, None))
 
 
-def _holds(request: Request) -> Iterator[dict[str, float]]:
+def _held_combinations(request: Request) -> Iterator[dict[str, float]]:
     """Every combination of held and swept joints [rad | mm]; one empty one if there are none."""
     for choice in itertools.product(*request.swept.values()):
-        yield _in(request.arm, {**request.held, **dict(zip(request.swept, choice, strict=True))})
+        yield _held_values(request.arm, {**request.held, **dict(zip(request.swept, choice, strict=True))})
 
 
-def _in(arm: Arm, held: Mapping[str, float]) -> dict[str, float]:
+def _held_values(arm: Arm, held: Mapping[str, float]) -> dict[str, float]:
     """Joint name -> value, from [deg | mm] to [rad | mm]."""
     values = units.joints_in(arm, [held.get(name, 0.0) for name in arm.joint_names]).tolist()
     return {name: value for name, value in zip(arm.joint_names, values, strict=True) if name in held}
 
 
-def _kept(arm: Arm, held: Mapping[str, float]) -> list[int]:
+def _kept_joints(arm: Arm, held: Mapping[str, float]) -> list[int]:
     return [i for i, name in enumerate(arm.joint_names) if name not in held]
 
 

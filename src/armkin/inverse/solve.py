@@ -126,11 +126,11 @@ def answered(  # noqa: C901 - what is looked at after the closed form, in its or
     if geometry.pairs:
         out, count, target, shown, left = chunks.solve(arm, definition, geometry, given, each, one, examine, workers)
         if len(left):
-            out = _otherwise(Goals(arm, definition, target, each), geometry.doubts, out, left, examine, workers)
+            out = _by_slower_class(Goals(arm, definition, target, each), geometry.doubts, out, left, examine, workers)
     else:
         target, _, shown = read_targets(definition, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
-        out, count = _rows(arm, definition, geometry, target, each, examine, workers)
+        out, count = _row_by_row(arm, definition, geometry, target, each, examine, workers)
     shown, most = target_rounding.of_targets(arm, definition, target, (given, shown), single, rounding, lead)
     goals = Goals(arm, definition, target, each)
     if examine:
@@ -184,19 +184,21 @@ def _commanded(arm: Arm, found: Solutions) -> Solutions:
     return replace(found, arm=arm, task=task_for(arm, task), near=near, q=q, interval=interval)
 
 
-def _otherwise(goals: Goals, geometry: Geometry | None, out: Batch, left: Int, examine: bool, workers: int) -> Batch:
+def _by_slower_class(
+    goals: Goals, geometry: Geometry | None, out: Batch, left: Int, examine: bool, workers: int
+) -> Batch:
     """The same with what a closed form leaves in doubt solved the other way that it names."""
     assert geometry is not None
     some = arm, task, target, near = goals.of(left)
     if not geometry.pairs:
-        return replaced(out, left, _rows(arm, task, geometry, target, near, examine, workers)[0])
+        return replaced(out, left, _row_by_row(arm, task, geometry, target, near, examine, workers)[0])
     rest, _, target, _, more = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
     if len(more):
-        rest = _otherwise(some._replace(target=target), geometry.doubts, rest, more, examine, workers)
+        rest = _by_slower_class(some._replace(target=target), geometry.doubts, rest, more, examine, workers)
     return replaced(out, left, rest)
 
 
-def _rows(
+def _row_by_row(
     arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, examine: bool, workers: int
 ) -> tuple[Batch, int]:
     """Solvers that return joint values row by row. Also the number of branch columns."""

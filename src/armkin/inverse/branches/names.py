@@ -60,7 +60,7 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
 
 def _swapped(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -> dict[str, Bool]:
     """Of each word of the class on which branches (b0, b1, b2) the second of its two names is the first sign's."""
-    postures, q, valid = _look(arm, task, geometry)
+    postures, q, valid = _sample_postures(arm, task, geometry)
     shape = (len(q), *sizes)
     own = _own_branch(arm, postures, q, valid)
     swap = {label: np.zeros(shape[1:], bool) for label in geometry.labels if label}
@@ -124,7 +124,7 @@ def _parts(text: str) -> tuple[list[str], list[str]]:
     return parts + [f"elbow {w}" for w in rest], [w for w in text.split() if w not in rest]
 
 
-def _look(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]:
+def _sample_postures(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]:
     """Some postures (M, n), home and its neighbours first, and all branches at each: (M, B, n), valid (M, B)."""
     rng = np.random.default_rng(3)
     near_home = arm.home + rng.uniform(-0.35, 0.35, (24, arm.n)) * np.where(arm.prismatic, arm.reach / 20, 1.0)

@@ -60,13 +60,13 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     for backward, first in product((False, True), (1, 3)):
         loop = _Loop.of(reverse(own) if backward else own, first, tolerance, arm.reach)
         if loop is not None and not loop.ends.close:
-            geometry = _backward(loop) if backward else _forward(loop)
+            geometry = _class_walked_back(loop) if backward else _class_of(loop)
             if is_sound(arm, task, geometry):
                 return geometry
     return None
 
 
-def _forward(loop: _Loop, names: Sequence[int] = range(6)) -> Geometry:
+def _class_of(loop: _Loop, names: Sequence[int] = range(6)) -> Geometry:
     """The class of a loop, of a chain whose joints have these names (0..5)."""
     axes = sorted(names[i] + 1 for i in range(loop.first, loop.first + 3))
     what, name = "meet in a point", "three axes that meet"
@@ -80,9 +80,9 @@ def _forward(loop: _Loop, names: Sequence[int] = range(6)) -> Geometry:
     return Geometry(name, why, True, loop.solve, ordered=not loop.ends.regular, ends=ends)
 
 
-def _backward(loop: _Loop) -> Geometry:
+def _class_walked_back(loop: _Loop) -> Geometry:
     """The class of a loop of the chain walked from the tool to the base."""
-    return replace(_forward(loop, range(5, -1, -1)), pairs=walked_back(loop.solve))
+    return replace(_class_of(loop, range(5, -1, -1)), pairs=walked_back(loop.solve))
 
 
 class _Ends:
@@ -133,23 +133,23 @@ class _Ends:
         return [first, second, last], doubt | Doubt(free, free)
 
     def _quartic(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
-        f = [_mixed(row, sides) for row in np.linalg.inv(self.A)]
+        f = [_combination(row, sides) for row in np.linalg.inv(self.A)]
         across = arrays.add(arrays.mul(e[0], e[0]), arrays.mul(e[1], e[1]))
         start: list[Entry] = [arrays.mul(-1.0, across), 0.0, 0.0, 0.0, 0.0, 0.0]
         last, doubt = quadratics.turn(quadratics.total(start, *(quadratics.product(k, k) for k in f)), 1.0, prefer[2])
-        fx, fy = (_at(k, last) for k in f)
+        fx, fy = (_affine_at(k, last) for k in f)
         first, doubt_a = rotation_between(fx, fy, e[0], e[1], 1.0, prefer[0])
         return first, last, doubt | doubt_a
 
     def _rank_one(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
-        rest, cosine, sine = _mixed(self.alone, sides)
+        rest, cosine, sine = _combination(self.alone, sides)
         known = arrays.mul(-1.0, rest)
         last, doubt = linear(cosine, sine, known, 0, 1.0, prefer[2], one_root(cosine, sine, known))
         last = normalised(last)
         fx, fy = (self.main @ self.A).tolist()
         a = arrays.add(arrays.mul(fx, e[0]), arrays.mul(fy, e[1]))
         b = arrays.sub(arrays.mul(fx, e[1]), arrays.mul(fy, e[0]))
-        first, doubt_a = linear(a, b, _at(_mixed(self.main, sides), last), 1, 1.0, prefer[0])
+        first, doubt_a = linear(a, b, _affine_at(_combination(self.main, sides), last), 1, 1.0, prefer[0])
         return normalised(first), last, doubt | doubt_a
 
 
@@ -221,11 +221,11 @@ class _Loop:
         return Candidates(pairs, doubt | doubt3, None, angles)
 
 
-def _mixed(weights: Array, sides: list[list[Entry]]) -> list[Entry]:
+def _combination(weights: Array, sides: list[list[Entry]]) -> list[Entry]:
     """A combination of two expressions affine in (cos, sin)."""
     return arrays.combine(float(weights[0]), sides[0], float(weights[1]), sides[1])
 
 
-def _at(affine: list[Entry], pair: Pair) -> Entry:
+def _affine_at(affine: list[Entry], pair: Pair) -> Entry:
     """An affine expression of a joint's cosine and sine, at the joint."""
     return arrays.add(affine[0], arrays.add(arrays.mul(affine[1], pair.c), arrays.mul(affine[2], pair.s)))

@@ -37,12 +37,12 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     size = np.full(len(flat), np.inf)
     size[some] = S[:, rank - 2]
     second, place, unit = size.reshape(N, steps, B), q.copy(), radian_or_reach(arm)
-    found = _least(second)
+    found = _least_steps(second)
     if J.shape[1] == n == rank:
         bordered = np.full((len(flat), 2 * n + 1), np.nan)
         product = np.linalg.det(U) * np.linalg.det(V) * S[:, :-1].prod(axis=1)
         bordered[some] = np.concatenate([product[:, None], U[:, :, -1], V[:, -1]], axis=1)
-        way, share = _change(arm, q, bordered.reshape(N, steps, B, -1))
+        way, share = _sign_changes(arm, q, bordered.reshape(N, steps, B, -1))
         changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
         found |= changes
@@ -50,7 +50,7 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     for b in range(1, B):  # double roots are there twice
         twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < tol.SAME
         found[:, :, b] &= ~twin.any(axis=2)
-    at = _apart(arm, place.reshape(N, -1, n), np.where(found, second, np.inf).reshape(N, -1)).reshape(-1, n)
+    at = _distinct_places(arm, place.reshape(N, -1, n), np.where(found, second, np.inf).reshape(N, -1)).reshape(-1, n)
     out = np.full((len(at), 8, n), np.nan)
     some = np.flatnonzero(~np.isnan(at).any(axis=1))
     _, V, _ = newton.null_space(arm, task, at[some], np.repeat(target, MOST, axis=0)[some])
@@ -65,7 +65,7 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     return out.reshape(N, -1, n)
 
 
-def _apart(arm: Arm, place: Array, second: Array) -> Array:
+def _distinct_places(arm: Arm, place: Array, second: Array) -> Array:
     """Of places (N, P, n) the `MOST` with the smallest second singular values (N, P), each crossing once; else nan."""
     out = np.full((len(place), MOST, arm.n), np.nan)
     for k in np.flatnonzero(np.isfinite(second).any(axis=1)):
@@ -79,7 +79,7 @@ def _apart(arm: Arm, place: Array, second: Array) -> Array:
     return out
 
 
-def _least(second: Array) -> Bool:
+def _least_steps(second: Array) -> Bool:
     """Steps (N, steps, B) nearest to a zero of the second smallest singular value."""
     before, after = np.roll(second, 1, axis=1), np.roll(second, -1, axis=1)
     near, far = np.minimum(before, after), np.maximum(before, after)
@@ -88,7 +88,7 @@ def _least(second: Array) -> Bool:
     return np.asarray(falls & (second < MEETING))
 
 
-def _change(arm: Arm, q: Array, bordered: Array) -> tuple[Array, Array]:
+def _sign_changes(arm: Arm, q: Array, bordered: Array) -> tuple[Array, Array]:
     """The way to the next step (N, steps, B, n), and the share of it after which the product changes its sign.
 
     bordered: (N, steps, B, 1 + 2 n) the product and the null vectors, left and right, whose own signs mean nothing: one

@@ -38,7 +38,7 @@ class NewtonSteps:
     def __init__(self, arm: Arm, task: Task, off: float) -> None:
         """off: how far the arm is from the class whose roots are the seeds, lengths in units of the reach."""
         self.arm, self.size = arm, task.position  # equations and unknowns: 2 or 3
-        link, offset = _peeled(arm)
+        link, offset = _links_without_turns(arm)
         self.base: pose.Pose | None = None
         if self.size == 3:  # what the target misses is told in the first joint's frame
             self.base, link[0] = pose.inverse(pose.constant(link[0])), np.eye(4)
@@ -133,7 +133,7 @@ class NewtonSteps:
         return out
 
 
-def _peeled(arm: Arm) -> tuple[Array, list[float]]:
+def _links_without_turns(arm: Arm) -> tuple[Array, list[float]]:
     """The links without their turns about joints that turn, and these turns [rad], joint by joint.
 
     Between two such joints a link is a turn about x and a translation: half of the products of a step.
@@ -182,7 +182,7 @@ def _merged(pairs: list[Pair], unit: list[float]) -> Truth:
                 if v is not None:
                     other = v
                     for axis in axes:
-                        other = _other(other, axis)
+                        other = _on_other_branch(other, axis)
                     if other is not v:
                         d = arrays.mul(scale, v - other)
                         away = arrays.add(away, d * d)
@@ -191,7 +191,7 @@ def _merged(pairs: list[Pair], unit: list[float]) -> Truth:
     return merged
 
 
-def _other(v: Entry, axis: int) -> Entry:
+def _on_other_branch(v: Entry, axis: int) -> Entry:
     """What stands on the other branch of an axis; the value itself if it is one for both."""
     return v if isinstance(v, float) or (isinstance(v, np.ndarray) and v.ndim < 4) else arrays.flip(v, axis)
 

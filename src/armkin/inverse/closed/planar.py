@@ -43,7 +43,7 @@ def recognise(  # noqa: C901 - the closed form is a function in it
         prismatic = np.delete(prismatic, lift)
         kept.remove(lift)
     chain = Chain(link, prismatic)
-    solve_plane = _two(chain) if task.name == "xy" else _three(chain, task, kept)
+    solve_plane = _two_joints(chain) if task.name == "xy" else _three_joints(chain, task, kept)
     if solve_plane is None:
         return None
     fixed = [pose.constant(L) for L in arm.link]
@@ -78,7 +78,7 @@ def _leaves_plane(w: Array, prismatic: Bool, lift: int | None) -> float:
     return float(max(np.hypot(*w[upright, :2].T).max(initial=0.0), np.abs(w[level, 2]).max(initial=0.0)))
 
 
-def _two(chain: Chain) -> Solve:
+def _two_joints(chain: Chain) -> Solve:
     """Two planar joints that place a point.
 
     Two turning ones are an elbow; otherwise a virtual slide along z, whose value does not
@@ -114,7 +114,7 @@ def _two_turning(chain: Chain) -> Solve:
     return solve
 
 
-def _three(chain: Chain, task: Task, kept: list[int]) -> Solve:
+def _three_joints(chain: Chain, task: Task, kept: list[int]) -> Solve:
     """Three planar joints with the tool's direction given."""
     weights = task.sums[0][kept]
     if not chain.prismatic[2]:
@@ -138,7 +138,7 @@ def _at_zero(chain: Chain) -> Array:
     return np.asarray(np.linalg.multi_dot(list(chain.link)))
 
 
-def _rest(goal: list[Entry], task: Task, weights: Array, pairs: list[Pair | None], joint: int) -> Pair:
+def _last_of_sum(goal: list[Entry], task: Task, weights: Array, pairs: list[Pair | None], joint: int) -> Pair:
     """The joint that is left, from the sum of all."""
     c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
     for w, pair in zip(weights, pairs, strict=True):
@@ -150,13 +150,13 @@ def _rest(goal: list[Entry], task: Task, weights: Array, pairs: list[Pair | None
 def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
     """Joint 3 turns: step back from the tool to its axis, place that point with joints 1 and 2."""
     back = pose.constant(inverse(chain.link[3]))
-    two = _two(Chain(chain.link[:3], chain.prismatic[:2]))
+    two = _two_joints(Chain(chain.link[:3], chain.prismatic[:2]))
 
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         R = _direction(goal, task, chain)
         x, y, _ = pose.turn(R, back[9:12])
         pairs, doubt = two([goal[0] + x, goal[1] + y], prefer[:2])
-        return [*pairs, _rest(goal, task, weights, [*pairs, None], 2)], doubt
+        return [*pairs, _last_of_sum(goal, task, weights, [*pairs, None], 2)], doubt
 
     return solve
 
@@ -166,14 +166,14 @@ def _known_first(chain: Chain, task: Task, weights: Array) -> Solve:
     level = np.eye(4)  # the tool's frame when all joints are zero, turned so that z is the plane's normal
     level[:3, :3] = _at_zero(chain)[:3, :3].T
     back = reverse(Chain(np.array([*chain.link[:3], chain.link[3] @ level]), chain.prismatic))
-    two = _two(Chain(back.link[:3], back.prismatic[:2]))
+    two = _two_joints(Chain(back.link[:3], back.prismatic[:2]))
     axis = [float(v) for v in chain.link[0][:2, 3]]
 
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
         x, y = axis[0] - goal[0], axis[1] - goal[1]
         (third, second), doubt = two([c * x + s * y, c * y - s * x], [prefer[2], prefer[1]])
-        return [_rest(goal, task, weights, [None, second, third], 0), second, third], doubt
+        return [_last_of_sum(goal, task, weights, [None, second, third], 0), second, third], doubt
 
     return solve
 
@@ -183,7 +183,7 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
     link = [pose.constant(L) for L in chain.link]
 
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
-        second = _rest(goal, task, weights, [None, None, None], 1)
+        second = _last_of_sum(goal, task, weights, [None, None, None], 1)
         P = pose.times(link[0], link[1])
         a = link[0][6:8]
         P = pose.times(pose.rotate(P, *second), link[2])

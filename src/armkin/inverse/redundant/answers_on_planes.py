@@ -78,7 +78,7 @@ def answered(find: Follower, known: Int, postures: Array) -> tuple[Planes, Nodes
         there, own = ~np.isnan(q[:, :, 0]), q[:0, 0]
     else:
         q, missed = source.candidates(row, t)
-        more, own = _between(source, even, missed.reshape(N, PLANES, -1))
+        more, own = _answers_between(source, even, missed.reshape(N, PLANES, -1))
         more, own = np.append(more, known), np.append(own, postures, axis=0)
         row, t = np.append(row, more), np.append(t, own[:, guide.joint])
         others = source.candidates(more, t[N * PLANES :])
@@ -98,7 +98,7 @@ def answered(find: Follower, known: Int, postures: Array) -> tuple[Planes, Nodes
     return planes, nodes, grid[:, :, :-1]
 
 
-def _between(source: Follower, t: Array, missed: Array) -> tuple[Int, Array]:
+def _answers_between(source: Follower, t: Array, missed: Array) -> tuple[Int, Array]:
     """Answers (M, n) of targets (M,) where these may be between values t (K,) alone, as what branches miss (N, K, B)
     tells: of a short curve, whose joint cannot be held where it turns back."""
     width, part = t[1] - t[0], np.arange(1, BETWEEN) / BETWEEN

@@ -56,7 +56,7 @@ def families(
     q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad].
     """
     if free.still:
-        return _still(ik, arm, free, targets, near, rounding)
+        return _with_tool_turn(ik, arm, free, targets, near, rounding)
     task = free.task
     values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
     goal, lead, off = read_targets(task, values)
@@ -88,7 +88,7 @@ def families(
     return replace(s, interval=interval.reshape(*s.valid.shape, 2))
 
 
-def _still(
+def _with_tool_turn(
     ik: Ik, arm: Arm, free: Redundancy, targets: ArrayLike, near: ArrayLike | None, rounding: ArrayLike | None
 ) -> Solutions:
     """The branches of the others, which the redundant joint's motion leaves as they are: each is a family."""
@@ -152,13 +152,13 @@ class _Rows:
         rows = slice(begin, begin + count)
         self.complete[rows], self.short[rows] = curves.complete, curves.short
         near = self.near[begin + pieces.row]
-        q = _nearest(self.arm, curves, near)
+        q = _nearest_postures(self.arm, curves, near)
         if isinstance(curves, Traced):
             q = curves.settled(pieces, q)
         some = np.flatnonzero(self.stands[begin + pieces.row])
-        q[some] = _standing(self.arm, self.joint, rows_of(pieces, some), q[some], near[some])
+        q[some] = _with_near(self.arm, self.joint, rows_of(pieces, some), q[some], near[some])
         if self.arm.keep_out:
-            q = _free(self.arm, curves, q, near)
+            q = _with_free_postures(self.arm, curves, q, near)
         whole = pieces.b - pieces.a >= 2 * np.pi
         ends = np.stack([pieces.a, pieces.b], axis=1)
         # of the turns of the interval that in which the posture lies
@@ -203,7 +203,7 @@ class _Rows:
         return q, interval, legal, branch
 
 
-def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
+def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
     """The postures (P, n) of pieces that move the joints least from near (P, n): golden section around the best sample,
     then where a joint stands as near has it.
 
@@ -244,7 +244,7 @@ def _nearest(arm: Arm, curves: Curves, near: Array) -> Array:
     return best
 
 
-def _standing(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> Array:
+def _with_near(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> Array:
     """Postures (P, n) of pieces; near (P, n) that solves its target in place of the one nearest to it.
 
     It may be a posture with a joint that is free, or one that its target's rounding moves far.
@@ -261,7 +261,7 @@ def _standing(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> Ar
     return out
 
 
-def _free(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
+def _with_free_postures(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
     """The nearest postures (P, n) of legal pieces that hit nothing, to `FREE`; where there is none, q as it is."""
     out, pieces = q.copy(), curves.pieces
     for p in np.flatnonzero(pieces.legal & ~clear(arm, q)):

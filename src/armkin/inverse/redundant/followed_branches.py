@@ -105,10 +105,12 @@ def _pieces(find: Follower, found: Seen) -> Pieces:
     more, short = rows_of(hidden, ~gaps), places.short
     parts = [_of_runs(t, found.legal, True, found.crossed.at, places.legal)]
     sample = np.append(hidden.k, short.sample(0, K))
-    held = _holding(found.there, np.append(hidden.row, short.row), sample, np.append(hidden.branch, short.branch), K)
+    held = _hold_samples(
+        found.there, np.append(hidden.row, short.row), sample, np.append(hidden.branch, short.branch), K
+    )
     families = _of_runs(t, found.there, False, found.gone.at, places.there)
     parts.append(rows_of(families, ~(found.there.within | held)))
-    parts[0] = _cut(find, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
+    parts[0] = _without_gaps(find, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
     row, branch = np.append(short.row, more.row), np.append(short.branch, more.branch)
     if len(row):
         a, b = np.concatenate([np.sort(places.ends, axis=0), stretch[:, ~gaps]], axis=1)
@@ -132,7 +134,7 @@ def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -
     return Pieces(runs.row, runs.branch, np.full(len(at), legal), a, b, a, b, low, at, high, runs.start)
 
 
-def _holding(runs: Runs, row: Int, k: Int, branch: Int, K: int) -> Bool:
+def _hold_samples(runs: Runs, row: Int, k: Int, branch: Int, K: int) -> Bool:
     """Which runs hold one of the samples k (M,), of K, of branches (M,) of targets (M,)."""
     out = np.zeros(len(runs.row), bool)
     for one, sample, own in zip(row.tolist(), k.tolist(), branch.tolist(), strict=True):
@@ -140,7 +142,7 @@ def _holding(runs: Runs, row: Int, k: Int, branch: Int, K: int) -> Bool:
     return out
 
 
-def _cut(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
+def _without_gaps(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
     """Pieces with gaps taken out that lie within them, from where to where (2, G)."""
     for row, branch, (begin, end) in zip(gaps.row, gaps.branch, ends.T, strict=True):
         turns = 2 * np.pi * np.round((0.5 * (pieces.a + pieces.b) - begin) / (2 * np.pi))

@@ -103,15 +103,15 @@ def _of_chunk(ik: Ik, arm: Arm, task: Task, target: Array, near: Array) -> list[
     q, row = _seeds(arm, box, target, near)
     q, done = descend(arm, box, q, target[row])
     q, row = q[done], row[done]
-    exact = _exact(ik, arm, target, near)
+    exact = _exact_branches(ik, arm, target, near)
     out = []
     for k, goal in enumerate(target):
         some = np.concatenate([exact[k], nearest_row(arm, q[row == k], near[k][None])[0]])
-        out.append(_sorted(arm, task, some, len(exact[k]), goal, near[k]))
+        out.append(_sorted_minima(arm, task, some, len(exact[k]), goal, near[k]))
     return out
 
 
-def _exact(ik: Ik, arm: Arm, target: Array, near: Array) -> list[Array]:
+def _exact_branches(ik: Ik, arm: Arm, target: Array, near: Array) -> list[Array]:
     """The branches within limits that solve the poses, where the arm has a solver for them."""
     try:
         solver(arm, "pose")
@@ -121,7 +121,7 @@ def _exact(ik: Ik, arm: Arm, target: Array, near: Array) -> list[Array]:
     return [q[keep] for q, keep in zip(s.q, s.valid & s.within_limits, strict=True)]
 
 
-def _sorted(arm: Arm, task: Task, q: Array, exact: int, target: Array, near: Array) -> Array:
+def _sorted_minima(arm: Arm, task: Task, q: Array, exact: int, target: Array, near: Array) -> Array:
     """Minima (M, n) of one target, each once, by angle, then by motion from near (n,); the first ones are exact."""
     if not len(q):
         return q
@@ -165,14 +165,14 @@ def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, Int]:
     apart = (tips * tips).sum(axis=1) - 2.0 * (point @ tips.T)
     nearest = pool[np.argpartition(apart, NEAREST, axis=1)[:, :NEAREST]]
     own = np.clip(near, arm.lower, arm.upper)[:, None]
-    starts = np.concatenate([own, _spread(arm, nearest)], axis=1).reshape(-1, arm.n)
+    starts = np.concatenate([own, _farthest_apart(arm, nearest)], axis=1).reshape(-1, arm.n)
     row = np.repeat(np.arange(len(target)), STARTS + 1)
     q, missed = _to_position(arm, box, starts, point[row], 24)
     there = missed <= tol.SOLUTION
     return q[there], row[there]
 
 
-def _spread(arm: Arm, q: Array) -> Array:
+def _farthest_apart(arm: Arm, q: Array) -> Array:
     """STARTS of postures (N, K, n), each the one farthest from those taken before: small basins get one, too."""
     u = q / arm.reach * np.pi
     places = np.concatenate([np.where(arm.prismatic, u, np.cos(q)), np.where(arm.prismatic, 0.0, np.sin(q))], axis=2)
@@ -199,16 +199,16 @@ def _to_position(arm: Arm, box: Box, q: Array, point: Array, steps: int) -> tupl
         active, c, J = active[going], c[going], J[going, :3] * box.unit / arm.reach
         if step == steps or not len(active):
             break
-        move, stuck = _least(J, c), np.zeros((len(c), arm.n), bool)
+        move, stuck = _least_norm_steps(J, c), np.zeros((len(c), arm.n), bool)
         for _ in range(2):  # joints that would go beyond a limit stay on it
             stuck |= ((q[active] <= box.lower) & (move < 0)) | ((q[active] >= box.upper) & (move > 0))
-            move = _least(np.where(stuck[:, None], 0.0, J), c)
+            move = _least_norm_steps(np.where(stuck[:, None], 0.0, J), c)
         move *= np.minimum(1.0, 0.5 / np.maximum(np.abs(move).max(axis=1), tol.TINY))[:, None]
         q[active] = np.clip(q[active] + move * box.unit, box.lower, box.upper)
     return q, missed
 
 
-def _least(J: Array, c: Array) -> Array:
+def _least_norm_steps(J: Array, c: Array) -> Array:
     """Damped steps of least norm (M, n) of J d = c, J (M, 3, n)."""
     size = np.einsum("mi,mi->m", c, c)[:, None, None]
     G = J @ J.swapaxes(1, 2) + (1e-2 * size + tol.WEAK * tol.WEAK) * np.eye(3)

@@ -54,7 +54,7 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: Int) -> Batch:
     if left.any():
         if len(part := np.flatnonzero(left & doubts.narrow)):  # there may be another part
             whole = rows[part]
-            doubts.first[part], other, _ = _at_two(runner, target[whole], near[whole], near[whole] + 1.0)
+            doubts.first[part], other, _ = _candidates_at_two(runner, target[whole], near[whole], near[whole] + 1.0)
             doubts.other[part] = np.where(doubts.loose[part][:, :, None], other, np.nan)
         open_, tight, first, other, loose, _, at_ends, _, simple = rows_of(doubts, left)
         # with the preferred values for joints that are free, and those that other values would change
@@ -141,14 +141,14 @@ def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     part = np.flatnonzero(out.free)
     if len(part):
         goal, close = target[part], near[part]
-        first, second, solved = _at_two(runner, goal, close, close + 1.0)
+        first, second, solved = _candidates_at_two(runner, goal, close, close + 1.0)
         apart = np.abs(first - second)
         changed = ~((apart.max(axis=2) < tol.SAME) | plain[part])
         lost = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
         if len(lost):  # solutions for some values of the free joints alone, or for one
             shift, single = runner.best_shift(goal[lost], close[lost], changed[lost])
             best = close[lost] + shift
-            first[lost], second[lost], solved = _at_two(runner, goal[lost], best, best + tol.FOLD_WAY)
+            first[lost], second[lost], solved = _candidates_at_two(runner, goal[lost], best, best + tol.FOLD_WAY)
             out.narrow[part[lost]] = solved[1].any(axis=1)
             single &= ~out.narrow[part[lost]]
             out.free[part[lost]], second[lost[single]] = ~single, np.nan  # one value alone is no freedom
@@ -159,7 +159,7 @@ def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     return out
 
 
-def _at_two(runner: Recorded, target: Array, values: Array, others: Array) -> tuple[Array, Array, Bool]:
+def _candidates_at_two(runner: Recorded, target: Array, values: Array, others: Array) -> tuple[Array, Array, Bool]:
     """Candidates for two values of free joints, (N, B, n) each, and which solve their targets (2, N, B)."""
     found = runner.with_values(np.concatenate([target, target]), np.concatenate([values, others]))
     solved = found[..., -1].reshape(2, len(target), -1) <= tol.ACCEPTED**2

@@ -94,7 +94,7 @@ def _pairs(goals: Goals, at: Doubted, asked: Bool, told: Bool) -> Bool:
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
     lone = np.flatnonzero(weak & (many == 0) & told[k])
     if len(lone):
-        told[k[lone[~_alone(goals, q[lone], inverse[lone], beside[lone])]]] = False
+        told[k[lone[~_isolated(goals, q[lone], inverse[lone], beside[lone])]]] = False
     if len(i):
         ends = inverse[j] if not beside.shape[2] else _inverses(goals, q[j], beside[i])[0]
         alone, meet = _cubic(way, inverse[i], ends)
@@ -136,7 +136,7 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
         rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ other)[:, 0, 0]
         size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / far, np.abs(rise + fall)
         # the fourth derivative is taken for as large as that of the sharpest fold
-        plain = _single(first, lost) & (far > APART) & (uneven < SYMMETRIC * size)
+        plain = _one_direction_lost(first, lost) & (far > APART) & (uneven < SYMMETRIC * size)
         alone = plain & (0.125 * far * size - tol.CURVATURE * far**4 / 384.0 > SURELY * tol.SOLUTION)
         # as far as the residual of two that meet may be 2 SOLUTION
         end = far + 2.0 * np.sqrt(tol.SOLUTION / bend)
@@ -147,7 +147,7 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
     return np.asarray(alone), np.asarray(meet)
 
 
-def _alone(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
+def _isolated(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
     """Which weak postures (M, n), with no other close by, are isolated roots: g is too steep to turn before it passes
     `SOLUTION`."""
     n = q.shape[1]
@@ -166,7 +166,7 @@ def _alone(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
         ahead, behind = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
         bend, passed = np.abs(ahead - behind) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / slope
         steep = slope**2 > SURELY * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
-    return np.asarray(_single(inverse, lost) & (passed < tol.FOLD_WAY) & steep)
+    return np.asarray(_one_direction_lost(inverse, lost) & (passed < tol.FOLD_WAY) & steep)
 
 
 def _tangents(v: Array, inverse: Array) -> Array:
@@ -181,7 +181,7 @@ def _unit(rows: Array) -> Array:
         return np.asarray(rows / np.sqrt((rows * rows).sum(axis=2, keepdims=True)))
 
 
-def _single(inverse: Array, lost: Array) -> Bool:
+def _one_direction_lost(inverse: Array, lost: Array) -> Bool:
     """Whether one direction alone is lost, by an upper bound of what the others make of inverses; lost: J^-1 u."""
     rest = (inverse * inverse).sum(axis=(1, 2)) - (lost * lost).sum(axis=(1, 2))
     return np.asarray(rest * tol.HIGH**2 < 1.0)

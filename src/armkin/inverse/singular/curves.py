@@ -54,7 +54,7 @@ class Curves:
     def __init__(self, arm: Arm, task: Task, q: Array, joints: Bool, target: Array, ahead: Array) -> None:
         self._arm, self._task, self._joints, self._target = arm, task, joints, target
         self._start, self._ahead, self._taken = q, ahead, np.zeros(len(q), int)
-        self._pace = _longest(_across(arm, task, q, joints, target)[2])
+        self._pace = _longest_steps(_onto_curve(arm, task, q, joints, target)[2])
         self.at, self.going, self.closed = q.copy(), np.ones(len(q), bool), np.zeros(len(q), bool)
 
     def step(self) -> Step:
@@ -62,13 +62,13 @@ class Curves:
         rows = np.flatnonzero(self.going)
         arm, joints, last, pace = self._arm, self._joints[rows], self._ahead[rows], self._pace[rows]
         start = self.at[rows] + pace[:, None] * last * radian_or_reach(arm)
-        there, V, second, size = _across(arm, self._task, start, joints, self._target[rows])
-        ahead = _onwards(V, second, last)
+        there, V, second, size = _onto_curve(arm, self._task, start, joints, self._target[rows])
+        ahead = _next_directions(V, second, last)
         cosine = np.linalg.norm(ahead, axis=1)
         good = (size < tol.OFF_CURVE) & (cosine > STRAIGHT)
         before = self.at[rows]
         self.at[rows[good]], self._ahead[rows[good]] = there[good], ahead[good] / cosine[good, None]
-        self._pace[rows] = pace = np.minimum(_longest(second), np.where(good, 2.0, 0.5) * pace)
+        self._pace[rows] = pace = np.minimum(_longest_steps(second), np.where(good, 2.0, 0.5) * pace)
         self._taken[rows] += 1
         stuck, long = ~good & (pace < tol.SHORTEST_STEP), self._taken[rows] == MOST
         unsure = (second < tol.CROSSING) | (stuck & (size < tol.OFF_CURVE)) | long
@@ -81,16 +81,16 @@ class Curves:
 
 def directions(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Bool]:
     """Directions (M, n) of curves through postures q (M, n), moving joints (M, n); which are crossings (M,)."""
-    _, V, second, _ = _across(arm, task, q, joints, target)
+    _, V, second, _ = _onto_curve(arm, task, q, joints, target)
     return V[:, :, 0], np.asarray(second < tol.CROSSING)
 
 
-def _longest(second: Array) -> Array:
+def _longest_steps(second: Array) -> Array:
     """Steps (M,) beside a second smallest singular value; where another curve crosses, one over the crossing."""
     return np.asarray(np.where(second < tol.CROSSING, OVER, np.minimum(STEP, BEND * second)))
 
 
-def _onwards(V: Array, second: Array, last: Array) -> Array:
+def _next_directions(V: Array, second: Array, last: Array) -> Array:
     """What is lost of the directions last (M, n), those of steps: V (M, n, n) the smallest singular value's first."""
     along = np.einsum("mij,mi->mj", V, last)
     along[:, 2:] = 0.0
@@ -98,7 +98,7 @@ def _onwards(V: Array, second: Array, last: Array) -> Array:
     return np.asarray(np.einsum("mij,mj->mi", V, along))
 
 
-def _across(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Array, Array, Array]:
+def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Array, Array, Array]:
     """Postures (M, n) moved onto the curve beside them, at right angles to it.
 
     Also right singular vectors there (M, n, n), the curve's direction first, the second smallest singular value (M,)

@@ -63,7 +63,7 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     known, motions = _motions(goals, q, there, loose)
     lacking = np.asarray((loose & (there.sum(axis=1) < 2)).any(axis=1))
     known &= ~lacking & ~((own > tol.CLOSED) & (own <= tol.SOLUTION))
-    one, apart = _columns(arm, motions, loose)
+    one, apart = _first_columns(arm, motions, loose)
     known &= apart
     circuit = np.zeros((K, S, B), bool)
     k, s, b = np.nonzero(there & known[:, None, None] & (motions.joint >= 0)[:, None])
@@ -83,7 +83,7 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     np.put_along_axis(listed, order, first, axis=1)
     listed &= key < 2 * B
     if (stands := known & (own <= tol.CLOSED)).any():
-        known &= _replaced(goals, q, listed, key, motions, one, loose, stands)
+        known &= _listed_as_near(goals, q, listed, key, motions, one, loose, stands)
     known &= _one_direction(goals, q, listed & known[:, None], key)
     listed &= known[:, None]
     q[~listed] = np.nan
@@ -116,7 +116,7 @@ def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _M
     return np.asarray((line | bars | ~loose).all(axis=1)), _Motions(line, d, base, joint)
 
 
-def _held(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Array:
+def _held_difference(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Array:
     """How far postures (..., n) differ besides a way along self-motions d (..., n), lines or four bars: (...)."""
     way = newton.difference(arm, a, b)
     held = np.abs(np.where(d != 0.0, 0.0, way)).max(axis=-1)
@@ -128,10 +128,12 @@ def _held(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Array:
     return np.asarray(held)
 
 
-def _columns(arm: Arm, at: _Motions, loose: Bool) -> tuple[Int, Bool]:
+def _first_columns(arm: Arm, at: _Motions, loose: Bool) -> tuple[Int, Bool]:
     """The first column (K, B) on the same self-motion as each; and whether all others are clearly apart (K,)."""
     B = loose.shape[1]
-    held = _held(arm, at.base[:, None], at.base[:, :, None], at.d[:, :, None], at.line[:, :, None])  # (K, B, B)
+    held = _held_difference(
+        arm, at.base[:, None], at.base[:, :, None], at.d[:, :, None], at.line[:, :, None]
+    )  # (K, B, B)
     alike = ((at.d[:, :, None] != 0.0) == (at.d[:, None] != 0.0)).all(axis=3)
     sense = at.d.prod(axis=2, where=at.d != 0.0)
     alike &= sense[:, :, None] == sense[:, None]
@@ -156,7 +158,7 @@ def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
     return out
 
 
-def _replaced(
+def _listed_as_near(
     goals: Goals, q: Array, listed: Bool, key: Int, at: _Motions, one: Int, loose: Bool, stands: Bool
 ) -> Bool:
     """Put `near` in place of what is listed of the self-motion that it is on; (K,) False where it may be on another.
@@ -166,7 +168,7 @@ def _replaced(
     arm, _, _, near = goals
     k = np.flatnonzero(stands)
     known = np.ones(len(q), bool)
-    held = _held(arm, near[k, None], at.base[k], at.d[k], at.line[k])
+    held = _held_difference(arm, near[k, None], at.base[k], at.d[k], at.line[k])
     held = np.where(loose[k], held, np.inf)
     b, least = held.argmin(axis=1), held.min(axis=1)
     known[k[(least >= tol.TURNED) & (least < tol.APART_ROOTS)]] = False

@@ -73,7 +73,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
     """
     M, n = q.shape
     at = known or newton.Linear.at(arm, task, q, target)
-    (r, U, S, V), out = at, _unknown(at)
+    (r, U, S, V), out = at, _undecided(at)
     rows = r.shape[1]
     if rows < n:
         return out
@@ -99,13 +99,13 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
 def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array) -> Structure:
     """The curves through postures (M, n) as far as span (M,): known are those that stay at hand."""
     at = newton.Linear.at(arm, task, q, target)
-    out = _unknown(at)
+    out = _undecided(at)
     out.span[...] = span
     out.known[...] = _follow(arm, task, q, target, at.U, at.V, np.zeros(q.shape), out, np.arange(len(q)))
     return out
 
 
-def _unknown(at: newton.Linear) -> Structure:
+def _undecided(at: newton.Linear) -> Structure:
     """What Jacobians alone tell of their M postures."""
     r, _, S, V = at
     M, n = len(r), V.shape[2]
@@ -251,7 +251,7 @@ def _polynomials(
         if not len(going):
             break
     # the last rows span what no motion across v reaches: u has turned on the way
-    g = _least(inverse[:, :, n:, :rows], left)
+    g = _least_residual(inverse[:, :, n:, :rows], left)
     chebyshev = np.tensordot(_FIT, np.concatenate([away, g], axis=2), axes=1)
     # the polynomials are exact on the span if their last coefficients are small
     last = np.abs(chebyshev[-2:]).max(axis=0)
@@ -270,7 +270,7 @@ def _polynomials(
     return np.asarray(on), longer, np.asarray(alone), power[:, :, :n], power[:, :, n:]
 
 
-def _least(across: Array, left: Array) -> Array:
+def _least_residual(across: Array, left: Array) -> Array:
     """Vectors (..., k) as long as the least residual on the hyperplanes across v: it along across (..., k, rows)."""
     if left.shape[-1] == 1:
         return np.asarray(left / np.linalg.norm(across, axis=-1))
@@ -294,11 +294,11 @@ def _values(coefficients: Array, s: Array) -> Array:
     return out
 
 
-def _size(g: Array, s: Array) -> Array:
+def _residual_size(g: Array, s: Array) -> Array:
     return np.asarray(np.linalg.norm(_values(g, s), axis=-1))
 
 
-def _ends(g: Array) -> tuple[Array, Bool]:
+def _ends_of_components(g: Array) -> tuple[Array, Bool]:
     """Where |g| (NODES, M, k) first exceeds `SOLUTION`, as a share of the span, and whether it does, (2, M): below 0
     and above."""
     M = g.shape[1]
@@ -313,7 +313,7 @@ def _ends(g: Array) -> tuple[Array, Bool]:
     low, high = POINTS[np.maximum(first - 1, 0)], POINTS[first]
     for _ in range(2 if len(some) else 0):
         between = low + FINER * (high - low)
-        beyond = _size(g[:, some], between[1:]) > tol.SOLUTION
+        beyond = _residual_size(g[:, some], between[1:]) > tol.SOLUTION
         beyond[-1] = True
         first = beyond.argmax(axis=0)
         low, high = between[first, np.arange(len(some))], between[first + 1, np.arange(len(some))]
@@ -324,7 +324,7 @@ def _ends(g: Array) -> tuple[Array, Bool]:
 def _decide(out: Structure, rows: Int) -> None:
     """Write what the polynomials of some postures tell: of a component that leaves a shortened span, nothing."""
     g, x, span = out.g[:, rows], out.x[:, rows], out.span[rows]
-    (low, high), (below, above) = _ends(g)
+    (low, high), (below, above) = _ends_of_components(g)
     low = -low
     s = low + FINE * (high - low)  # (points, M)
     way = _values(x, s)

@@ -104,7 +104,7 @@ def drop_twins(
     slow = ~held & (most > tol.TURNED) & (most < tol.DRIFT)
     held |= np.equal(j, 0)  # `near` stands for all that meet there
     open_ = np.flatnonzero(held)
-    same[open_] = _straight(arm, task, at[open_], apart[open_], target[k[open_]])
+    same[open_] = _reached_straight(arm, task, at[open_], apart[open_], target[k[open_]])
     left = np.flatnonzero(slow & ~same)
     if len(left):  # whether the self-motion of the one goes round to the other
         joints = curve[k[left], i[left]] | (size[left] > tol.SAME)
@@ -118,7 +118,7 @@ def drop_twins(
         chosen[k[p], i[p]] &= not chosen[k[p], j[p]]
 
 
-def _straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool:
+def _reached_straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool:
     """Whether the joints can move from q (M, n) to q + way while they keep the target, each at a constant pace: (M,).
 
     A quarter, half and three quarters of the way are asked, each way round for joints that turn by about 180 degrees.
@@ -162,14 +162,14 @@ def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Arr
     return there, size, np.where(far, size - newton.missing(arm, task, q, target), np.inf) / step
 
 
-def _apart(away: Array, push: Array) -> Bool:
+def _equally_long(away: Array, push: Array) -> Bool:
     """Whether motions (2, 2, M, n), by a short step and a long one, both ways along push (M, n), are about as long."""
     least = 0.3 * STEPS * np.abs(push).max(axis=1)  # (2, M)
     far = (np.abs(away).max(axis=3) > least[:, None]).all(axis=1)
     return np.asarray(far & (np.abs(away[:, 0] - away[:, 1]).max(axis=2) > 0.3 * least))
 
 
-def _moved(away: Array, long: Bool) -> Bool:
+def _moving_joints(away: Array, long: Bool) -> Bool:
     """Joints (M, n) that move at all on the long ways (2, 2, M, n), or on the short ones where it is no motion (M,).
 
     Roots of high order are off by up to 10 `TURNED`, and a short way that is drawn back to a meeting ends anywhere
@@ -206,12 +206,12 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     there, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[who]] * 8), steps=20)
     away, size = (there.reshape(start.shape)[:, :, 0] - q[who]) / unit, size.reshape(start.shape[:4])
     grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[who]  # (2, m)
-    short, long = (grown <= tol.GROWTH * STEPS) & _apart(away, push)
+    short, long = (grown <= tol.GROWTH * STEPS) & _equally_long(away, push)
     # where the residual grows at all, it must do so slowly as far as the long step: near a fold the first tenth of a
     # radian costs nothing
     along = (short & ((grown[0] <= tol.CLOSED) | long)) | (long & several)
     np.logical_or.at(moving, who, along)
-    np.logical_or.at(joints, who, along[:, None] & _moved(away, long))
+    np.logical_or.at(joints, who, along[:, None] & _moving_joints(away, long))
     return moving, joints
 
 
@@ -248,7 +248,7 @@ def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
     return who[once], push[once]
 
 
-def _across(held: Array) -> Array:
+def _normals(held: Array) -> Array:
     """Vectors (..., k) at right angles to the k - 1 columns of (..., k, k - 1): of three, the cross product."""
     k = held.shape[-2]
     return np.stack([(-1) ** i * np.linalg.det(np.delete(held, i, axis=-2)) for i in range(k)], axis=-1)
@@ -267,13 +267,13 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
         some = np.flatnonzero(nullity == k)
         basis = V[some, ::-1][:, :k]
         held = list(itertools.combinations(range(n), k - 1))
-        yield _far(some, np.einsum("cmk,mkn->cmn", _across(np.moveaxis(basis[:, :, held], 2, 0)), basis))
+        yield _long_directions(some, np.einsum("cmk,mkn->cmn", _normals(np.moveaxis(basis[:, :, held], 2, 0)), basis))
     many = np.flatnonzero(nullity > 1)
     in_null = (np.arange(n) >= n - nullity[many][:, None])[:, :, None]
-    yield _far(many, np.moveaxis(V[many].swapaxes(1, 2) @ np.where(in_null, V[many], 0.0), 1, 0))
+    yield _long_directions(many, np.moveaxis(V[many].swapaxes(1, 2) @ np.where(in_null, V[many], 0.0), 1, 0))
 
 
-def _far(who: Int, push: Array) -> tuple[Int, Array]:
+def _long_directions(who: Int, push: Array) -> tuple[Int, Array]:
     """Those of directions (C, m, n) of postures (m,) that are long enough, of length one."""
     size = np.linalg.norm(push, axis=2)
     far = size > 0.1

@@ -62,7 +62,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if (
         elimination is not None
         and off > tol.BLURRED
-        and (straight := _straight(arm, task, alike, off, elimination())) is not None
+        and (straight := _by_elimination(arm, task, alike, off, elimination())) is not None
     ):
         return straight
 
@@ -70,7 +70,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         starts = range(0, max(len(target), 1), CHUNK)
         parts = [_solve(arm, task, alike, off, elimination, target[k : k + CHUNK]) for k in starts]
         found = stacked(parts)
-        complete = _four(arm, found.q) if counted else found.complete
+        complete = _has_four_roots(arm, found.q) if counted else found.complete
         return found._replace(doubt=found.doubt & ~complete, complete=complete)  # four roots apart are simple ones
 
     steps = newton_steps.steps(arm, task, off, alike.pairs) if alike.pairs is not None else None
@@ -89,7 +89,7 @@ def _named_columns(alike: Geometry) -> int | None:
     return math.prod(2 if label else 1 for label in alike.labels) if alike.labels else None
 
 
-def _straight(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geometry | None) -> Geometry | None:
+def _by_elimination(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geometry | None) -> Geometry | None:
     """The elimination, its branches named after those of the similar arm; None if it is not healthy on this arm."""
     if general_ is None or general_.elimination is None or general_.rows is None or not general_.complete:
         return None
@@ -192,13 +192,13 @@ def _by_neighbours(
     else:
         rings = (around(arm, task, goals, size * off_here[few]) for size in RINGS)
         others = [source.rows(there)[0] for ring in rings for there in ring]
-    more = _settled(arm, task, np.concatenate([seeds[few], *others], axis=1), goals, seeds.shape[1])
+    more = _corrected_seeds(arm, task, np.concatenate([seeds[few], *others], axis=1), goals, seeds.shape[1])
     out = widened(q, more.shape[1])
     out[few] = more
     return out, doubt
 
 
-def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
+def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
     """Seeds (N, B, n) moved onto the arm: the first `own` in their places, then what else they lead to, once."""
     N, B, n = q.shape
     flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
@@ -206,21 +206,21 @@ def _settled(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
     size = np.full(len(flat), np.inf)
     flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=20, patience=4)
     flat[size > tol.SOLUTION] = np.nan
-    q = _packed(flat.reshape(N, B, n), own)
+    q = _filled_columns(flat.reshape(N, B, n), own)
     for i in range(1, q.shape[1]):
         again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < tol.ALIKE
         q[again.any(axis=1), i] = np.nan
-    return _packed(q, own)
+    return _filled_columns(q, own)
 
 
-def _four(arm: Arm, q: Array) -> Bool:
+def _has_four_roots(arm: Arm, q: Array) -> Bool:
     """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
     near = newton.distances(arm, q, q) < tol.APART_ROOTS
     there = ~np.isnan(q[:, :, 0])
     return np.asarray((there.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
 
 
-def _packed(q: Array, own: int) -> Array:
+def _filled_columns(q: Array, own: int) -> Array:
     """Rows (N, B, n) without the columns that are nan, but for the first `own`."""
     there = ~np.isnan(q[:, own:, 0])
     order = own + np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]

@@ -66,7 +66,7 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
     bad = (np.isnan(q[:, :, 0]) & tried) | jumped | _merged(arm, q)
     doubt, complete = np.zeros((2, len(target)), bool)
     left = np.flatnonzero(bad.any(axis=1) & ~open_)
-    others = _others(source)
+    others = _partners(source)
     if not len(left) or task.constraints != arm.n or not len(others):
         open_[left] = True
         return Rows(q, doubt, complete, None, guesses), open_
@@ -81,7 +81,7 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
     pair = root_pairs.meet(arm, task, middle, target[row])
     found = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < MOVED)
     open_[row[~found]] = True
-    sense = np.where(_along(arm, task, source, (row, one, two), off, target, pair.way), 1.0, -1.0)[:, None]
+    sense = np.where(_keep_sense(arm, task, source, (row, one, two), off, target, pair.way), 1.0, -1.0)[:, None]
     for place, side in ((one, sense), (two, -sense)):
         guess = pair.middle + side * pair.way
         guesses[row, place] = np.where((pair.square < -TOUCHING)[:, None], np.nan, guess)
@@ -98,14 +98,14 @@ def _merged(arm: Arm, q: Array) -> Bool:
     return np.asarray(near.sum(axis=2) > 1)
 
 
-def _others(source: Recorded) -> Int:
+def _partners(source: Recorded) -> Int:
     """The branches' partners along each axis of two: (A, B)."""
     number = np.arange(np.prod(source.axes)).reshape(source.axes)
     flipped = [np.flip(number, axis).ravel() for axis, size in enumerate(source.axes) if size == 2]
     return np.array(flipped, np.intp).reshape(len(flipped), number.size)
 
 
-def _along(
+def _keep_sense(
     arm: Arm, task: Task, source: Recorded, where: tuple[Int, ...], off: Array, target: Array, way: Array
 ) -> Bool:
     """Whether ways (M, n) lead from branch `two` to branch `one` of targets row: as they do where the class's lie
