@@ -21,7 +21,7 @@ from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.singular import chains, circuits, meetings, roots, self_motions
+from armkin.inverse.singular import chains, circuits, high_order_roots, meetings, self_motions
 from armkin.inverse.singular.local_structure import beyond_folds, local_structure
 
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
@@ -197,7 +197,7 @@ class _Groups:
         """Which candidates are one with these, whose component is not known."""
         at, (arm, task, target, _), sigma = self.at, self.goals, self.lost.sigma
         self.place[k, b] = len(self.component) + np.arange(len(k))
-        one, away = roots.alike(arm, task, at.q, k, b, sigma, at.size, target)
+        one, away = high_order_roots.alike(arm, task, at.q, k, b, sigma, at.size, target)
         self.edge[k, b] = (one & self.valid[k] & (away > tol.SAME)).any(axis=1) | (sigma[k, b] < tol.DOUBLE)
         self.component = np.concatenate([self.component, one])
 

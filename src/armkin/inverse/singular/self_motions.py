@@ -14,7 +14,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular import circuits, roots
+from armkin.inverse.singular import circuits, high_order_roots
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -71,7 +71,7 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     way = newton.difference(arm, there, q)
     near = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(way).max(axis=1) < tol.CLOSE_BY))
     miss, out = newton.missing(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
-    out[near] = roots.joined(arm, task, q[near], way[near], miss, sigma[near], goal[near])
+    out[near] = high_order_roots.joined(arm, task, q[near], way[near], miss, sigma[near], goal[near])
     return np.asarray(out.reshape(2, -1).any(axis=0))
 
 
