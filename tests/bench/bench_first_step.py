@@ -25,7 +25,7 @@ from emulator import EmulatedBoard
 import armkin
 from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.ports import SerialPort
 from armkin.errors import LinkError
 
@@ -37,7 +37,7 @@ def first_steps(runs: int) -> tuple[list[float], float]:
     for _ in range(runs):
         with EmulatedBoard(trace=True, reset_on_open=False, patience=0) as board:
             port = SerialPort(board.port)
-            machine = Machine(port, arm, configure(arm))
+            machine = FirmwareMachine(port, arm, configure(arm))
             machine.prepare(assume=arm.home)
             plan = machine.plan(machine.counts(), np.deg2rad([-3, 0.5, -0.5]))
             law = plan.trajectory.stretches[0].law  # type: ignore[attr-defined]
@@ -69,7 +69,7 @@ def short_moves(moves: int, load: int) -> tuple[int, int, float]:
     try:
         with EmulatedBoard(reset_on_open=False, patience=0) as board:
             port = SerialPort(board.port)
-            machine = Machine(port, arm, configure(arm))
+            machine = FirmwareMachine(port, arm, configure(arm))
             machine.prepare(assume=arm.home)
             rng = np.random.default_rng(1)
             for _ in range(moves):

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 from emulator import EmulatedBoard
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.session import probe
 from armkin.board.ports import SerialPort
@@ -39,7 +39,7 @@ def noisy(seed: int) -> str:
     configuration = configure(arm)
     with EmulatedBoard(seed=seed, reset_on_open=False, patience=0) as board:
         port = SerialPort(board.port)
-        machine = Machine(port, arm, configuration)
+        machine = FirmwareMachine(port, arm, configuration)
         machine.prepare(assume=machine.arm.home)
         board.control(f"noise flip 0.01 drop 0.01 seed {seed}")
         probe(machine.session)

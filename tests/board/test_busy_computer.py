@@ -7,7 +7,7 @@ import pytest
 from test_feetech_machine import ARM, bus, machine
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_servo_bus import ServoBus
 from armkin.errors import LinkError
@@ -37,12 +37,12 @@ class Suspended(Wire):
         return super().now() + self.paused
 
 
-def prepared() -> tuple[Suspended, Machine]:
+def prepared() -> tuple[Suspended, FirmwareMachine]:
     """A board that knows its arm at home, and the program that speaks with it."""
     arm = arms.load(ROOT / "robots/three_dof.yaml")
     configuration = configure(arm)
     port = Suspended(SimBoard(configuration.board))
-    one = Machine(port, arm, configuration)
+    one = FirmwareMachine(port, arm, configuration)
     one.prepare(assume=arm.home)
     return port, one
 

@@ -13,7 +13,7 @@ import pytest
 
 from armkin.board.firmware import gripping, homing, jogging
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Info, Status
@@ -73,7 +73,7 @@ def test_an_info_that_cannot_be_is_refused(three_dof: Arm, lie: dict[str, int]) 
     port = LyingPort(None, **lie)
     port.lying = True
     with pytest.raises(BoardSaysError, match=f"answers {next(iter(lie))} "):
-        Machine(port, three_dof, configure(three_dof))
+        FirmwareMachine(port, three_dof, configure(three_dof))
 
 
 # What replies are made to say once the machine is ready.
@@ -111,7 +111,7 @@ CANNOT_KNOW = {
     "home": {"counts", "free", "known"},
     "grip": {"tag"},
 }
-COMMANDS: dict[str, Callable[[Machine], object]] = {
+COMMANDS: dict[str, Callable[[FirmwareMachine], object]] = {
     "send": lambda one: one.run([one.plan(one.counts(), GOAL)]),
     "batch": lambda one: one.run([one.plan(one.counts(), np.stack([GOAL, GOAL / 2, GOAL]))]),
     "curve": lambda one: one.run(
@@ -140,7 +140,7 @@ def test_lies_to_a_moving_command_end_it_in_bounded_time(switched: Arm, command:
     for lie in LIES if LONG else LIES[:: 5 if command == "send" else 8]:
         configuration = configure(switched)
         port = LyingPort(homing.switches(switched, configuration), **lie)
-        one = Machine(port, switched, configuration)
+        one = FirmwareMachine(port, switched, configuration)
         one.prepare(assume=switched.home)
         gripping.prepare(one, gripping.gripper_of("arm", configuration), 833)
         port.lying = True
@@ -156,7 +156,7 @@ def test_lies_to_a_moving_command_end_it_in_bounded_time(switched: Arm, command:
 
 def test_a_sender_whose_session_was_replaced_ends(three_dof: Arm) -> None:
     port = SimPort(SimBoard(BOARDS["uno_cnc_shield"]))
-    one = Machine(port, three_dof, configure(three_dof))
+    one = FirmwareMachine(port, three_dof, configure(three_dof))
     one.prepare()
     port.board.receive(protocol.wire(protocol.hello(0, 0x12345678)))  # another program
     port.board.take()
@@ -168,4 +168,4 @@ def test_another_version_is_named_with_what_to_flash(three_dof: Arm) -> None:
     port = LyingPort(version=1)
     port.lying = True
     with pytest.raises(LinkError, match=r"protocol 1, this armkin 2: nothing was moved\n.*make -C firmware flash"):
-        Machine(port, three_dof, configure(three_dof))
+        FirmwareMachine(port, three_dof, configure(three_dof))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from armkin.board.backend import StoppedError
 from armkin.board.firmware import homing
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.firmware.wire.session import ReplacedError
@@ -88,9 +88,9 @@ class NoisyPort(SimPort):
         return bytes(out)
 
 
-def machine(arm: Arm, port: SimPort | None = None) -> Machine:
+def machine(arm: Arm, port: SimPort | None = None) -> FirmwareMachine:
     configuration = configure(arm)
-    return Machine(port or SimPort(SimBoard(configuration.board)), arm, configuration)
+    return FirmwareMachine(port or SimPort(SimBoard(configuration.board)), arm, configuration)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -115,7 +115,7 @@ def test_a_noisy_line_ends_at_exact_counts(three_dof: Arm, seed: int) -> None:
 def test_a_stop_holds_on_the_path(three_dof: Arm) -> None:
     configuration = configure(three_dof)
     port = SimPort(SimBoard(configuration.board))
-    one = Machine(port, three_dof, configuration, lambda: port.board.net[1] < -4000)
+    one = FirmwareMachine(port, three_dof, configuration, lambda: port.board.net[1] < -4000)
     one.prepare()
     plan = plan_moves(three_dof, one.counts(), np.deg2rad([-30, 5, -5]))
     with pytest.raises(StoppedError) as stopped:
@@ -226,7 +226,7 @@ def test_coupled_joints_home_one_after_another(wrist: Arm) -> None:
         return bool(pressed) if number == 3 else not pressed
 
     board = SimBoard(configuration.board, switch)
-    one = Machine(NoisyPort(board, 0.0, 1), wrist, configuration)
+    one = FirmwareMachine(NoisyPort(board, 0.0, 1), wrist, configuration)
     names: list[str] = []
     homing.home(one, announce=names.append)
     assert names == ["J1", "J2", "J3"]

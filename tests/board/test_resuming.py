@@ -11,7 +11,7 @@ import pytest
 
 import armkin
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.segments.remaining_plan import places_on, remaining_trajectory
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
 from armkin.board.firmware.wire.protocol import HALF, STEP
@@ -224,7 +224,7 @@ def test_a_stop_says_where_the_arm_stands_and_that_it_can_go_on(
 def _moves(way: Cut) -> list[int]:
     """Where a fresh board has come to that carries a plan out from its start."""
     arm = way.trajectory.arm
-    machine = Machine(SimPort(SimBoard(BOARDS["uno_cnc_shield"])), arm, configure(arm))
+    machine = FirmwareMachine(SimPort(SimBoard(BOARDS["uno_cnc_shield"])), arm, configure(arm))
     machine.prepare(assume=joints(arm, way.start))
     machine.run([way])
     return list(machine.counts())

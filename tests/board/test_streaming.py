@@ -11,7 +11,7 @@ import pytest
 import armkin
 from armkin.board.firmware import carry_out_plans, gripping, streaming
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.wire import framing
 from armkin.board.firmware.wire.protocol import Type
 from armkin.board.sim.sim_board import SimBoard
@@ -49,8 +49,8 @@ def payload_of(data: bytes) -> bytes:
     return whole[:-4]
 
 
-def machine_on(port: SimPort) -> Machine:
-    machine = Machine(port, ARM, configure(ARM))
+def machine_on(port: SimPort) -> FirmwareMachine:
+    machine = FirmwareMachine(port, ARM, configure(ARM))
     machine.prepare()
     return machine
 

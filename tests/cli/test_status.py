@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board_catalogue import BOARDS
 from armkin.cli.commands import status
@@ -59,14 +59,14 @@ def test_watch_tells_each_change_once_and_ends_with_ctrl_c(monkeypatch: pytest.M
     monkeypatch.setattr("armkin.cli.commands.status._EVERY", 0.001)
     asked = 0
 
-    def refresh(machine: Machine) -> None:
+    def refresh(machine: FirmwareMachine) -> None:
         nonlocal asked
         asked += 1
         machine.status = machine.session.status()
         if asked == 5:
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(Machine, "refresh", refresh)
+    monkeypatch.setattr(FirmwareMachine, "refresh", refresh)
     watched = run("status", THREE_DOF, "--port", "COM3", "--watch", "--json")
     assert (watched.code, watched.err, asked) == (0, "", 5)
     assert [line["position"] for line in watched.lines] == ["known"]

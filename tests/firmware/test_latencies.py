@@ -12,7 +12,7 @@ from stepped_port import SteppedPort
 import armkin
 from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.wire.protocol import Ack, Error, Info, Status
 
 ARM = armkin.load("three_dof")
@@ -26,7 +26,7 @@ def test_short_moves_lose_no_byte(monkeypatch: pytest.MonkeyPatch, load: float, 
     with EmulatedBoard(speed="step", reset_on_open=False) as board:
         port = SteppedPort(board, one_way_ms / 1e3)
         port.wait(0.02)
-        machine = Machine(port, ARM, configure(ARM))
+        machine = FirmwareMachine(port, ARM, configure(ARM))
         machine.prepare(assume=ARM.home)
         hear = machine.session.line.replies
 
@@ -54,7 +54,7 @@ def test_the_first_step_comes_within_10_ms_of_the_first_byte(monkeypatch: pytest
     with EmulatedBoard(speed="step", reset_on_open=False, trace=True) as board:
         port = SteppedPort(board, 0.0005)
         port.wait(0.02)
-        machine = Machine(port, ARM, configure(ARM))
+        machine = FirmwareMachine(port, ARM, configure(ARM))
         machine.prepare(assume=ARM.home)
         plan = machine.plan(machine.counts(), np.deg2rad([-3, 0.5, -0.5]))
         port.wait(0.03)

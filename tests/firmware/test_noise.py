@@ -17,7 +17,7 @@ from stepped_port import SteppedPort
 import armkin
 from armkin.board.firmware import streaming
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.wire import session
 
 ARM = armkin.load("three_dof")
@@ -34,7 +34,7 @@ def seconds(who: str, *line: str) -> float:
         )  # at random, the line would damage other bytes each time
         port = SteppedPort(board, 0.0005)
         port.wait(0.02)
-        machine = Machine(port, ARM, configure(ARM))
+        machine = FirmwareMachine(port, ARM, configure(ARM))
         machine.prepare(assume=ARM.home)
         for command in line:
             board.control(command)

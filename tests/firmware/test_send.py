@@ -11,7 +11,7 @@ from pins import net
 from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.firmware.wire.protocol import Flag
 from armkin.board.ports import SerialPort
@@ -108,7 +108,7 @@ def test_coupled_motors_and_their_joint_limits_on_both_sides(tmp_path: Path) -> 
         )}))  # fmt: skip
         port = SerialPort(board.port)
         try:
-            one = Machine(port, arm, configure(arm))
+            one = FirmwareMachine(port, arm, configure(arm))
             one.prepare()
             plan = plan_moves(loose, one.counts(), np.deg2rad([10, 45, -30]))
             with pytest.raises(Exception, match="LIMIT_JOINT"):

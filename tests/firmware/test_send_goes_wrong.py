@@ -18,7 +18,7 @@ from emulator import EmulatedBoard
 from pins import at_rest, net, on_the_line
 
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
 from armkin.board.ports import SerialPort
 from armkin.errors import HeldError
@@ -120,7 +120,7 @@ class _KilledError(Exception):
 
 
 @contextmanager
-def machine(board: EmulatedBoard, dies_after: float | None = None) -> Iterator[Machine]:
+def machine(board: EmulatedBoard, dies_after: float | None = None) -> Iterator[FirmwareMachine]:
     """The three-joint arm on this board; a sender that dies falls silent in the middle of whatever it does."""
     arm = arms.load(ROOT / THREE_DOF)
     port = SerialPort(board.port)
@@ -132,7 +132,7 @@ def machine(board: EmulatedBoard, dies_after: float | None = None) -> Iterator[M
         return False
 
     try:
-        yield Machine(port, arm, configure(arm), dead)
+        yield FirmwareMachine(port, arm, configure(arm), dead)
     finally:
         port.close()
 

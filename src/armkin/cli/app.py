@@ -1,4 +1,4 @@
-"""The shell around the commands: the group, and what runs a command line (`failures`: errors become exit codes)."""
+"""The shell around the commands: the group, and what runs a command line (`exit_codes`: errors become exit codes)."""
 
 import os
 import signal

@@ -2,7 +2,7 @@
 
 A kind is one class: what can be said without a port (does the arm fit, what does a trajectory become, where may
 such a board be), and, once `connect` has been called, what the board does. Some of that is a capability, which a kind
-has or lacks: it is asked for by its name (`can`, `need`), never by the kind.
+has or lacks: it is asked for by its name (`can`, `require`), never by the kind.
 
     board = board_of(arm)                    # UsageError if the arm cannot be driven
     machine = board.connect(board.open(name), stop)

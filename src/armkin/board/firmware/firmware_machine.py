@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Trajectory
 
 
-class Machine(Backend):
+class FirmwareMachine(Backend):
     """An arm on the board behind an open port.
 
     `stop` is asked all the time: when it says yes, the arm is held and StoppedError raised.

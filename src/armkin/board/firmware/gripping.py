@@ -9,7 +9,7 @@ from armkin.errors import GripperKnownError, GripperLostError, LinkError, UsageE
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.firmware.firmware_machine import Machine
+    from armkin.board.firmware.firmware_machine import FirmwareMachine
     from armkin.board.firmware.gripper_counts import Grip
     from armkin.board.firmware.segments.counts_to_segments import Move
 
@@ -38,12 +38,12 @@ def count_of(gripper: Grip, value: str | float) -> int:
     return count
 
 
-def gripper_known(machine: Machine, gripper: Grip) -> bool:
+def gripper_known(machine: FirmwareMachine, gripper: Grip) -> bool:
     """Whether the board knows where the gripper stands."""
     return machine.configured and bool(machine.status.known >> gripper.axis & 1)
 
 
-def prepare(machine: Machine, gripper: Grip, start: int | None) -> None:
+def prepare(machine: FirmwareMachine, gripper: Grip, start: int | None) -> None:
     """Have the gripper's axis configured, known and on; start: counts where a lost one is taken to stand."""
     is_known = gripper_known(machine, gripper)
     if is_known and start is not None:
@@ -60,7 +60,7 @@ def prepare(machine: Machine, gripper: Grip, start: int | None) -> None:
     machine.enable((gripper.axis,))
 
 
-def grip(machine: Machine, gripper: Grip, target: int) -> int:
+def grip(machine: FirmwareMachine, gripper: Grip, target: int) -> int:
     """Move the gripper to counts; where it stands then."""
     assert gripper.top is not None
     assert gripper.accel is not None

@@ -24,7 +24,7 @@ from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
-    from armkin.board.firmware.firmware_machine import Machine
+    from armkin.board.firmware.firmware_machine import FirmwareMachine
     from armkin.board.firmware.wire.protocol import Status
     from armkin.model.arm import Arm
 
@@ -82,7 +82,7 @@ def _orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int,
     if bare and not (rest_at_home and orders):
         raise NoHomingError(
             f"{arm.path} has no homing for {', '.join(bare)}",
-            advice="without limit switches put the arm in its home pose, then Machine.prepare(assume=arm.home)",
+            advice="without limit switches put the arm in its home pose, then FirmwareMachine.prepare(assume=arm.home)",
             joints=bare,
             file=arm.path,
             some=bool(orders),
@@ -91,7 +91,7 @@ def _orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int,
 
 
 def home(
-    machine: Machine,
+    machine: FirmwareMachine,
     names: Sequence[str] = (),
     announce: Callable[[str], None] = lambda name: None,
     *,
@@ -127,7 +127,7 @@ def home(
     return found
 
 
-def _lost(machine: Machine, search: Search, edge: Status, *, known: bool) -> LostSteps:
+def _lost(machine: FirmwareMachine, search: Search, edge: Status, *, known: bool) -> LostSteps:
     """The counts at a switch's edge, against where the robot file says that it is."""
     arm, j = machine.arm, search.joint
     if not known:
@@ -139,7 +139,7 @@ def _lost(machine: Machine, search: Search, edge: Status, *, known: bool) -> Los
     return LostSteps(arm.joint_names[j], steps, steps / float(leader))
 
 
-def _run_search(machine: Machine, search: Search) -> tuple[Status, Status]:
+def _run_search(machine: FirmwareMachine, search: Search) -> tuple[Status, Status]:
     """Carry out one search; status at rest, and at the switch's edge (page 1)."""
     session = machine.session
     try:
@@ -153,7 +153,7 @@ def _run_search(machine: Machine, search: Search) -> tuple[Status, Status]:
         raise resets_and_stops.explain(machine, error) from None
 
 
-def lost_joints(machine: Machine) -> list[str]:
+def lost_joints(machine: FirmwareMachine) -> list[str]:
     """Names of the joints that a motor of unknown position turns."""
     arm, known = machine.arm, machine.status.known if machine.configured else 0
     lost = [not known >> axis & 1 for axis in machine.configuration.axes]

@@ -18,14 +18,14 @@ from armkin.model import units
 from armkin.motion.plan.trajectory_proof import free_way
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.firmware_machine import Machine
+    from armkin.board.firmware.firmware_machine import FirmwareMachine
 
 HANDLE = 0.25  # [s] that the board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
 _LONGEST = 60.0  # [s] of a jog that is looked at
 SLOW = 8  # a lost position: at most an eighth of max_speed
 
 
-def prepare(machine: Machine) -> None:
+def prepare(machine: FirmwareMachine) -> None:
     """Have the motors configured and on; LinkError if the board knows the position of another arm."""
     if machine.session.port.simulated:
         machine.prepare()
@@ -42,7 +42,7 @@ def prepare(machine: Machine) -> None:
     machine.enable(machine.configuration.axes)
 
 
-def rates(machine: Machine, joint: int, speed: float) -> dict[int, int]:
+def rates(machine: FirmwareMachine, joint: int, speed: float) -> dict[int, int]:
     """Counts per second of a joint's motors, by axis; speed: [deg/s | mm/s], signed.
 
     Raises NoSolutionError if the joint would go farther outside its limits.
@@ -59,7 +59,7 @@ def rates(machine: Machine, joint: int, speed: float) -> dict[int, int]:
     return found
 
 
-def free_seconds(machine: Machine, joint: int, rates: dict[int, int]) -> float:
+def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) -> float:
     """How long a joint's motors may be told to jog at rates (see `rates`) so that it stands before it hits anything.
 
     Whole counts a second turn the other joints of coupled motors a little, too. Raises NoSolutionError if it could not
@@ -83,7 +83,9 @@ def free_seconds(machine: Machine, joint: int, rates: dict[int, int]) -> float:
     return seconds
 
 
-def jog(machine: Machine, rate: dict[int, int], seconds: float, goes_on: Callable[[], bool] = lambda: True) -> None:
+def jog(
+    machine: FirmwareMachine, rate: dict[int, int], seconds: float, goes_on: Callable[[], bool] = lambda: True
+) -> None:
     """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.
 
     goes_on: asked every 10 ms; the motion ends when it says no.

@@ -1,7 +1,8 @@
 """What a motion ends with when its board resets, stops or refuses: why, where the arm stands, what is lost.
 
-A reset shows as an answer without a session (`wire/session.py` raises it, `Machine.run` asks here): the session is
-opened anew, the board says what it still knows, and nothing of the motion is sent again.
+A reset shows as an answer without a session (`wire/session.py` raises it, `FirmwareMachine.run` asks here): the session
+is opened anew, the board says what it still knows, and nothing of the motion is sent again. Boards with other firmware
+have theirs in `grbl_session.py`, `klipper_machine.py` and `feetech_machine.py`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Machine(Protocol):
-    """Of an arm on its board, what is asked here: `machine.Machine`."""
+    """Of an arm on its board, what is asked here: `firmware_machine.FirmwareMachine`."""
 
     arm: Arm
     session: Session

@@ -22,7 +22,7 @@ from armkin.board.ports import note_path, read_note, remove_note, write_note
 from armkin.errors import HeldError, LinkError, NothingHeldError
 
 if TYPE_CHECKING:
-    from armkin.board.firmware.firmware_machine import Machine
+    from armkin.board.firmware.firmware_machine import FirmwareMachine
 
 _SURE = 1.0  # [s] that the noted time may be off: of places that near, the earliest is taken
 _NOTED = 0.5  # [s] between two notes while the arm moves
@@ -56,7 +56,9 @@ class Trip:
     started: the note of the motion that is resumed, and the seconds of it that were done.
     """
 
-    def __init__(self, machine: Machine, parts: Sequence[Cut], started: tuple[Note, float] | None = None) -> None:
+    def __init__(
+        self, machine: FirmwareMachine, parts: Sequence[Cut], started: tuple[Note, float] | None = None
+    ) -> None:
         self._machine, self._file = machine, note_path(machine.port.name)
         self._keeps_note = not machine.port.simulated
         start = parts[0].start.tolist() if parts else list(machine.counts())
@@ -93,7 +95,7 @@ class Trip:
 
 @contextmanager
 def under_way(
-    machine: Machine, cuts: Sequence[Cut], note: Note | None
+    machine: FirmwareMachine, cuts: Sequence[Cut], note: Note | None
 ) -> Iterator[tuple[Sequence[Cut], int, Callable[[float], None]]]:
     """The parts to be carried out, the number of the first of them, and whom to tell the seconds done.
 
@@ -106,7 +108,7 @@ def under_way(
         yield left, 0 if place is None else place.part, trip.progress
 
 
-def recall(machine: Machine) -> Note:
+def recall(machine: FirmwareMachine) -> Note:
     """The note of the motion that was held on this machine.
 
     Raises NothingHeldError if there is none, or it is of another robot file; LinkError if the arm has moved since.
@@ -125,7 +127,7 @@ def recall(machine: Machine) -> Note:
     return note
 
 
-def find_place(machine: Machine, note: Note, parts: Sequence[Cut]) -> Place:
+def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> Place:
     """Where the arm stands on the plan that was made anew.
 
     Raises NothingHeldError if it is another plan, LinkError if the arm does not stand on it.
@@ -142,7 +144,7 @@ def find_place(machine: Machine, note: Note, parts: Sequence[Cut]) -> Place:
     return next(place for place in found if abs(place.elapsed - note.seconds) <= nearest + _SURE)
 
 
-def remaining_parts(machine: Machine, parts: Sequence[Cut], place: Place) -> list[Cut]:
+def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: Place) -> list[Cut]:
     """What is left of the parts from a place on: the first one from where the arm stands, the others as they are."""
     left = remaining_trajectory(parts[place.part], place, machine.joints())
     counts = np.array(machine.counts(), dtype=np.int64)

@@ -1,7 +1,8 @@
 """The kinds of boards, one file a kind, found by its name: what stands behind `board: {kind: ...}`.
 
 A module has KIND, its data (`board_catalogue.ForeignBoard`), and BOARD, its class (`armkin.board.backend.board`);
-boards with armkin's own firmware are rows of `board_catalogue.BOARDS`, and `firmware.py` serves them all.
+boards with armkin's own firmware are rows of `board_catalogue.BOARDS`, and `firmware.py` serves them all. How to add
+a kind, here or in a package of its own: CONTRIBUTING.md, "Add a board"; `klipper.py` is a good one to begin from.
 """
 
 from __future__ import annotations

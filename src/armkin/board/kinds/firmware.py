@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armkin.board.backend.board import Board, Gripped, LostSteps
 from armkin.board.firmware import gripping, homing, jogging, resume_after_hold
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.firmware_machine import Machine
+from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
 from armkin.board.firmware.wire import find_boards
 from armkin.board.firmware.wire.session import Session
@@ -57,7 +57,7 @@ class FirmwareBoard(Board):
     """A board with armkin's firmware: `configuration` is what it must know of the arm."""
 
     home_speed = 0.25
-    machine: Machine
+    machine: FirmwareMachine
 
     def __init__(self, arm: Arm, *, rehearsal: bool = False) -> None:
         """Raises UsageError, naming all that is missing at once; rehearsal: see `configure`."""
@@ -95,9 +95,9 @@ class FirmwareBoard(Board):
         levels = homing.switches(self.arm, self.configuration)
         return open_port(name, board=self.configuration.board, baud=baud or self.baud, switches=levels, reset=reset)
 
-    def attach(self, port: Port, stop: Callable[[], bool]) -> Machine:
+    def attach(self, port: Port, stop: Callable[[], bool]) -> FirmwareMachine:
         """The arm on the board behind an open port."""
-        machine = Machine(port, self.arm, self.configuration, stop)
+        machine = FirmwareMachine(port, self.arm, self.configuration, stop)
         self._figures = {"clock": machine.info.clock, "min_interval": machine.info.min_interval}
         return machine
 

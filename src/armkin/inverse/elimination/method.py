@@ -33,7 +33,7 @@ Hence every isolated solution whose Jacobian's smallest singular value is above 
 the arm) is listed.  Below that, neighbouring roots cannot be told apart in double precision, and a
 self-motion is a curve of solutions of which only some points are given: such poses are reported as near singular.
 
-Three prismatic joints leave the orientation to the three others: `slides`, in closed form.
+Three prismatic joints leave the orientation to the three others: `three_prismatic`, in closed form.
 """
 
 from typing import NamedTuple

@@ -6,7 +6,7 @@ Every task is a choice of three kinds of constraints:
 - sums of joint values modulo a turn (`sums`: theta, phi, yaw, roll),
 - the direction of the tool's z axis or its whole orientation (`orientation`).
 
-What is missing to a target stands in `residuals`, which task fits an arm in `fitting`.
+What is missing to a target stands in `residuals`, which task fits an arm in `choose_task`.
 """
 
 from __future__ import annotations

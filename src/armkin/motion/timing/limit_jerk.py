@@ -1,4 +1,7 @@
-"""Where jerk is limited: a curve in time, made smooth by a moving average."""
+"""Where the jerk of a path is limited: its curve in time, made smooth by a moving average.
+
+Moves from pose to pose have theirs from `profile.py`.
+"""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from armkin.motion.tool_path.path_pieces import Dense, Piece, Spot, line, turn_b
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
 
-FIT = 0.94  # share of the tolerance: points to curve (chords to curve: less, see `fitting`)
+FIT = 0.94  # share of the tolerance: points to curve (chords to curve: less, see `fit_points`)
 PLAN = (0.1, 0.05, 0.02)  # curve to motion, whatever the points; the first with which all points are within it
 _AT_ONCE = 8192  # points that are fitted together, about
 _FARTHEST_TURN = 5.0  # [rad] that rotation vectors tell from less

@@ -1,6 +1,6 @@
 """A trajectory as a board with our firmware drives it: moves of exact segments, refused where it is too fast.
 
-Trajectory (joints, seconds)  --cut-->  Cut (counts, clock cycles)  --Machine.run-->  frames
+Trajectory (joints, seconds)  --cut-->  Cut (counts, clock cycles)  --FirmwareMachine.run-->  frames
 """
 
 from __future__ import annotations
