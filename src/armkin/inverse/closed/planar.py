@@ -27,9 +27,7 @@ from armkin.model.rotation import FLIP, inverse
 Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Doubt]]
 
 
-def recognise(  # noqa: C901 - the closed form is a function in it
-    arm: Arm, task: Task, tolerance: float = tol.EXACT
-) -> Geometry | None:
+def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | None:
     """Planar and SCARA arms with as many joints as constraints."""
     if task.name not in ("xy", "xy_theta", "xyz_yaw") or arm.n != task.constraints:
         return None
@@ -37,15 +35,30 @@ def recognise(  # noqa: C901 - the closed form is a function in it
     lift = next((i for i in range(arm.n) if arm.prismatic[i] and abs(w[i, 2]) > 0.5), None)
     if (task.name == "xyz_yaw") != (lift is not None) or _leaves_plane(w, arm.prismatic, lift) > tolerance:
         return None
-    link, prismatic, kept = arm.link, arm.prismatic, list(range(arm.n))
-    if lift is not None:
-        link = np.array([*link[:lift], link[lift] @ link[lift + 1], *link[lift + 2 :]])
-        prismatic = np.delete(prismatic, lift)
-        kept.remove(lift)
-    chain = Chain(link, prismatic)
+    chain, kept = _in_plane(arm, lift)
     solve_plane = _two_joints(chain) if task.name == "xy" else _three_joints(chain, task, kept)
     if solve_plane is None:
         return None
+    kinds = "".join("P" if p else "R" for p in arm.prismatic)
+    name, more = ("planar", "") if lift is None else ("SCARA", " or along z")
+    why = f"{kinds}: all joints move in the base's x-y plane{more}"
+    solve = _with_lift(arm, solve_plane, kept, lift, w)
+    return Geometry(name, why, True, solve, labels=() if chain.prismatic.any() else ("", "elbow", ""))
+
+
+def _in_plane(arm: Arm, lift: int | None) -> tuple[Chain, list[int]]:
+    """The chain without the lift, and which joints it has."""
+    kept = [i for i in range(arm.n) if i != lift]
+    if lift is None:
+        return Chain(arm.link, arm.prismatic), kept
+    link = np.array([*arm.link[:lift], arm.link[lift] @ arm.link[lift + 1], *arm.link[lift + 2 :]])
+    return Chain(link, np.delete(arm.prismatic, lift)), kept
+
+
+def _with_lift(
+    arm: Arm, solve_plane: Solve, kept: list[int], lift: int | None, w: Array
+) -> Callable[[list[Entry], Prefer], Candidates]:
+    """The closed form of all joints by that of the others, kept; w: (n, 3) the joints' axes."""
     fixed = [pose.constant(L) for L in arm.link]
 
     def solve(goal: list[Entry], prefer: Prefer) -> Candidates:
@@ -60,14 +73,10 @@ def recognise(  # noqa: C901 - the closed form is a function in it
                 pair = next(rest)
                 P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
             P = pose.times(P, fixed[i + 1])
-        value = (goal[2] - P[11]) * float(np.sign(w[lift, 2]))
-        pairs.insert(lift, Pair(value, None))
+        pairs.insert(lift, Pair((goal[2] - P[11]) * float(np.sign(w[lift, 2])), None))
         return Candidates(pairs, doubt)
 
-    kinds = "".join("P" if p else "R" for p in arm.prismatic)
-    name = "SCARA" if lift is not None else "planar"
-    why = f"{kinds}: all joints move in the base's x-y plane" + (" or along z" if lift is not None else "")
-    return Geometry(name, why, True, solve, labels=() if prismatic.any() else ("", "elbow", ""))
+    return solve
 
 
 def _leaves_plane(w: Array, prismatic: Bool, lift: int | None) -> float:
