@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
-from armkin.motion.branches.branch_columns import Columns, Int
+from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import turns_of
 from armkin.motion.branches.linked_branches import ENDS
 from armkin.motion.plan.trajectory_proof import hit_samples as motion_hits

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.numeric.newton import correct
 from armkin.inverse.numeric.tolerances import CONVERGING
@@ -22,7 +22,6 @@ from armkin.motion.branches.joint_steps import change
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-Int = NDArray[np.intp]
 _STEPS, _STAYS = 8, 1e-6  # of Newton's method on one's self-motion; [rad | mm] of a joint that is not free
 _BLOCK = 16_384  # samples that are solved at once at most
 _APART = 8  # samples from one of a few that are solved first to the next

@@ -12,9 +12,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Status
 from armkin.motion.branches.branch_columns import Columns, Samples
 from armkin.motion.branches.joint_steps import change, chord_bound, largest_form, levers, turns_of
@@ -22,7 +21,6 @@ from armkin.motion.branches.joint_steps import change, chord_bound, largest_form
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-Int = NDArray[np.intp]
 SHORTEST = 1e-9  # of the route: what is not linked there is a jump
 ENDS = 0.002  # [mm] how finely the end of a branch, or the crossing of a limit, is found
 _TORN = 3  # parts of a step in which branches end: where they are more, branches end everywhere

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Int
 from armkin.forward import jacobian, position
 from armkin.motion.branches.joint_steps import chord_bound, levers
 from armkin.motion.branches.solve_on_route import DAMPING, corrected_to_route, exact_cubics
 from armkin.motion.timing.cubic_knots import Knots
-from armkin.motion.timing.speed_scan import Int
 from armkin.motion.timing.time_optimal import knots
 
 if TYPE_CHECKING:

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Int
 from armkin.forward import tip_and_jacobian
 from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.model.units import radian_or_reach
 from armkin.motion.timing.cubic_knots import Knots
-from armkin.motion.timing.speed_scan import Int
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

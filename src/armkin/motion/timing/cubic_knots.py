@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from armkin.formula.arrays import Array
-from armkin.motion.timing.speed_scan import Int
+from armkin.formula.arrays import Array, Int
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Int
 from armkin.motion.timing.cubic_knots import Knots
-from armkin.motion.timing.speed_scan import Int, Least, backward_step, concatenate, forward_step, least_of, scan
+from armkin.motion.timing.speed_scan import Least, backward_step, concatenate, forward_step, least_of, scan
 
 TINY = 1e-300
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each

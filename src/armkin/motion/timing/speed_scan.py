@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Int
 
-Int = NDArray[np.intp]
 _FEWEST, _MOST = 8, 4096  # intervals that are followed one by one before it is asked whether that can end
 _TOGETHER = 32  # runs: more of them go side by side
 _LONGEST = 64  # steps of runs side by side, while there are no more of them

@@ -22,10 +22,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_bounds import TINY, Bound, Fastest, in_parts
-from armkin.motion.timing.speed_scan import Int
 
 _NEIGHBOURS = 5  # samples that give a slope
 _SECTIONS = 16  # of samples, between breaks: more are worked on together

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 
-Int = NDArray[np.intp]
 _RIDGE = 1e-7  # weight of the control polygon's bend, where points are too few to determine a curve
 _ENDS = 1e6  # weight of a curve's ends, which it passes
 _DENSE = 16  # blocks: so few are solved as one system

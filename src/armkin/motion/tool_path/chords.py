@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
-from armkin.motion.tool_path.b_spline import Int
+from armkin.formula.arrays import Array, Bool, Int
 
 CORNER = np.deg2rad(20.0)  # a larger turn is rounded
 SHORT = 1 / 3  # of a chord: a shorter neighbour tells nothing of its curvature

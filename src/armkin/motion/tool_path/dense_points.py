@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, Int
 from armkin.model.target_numbers import targets_in
 from armkin.motion.tool_path import path_numbers
-from armkin.motion.tool_path.b_spline import Int
 from armkin.motion.tool_path.chords import distinct, turns
 from armkin.motion.tool_path.fit_points import REVERSAL, FittedCurves, fit_curves
 from armkin.motion.tool_path.path_pieces import Dense, Piece, Spot, line, turn_between, unit_speed, vector, weights

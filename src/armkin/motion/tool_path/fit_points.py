@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
-from armkin.motion.tool_path.b_spline import Int, Layout
+from armkin.formula.arrays import Array, Bool, Int
+from armkin.motion.tool_path.b_spline import Layout
 from armkin.motion.tool_path.chords import CORNER, Chords, turns
 from armkin.motion.tool_path.least_knots import Rows, least_knots
 

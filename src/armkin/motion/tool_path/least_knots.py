@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
-from armkin.motion.tool_path.b_spline import Int, Layout, least_squares
+from armkin.formula.arrays import Array, Bool, Int
+from armkin.motion.tool_path.b_spline import Layout, least_squares
 from armkin.motion.tool_path.chords import SHORT, Chords
 
 _CHORD = 0.85  # share of the tolerance, beside chords
