@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.columns.table import Table, Words, joined
+from armkin.formula.arrays import numbers_within
 from armkin.inverse import choose_branch
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find
@@ -92,7 +93,7 @@ def _listed(
         lines = np.maximum(count, 1)
         target = np.repeat(np.arange(len(lines)), lines)
         there = np.repeat(count > 0, lines)
-        place = np.arange(len(target)) - np.repeat(np.cumsum(lines) - lines, lines)
+        place = numbers_within(lines)
         branch = _ranked(key, valid, within, free)[target[there], place[there]]
         motion = motion[target[there], branch]
     else:

@@ -165,3 +165,8 @@ def wrapped(angle: E) -> E:
     """
     less: E = angle - 2 * np.pi * _numpy.rint(angle / (2 * np.pi))
     return less
+
+
+def numbers_within(count: Int) -> Int:
+    """0, 1, ... in each of groups, one behind the other, of so many each: (G,) -> (sum of count,)."""
+    return np.asarray(np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count))

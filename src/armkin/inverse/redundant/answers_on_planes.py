@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, Int
+from armkin.formula.arrays import Array, Bool, Int, numbers_within
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.curve_points import Points, onto
@@ -85,7 +85,7 @@ def answered(find: Follower, known: Int, postures: Array) -> tuple[Planes, Nodes
         q, there = np.append(q, others[0], axis=0), np.append(missed, others[1], axis=0) < tol.NEAR
     order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
     plane = np.empty_like(row)
-    plane[order] = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    plane[order] = numbers_within(count)
     planes = Planes(find, guide, np.full((N, int(count.max(initial=PLANES))), np.inf), count)
     planes.values[row, plane] = t
     one, branch = np.nonzero(there)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, numbers_within
 from armkin.inverse.closed.wrist import foot, meeting_point
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
@@ -199,7 +199,7 @@ def places(of: Boundaries, target: Array) -> tuple[Array, Bool]:
     row, at = row[apart], at[apart]
     count = np.bincount(row, minlength=S)
     out = np.full((S, int(count.max(initial=0))), np.inf)
-    out[row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)] = at
+    out[row, numbers_within(count)] = at
     return out, np.asarray(found.decided.reshape(F, S).all(axis=0))
 
 

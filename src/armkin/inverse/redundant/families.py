@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, Int, wrapped
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.batch import Batch, Goals, as_solutions
 from armkin.inverse.answers.solutions import Solutions, Status
@@ -194,7 +194,7 @@ class _Rows:
         order = np.argsort(row, kind="stable")
         count = np.bincount(row, minlength=N)
         B = int(count.max(initial=0))
-        where = row[order], np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        where = row[order], numbers_within(count)
         q, interval = np.full((N, B, n), np.nan), np.full((N, B, 2), np.nan)
         legal, branch = np.zeros((N, B), bool), np.full((N, B), -1, np.int8)
         if len(row):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, Int, wrapped
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
 from armkin.model.arm import Arm
 
 
@@ -77,11 +77,11 @@ def holding_none(good: Bool, row: Int, first: Int, length: Int) -> Bool:
 
 def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
     """Of each run the least costly sample, counted from its first one: cost (M, K), a run goes round the end."""
-    begin = np.cumsum(count) - count
-    index = np.arange(int(count.sum())) - np.repeat(begin, count)
+    index = numbers_within(count)
     K = cost.shape[1]
     sample = np.repeat(first, count) + index
     costs = cost.ravel()[np.repeat(curve * K, count) + np.where(sample < K, sample, sample - K)]
+    begin = np.cumsum(count) - count
     least = np.minimum.reduceat(costs, begin)
     where = np.flatnonzero(costs == np.repeat(least, count))
     return np.asarray(index[where[np.searchsorted(where, begin)]])

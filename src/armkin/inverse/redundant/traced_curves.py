@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool, Int, wrapped
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.answers_on_planes import Nodes, answered, once
@@ -205,7 +205,7 @@ class Chains(NamedTuple):
         """Some of the curves, in that order."""
         count = self.counts[which]
         first = np.cumsum(self.counts) - self.counts
-        point = np.arange(int(count.sum())) + np.repeat(first[which] - np.cumsum(count) + count, count)
+        point = numbers_within(count) + np.repeat(first[which], count)
         return Chains(rows_of(self.points, point), self.row[which], count, self.closed[which])
 
 

@@ -12,6 +12,7 @@ from armkin.motion.branches.joint_steps import chord_bound, levers
 from armkin.motion.branches.solve_on_route import DAMPING, corrected_to_route, exact_cubics
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.time_optimal import knots
+from armkin.motion.tool_path.path_pieces import divide_spans
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -116,9 +117,7 @@ def _places(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, Int]:
     level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
     ends = np.interp(edges, grid, level)
     begin = np.cumsum(count) - count
-    inside = (np.arange(int(count.sum())) - np.repeat(begin, count)) / np.repeat(count, count)
-    levels = np.repeat(ends[:-1], count) + inside * np.repeat(np.diff(ends), count)
-    where = np.append(np.interp(levels, level, grid), b)
+    where = np.append(np.interp(divide_spans(ends, count), level, grid), b)
     where[begin] = edges[:-1]
     fine = route.spans
     inside = np.diff(np.searchsorted(fine, where))
@@ -159,9 +158,7 @@ def _graded(points: Array, breaks: Int) -> tuple[Array, Int]:
 def _divided(points: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
     """Points (N,) with every interval in so many parts (N - 1,); breaks keep their places."""
     begin = np.cumsum(parts) - parts
-    f = (np.arange(int(parts.sum())) - np.repeat(begin, parts)) / np.repeat(parts, parts)
-    new = np.repeat(points[:-1], parts) + f * np.repeat(np.diff(points), parts)
-    return np.append(new, points[-1]), begin[breaks]
+    return np.append(divide_spans(points, parts), points[-1]), begin[breaks]
 
 
 def _solved(arm: Arm, way: Way, points: Array, damping: float, coarser: Knots | None) -> Array:

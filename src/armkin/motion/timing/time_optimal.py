@@ -22,7 +22,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, Int
+from armkin.formula.arrays import Array, Bool, Int, numbers_within
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_bounds import TINY, Bound, Fastest, in_parts
 
@@ -70,7 +70,7 @@ def _in_sections(s: Array, q: Array, edges: Int, rests: Bool) -> Knots:
     size = np.diff(edges) + 1
     first = np.repeat(edges[:-1], size)
     begin = np.cumsum(size) - size
-    i = np.arange(int(size.sum())) - np.repeat(begin, size) + first
+    i = numbers_within(size) + first
     last = np.repeat(edges[1:], size)
     parts = [slice(some.start, some.stop) for some in in_parts(len(i))]
     slopes = np.concatenate([_slopes_at(s, q, i[some], first[some], last[some]) for some in parts])

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, numbers_within
 from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import quaternion
 from armkin.motion.tool_path.b_spline import solve_banded
@@ -224,7 +224,7 @@ def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
         c0, c1, c2, c3 = (c[i] for c in coefficients)
         return c0 + w * (c1 + w * (c2 + w * c3)), c1 + w * (2 * c2 + 3 * w * c3)
 
-    v = _places(u, _intervals(len(u) - 1))
+    v = divide_spans(u, _intervals(len(u) - 1))
     tangent = at(v)[1] * weights(task)
     back = np.flatnonzero((tangent[2:] * tangent[:-2]).sum(axis=1) < 0)
     if len(back):
@@ -305,7 +305,7 @@ def unit_speed(
     Returns also the function from parameters to lengths.
     """
     scale = weights(task)
-    grid = np.append(_places(u, _table(curve, u, scale)), u[-1])
+    grid = np.append(divide_spans(u, _table(curve, u, scale)), u[-1])
     step = np.diff(grid)
     nodes = grid[:-1, None] + step[:, None] * _GAUSS
     speed = np.linalg.norm(curve(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
@@ -348,11 +348,11 @@ def _intervals(spans: int) -> int:
     return int(np.clip(_TABLES // max(spans, 1), _LEAST_TABLE, _TABLE))
 
 
-def _places(u: Array, parts: NDArray[np.intp] | int) -> Array:
+def divide_spans(u: Array, parts: NDArray[np.intp] | int) -> Array:
     """Every span between the values u in so many equal parts, without the last value."""
     count = np.broadcast_to(parts, len(u) - 1)
-    inside = np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
-    return np.asarray(np.repeat(u[:-1], count) + np.repeat(np.diff(u), count) * (inside / np.repeat(count, count)))
+    share = numbers_within(count) / np.repeat(count, count)
+    return np.asarray(np.repeat(u[:-1], count) + np.repeat(np.diff(u), count) * share)
 
 
 def relative(task: Task, a: Spot, b: Spot) -> Array:
