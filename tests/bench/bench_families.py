@@ -17,7 +17,7 @@ import numpy as np
 import armkin
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1])]
-from test_families import covers, held_answers, postures  # noqa: E402
+from redundant_arms import covers, held_answers, postures  # noqa: E402
 
 from armkin.inverse.solvers.redundant import redundancy  # noqa: E402
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from redundant_arms import covers, held_answers, postures
 
 import armkin
 from armkin import Status
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.redundant import answers_on_planes
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import redundancy
@@ -14,34 +14,6 @@ from armkin.model.arm import from_links
 from command_line import run
 
 ARMS = [("panda", None), ("iiwa7", None), ("planar_3dof", "xy")]
-
-
-def postures(arm: armkin.Arm, task: str | None, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Joint values within limits (N, n), and the targets that they reach."""
-    low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
-    q = np.random.default_rng(seed).uniform(low, high, (count, arm.n))
-    T = armkin.fk(arm, q)
-    return q, T[:, :2, 3] if task == "xy" else T
-
-
-def held_answers(arm: armkin.Arm, joint: int, value: float, target: np.ndarray, task: str | None) -> np.ndarray:
-    """Legal postures (B, n) with the redundant joint held: the arm is built anew, as `--lock` does.
-
-    Neither what stands between two roots that have just vanished is one, which misses its target by 1e-12 and more (an
-    answer by 1e-14), nor what lies beyond a limit within its slack of 1e-9 rad: an interval ends where the limit is.
-    """
-    held = {arm.joint_names[joint]: value}
-    s = armkin.ik(armkin.lock(arm, held), target, task, examine=False)
-    mm, rad = s.residual()
-    exact = s.within_limits & (np.maximum(mm / arm.reach, np.nan_to_num(rad)) <= 1e-13)
-    q = armkin.unlock(arm, held, s.q[exact])
-    return np.asarray(q[((q >= arm.lower - 1e-12) & (q <= arm.upper + 1e-12)).all(axis=1)])
-
-
-def covers(arm: armkin.Arm, intervals: np.ndarray, value: float | np.ndarray, slack: float = 1e-8) -> np.ndarray:
-    """Which intervals (B, 2) hold a value, modulo whole turns."""
-    middle, half = intervals.mean(axis=-1), np.ptp(intervals, axis=-1) / 2
-    return np.asarray(np.abs(np.remainder(value - middle + np.pi, 2 * np.pi) - np.pi) <= half + slack)
 
 
 @pytest.mark.parametrize(("name", "task"), ARMS)
@@ -60,18 +32,6 @@ def test_the_generating_posture_lies_in_a_listed_interval(name: str, task: str |
     mm, rad = s.residual()
     assert np.nanmax(mm) <= 1e-9 * arm.reach
     assert np.nanmax(rad, initial=0.0) <= 1e-9
-
-
-def test_families_of_a_nearly_stretched_arm_are_listed() -> None:
-    """The elbow turns in so small a circle that no value of joint 1 that is asked meets it: 1.1 % of random targets."""
-    arm = armkin.load("kinova_gen3")
-    degrees = [[-33, -33, -64, 0.3, 68, 61, 97], [29, 20, 25, 0.7, 43, -60, -85], [-56, 41, 60, 1.4, -83, -73, -130],
-               [74, -129, -39, -2.2, -42, 15, -70]]  # fmt: skip
-    q = np.deg2rad(degrees)
-    s = armkin.ik(arm, armkin.fk(arm, q))
-    assert s.interval is not None
-    for k in range(len(q)):
-        assert covers(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any()
 
 
 @pytest.mark.parametrize(("name", "task"), ARMS)
@@ -267,84 +227,6 @@ def test_the_arm_angle_knows_all_families_of_a_class_whatever_its_zeros_and_elbo
     for value in rng.uniform(-np.pi, np.pi, 8):
         own = held_answers(other, 6, float(value), s.target[0], None)
         assert covers(other, legal, float(value), 0.0).sum() == len(own)
-
-
-def test_where_an_arm_without_a_closed_form_has_no_answer_nothing_is_traced() -> None:
-    """kinova_gen3 alone, at values of J7 that have no answer, ended in a traceback."""
-    arm = armkin.load("kinova_gen3")
-    far = np.eye(4)[None].copy()
-    far[:, 2, 3] = 3000.0
-    assert (armkin.ik(arm, far).status == Status.UNREACHABLE).all()
-
-
-@pytest.mark.parametrize("near", [np.zeros(7), None])
-def test_a_stretched_arm_without_a_closed_form_stands_there(near: np.ndarray | None) -> None:
-    """All answers of this target are one posture, which no value that the elimination is asked at has."""
-    arm = armkin.load("kinova_gen3")
-    s = armkin.ik(arm, armkin.fk(arm, np.zeros(7)), near=near)
-    assert s.status == Status.EXACT
-    assert not s.complete
-    assert s.residual()[0][s.best] <= 1e-9 * arm.reach
-    assert near is None or s.motion[s.best] <= 1e-9
-
-
-def test_traced_intervals_end_where_their_arm_has_one_posture_less() -> None:
-    """kinova_gen3: a sixth of these places disagreed, as branches were linked wrongly and ended before their turns."""
-    arm = armkin.load("kinova_gen3")
-    q, target = postures(arm, None, 5, 21)
-    s = armkin.ik(arm, target)
-    assert s.interval is not None
-    for k in range(len(q)):
-        assert covers(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any()
-    assert np.nanmax(s.residual()) <= 1e-9
-    again = armkin.ik(arm, target, near=q)
-    assert np.take_along_axis(again.motion, again.best[:, None], axis=1).max() <= 1e-6
-    legal = s.interval[4][s.within_limits[4]]
-    ends = np.unique(legal.ravel().round(7))
-    for value in [*(ends[1::3] - np.deg2rad(1e-5)), *(ends[1::3] + np.deg2rad(1e-5))]:
-        own = held_answers(arm, 6, float(value), target[4], None)
-        assert covers(arm, legal, float(value), 0.0).sum() == len(own), np.rad2deg(value)
-
-
-@pytest.mark.parametrize(
-    ("number", "value", "count"),
-    [(48, 185.63707, 7), (174, 104.98252, 6), (180, 182.51449, 4), (272, 182.9476, 8), (291, 353.91396, 6)],
-)
-def test_a_curve_that_passes_a_straight_wrist_is_whole(number: int, value: float, count: int) -> None:
-    """kinova_gen3: five targets of 300 that lacked intervals or parts of some, up to half of them."""
-    arm = armkin.load("kinova_gen3")
-    target = postures(arm, None, 300, 77)[1][number]
-    s = armkin.ik(arm, target)
-    assert s.interval is not None
-    value = float(np.deg2rad(value))
-    assert len(held_answers(arm, 6, value, target, None)) == count
-    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == count
-
-
-@pytest.mark.parametrize(("number", "count"), [(169, 16), (226, 24), (247, 16)])
-def test_curves_on_which_joint_1_hardly_moves_are_found(number: int, count: int) -> None:
-    """kinova_gen3, nearly stretched: all answers lie between two of the values of joint 1 that are asked."""
-    arm = armkin.load("kinova_gen3")
-    s = armkin.ik(arm, postures(arm, None, 300, 77)[1][number])
-    assert s.within_limits.sum() == count
-
-
-def test_answers_do_not_depend_on_the_joint_whose_values_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """kinova_gen3 by the elimination at values of joint 7, or by a spherical wrist's branches at values of joint 1."""
-    arm = armkin.load("kinova_gen3")
-    target = postures(arm, None, 2, 78)[1]
-    near = armkin.ik(arm, target)
-    assert "near spherical wrist" in near.why
-    monkeypatch.setattr(answers_on_planes, "nearly_closed", lambda arm, free: free)
-    other = armkin.ik(arm, target)
-    assert near.interval is not None
-    assert other.interval is not None
-    for k in range(len(target)):
-        own, same = near.interval[k][near.within_limits[k]], other.interval[k][other.within_limits[k]]
-        assert len(own) == len(same)
-        assert len(own)
-        away = np.abs(np.remainder(own[:, None] - same + np.pi, 2 * np.pi) - np.pi).max(axis=2)
-        assert away.min(axis=1).max() < 1e-9
 
 
 def test_a_target_that_only_postures_outside_the_limits_reach_has_no_legal_interval() -> None:
