@@ -30,7 +30,7 @@ from armkin.keep_out.shapes.box import Box
 from armkin.keep_out.shapes.capsule import Capsule
 from armkin.keep_out.shapes.floor import Floor
 from armkin.model.arm import Arm
-from armkin.motion.joint_moves import plan
+from armkin.motion.joint_moves import plan_joint_moves
 from armkin.motion.plan.trajectory_proof import prove_trajectory
 from armkin.motion.timing.trajectory import Trajectory
 
@@ -243,7 +243,7 @@ def motions(count: int, rng: np.random.Generator) -> None:
             q = q[held.least(q)[0] >= 0]
             for a, b in zip(q[0::2][:125], q[1::2][:125], strict=False):
                 b = b if rng.random() < 0.5 else np.clip(a + rng.uniform(0.02, 0.5) * (b - a), arm.lower, arm.upper)
-                found = prove_trajectory(plan(arm, a, b))
+                found = prove_trajectory(plan_joint_moves(arm, a, b))
                 assert found is not None
                 least = float(held.least(a + share * (b - a))[0].min())
                 done, free = done + 1, free + found.free

@@ -27,14 +27,14 @@ from lines import random_line
 
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.motion.branches.branch_chains import Chain, chains, fewest
+from armkin.motion.branches.branch_chains import Chain, chains_of_columns, fewest_runs
 from armkin.motion.branches.linked_branches import link_branches
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.profile import seven_phases
-from armkin.motion.timing.time_optimal import Bounds, finer, optimal
-from armkin.motion.tool_path.path_pieces import spot
+from armkin.motion.timing.time_optimal import Bounds, optimal_law, refine_knots
+from armkin.motion.tool_path.path_pieces import split_target
 
 SIX = ("three_dof", "irb2400", "puma560", "ar4", "labvolt_5150", "ur5e")
 ARMS = ("three_dof", "irb2400", "puma560", "irb120", "ar4", "labvolt_5150", "parol6", "ra02")
@@ -67,12 +67,12 @@ def branches(lines: int) -> None:
             way = random_line(arm, rng)
             dense = np.linspace(0, way.length, 1001)
             columns = link_branches(arm, way.targets, dense[::4], task=None, tolerance=0.05, near=arm.home)
-            all_ = chains(arm, columns)
+            all_ = chains_of_columns(arm, columns)
             mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
             whole += mine >= way.length - 1e-9
             apart = abs(mine - brute.zoomed(arm, way.targets, dense, 0.05))
             off, differ = max(off, apart), differ + (apart > 0.01)
-            length = [columns.s[run.last] - columns.s[run.first] for run in fewest(all_, len(columns.s))]
+            length = [columns.s[run.last] - columns.s[run.first] for run in fewest_runs(all_, len(columns.s))]
             for finer_by in (1, 10):  # a run that is shorter than their step is none to the samples
                 s = np.linspace(0, way.length, 1000 * finer_by + 1)
                 unlike = sum(x > s[1] for x in length) != len(brute.runs(arm, way.targets(s), 0.05))
@@ -85,7 +85,10 @@ def branches(lines: int) -> None:
             began = time.process_time()
             armkin.ik(arm, targets)
             between = time.process_time()
-            fewest(chains(arm, link_branches(arm, way.targets, s, task=None, tolerance=0.05, near=arm.home)), 10_000)
+            fewest_runs(
+                chains_of_columns(arm, link_branches(arm, way.targets, s, task=None, tolerance=0.05, near=arm.home)),
+                10_000,
+            )
             own, spent = own + between - began, spent + time.process_time() - between
         per = 1e6 / lines / 10_000
         print(
@@ -121,7 +124,7 @@ def tips(lines: int) -> None:
             columns = link_branches(
                 arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home
             )
-            all_ = chains(arm, columns)
+            all_ = chains_of_columns(arm, columns)
             steps += sum(len(chain.q) - 1 for chain in all_)
             off = tips_off(arm, all_)
             worst, beyond = max(worst, off), beyond + (off > 0.05)
@@ -134,7 +137,7 @@ def tips(lines: int) -> None:
             assert isinstance(curve, Curve)
             t = np.interp(np.arange(20 * len(curve.times)) / 20, np.arange(len(curve.times)), curve.times)
             p = armkin.fk(arm, curve.evaluate(t))[:, :3, 3]
-            a, b = (spot(task_for(arm), end).p for end in ends)
+            a, b = (split_target(task_for(arm), end).p for end in ends)
             a, b = (np.append(x, p[0, 2])[:3] if len(x) < 3 else x for x in (a, b))
             d = (b - a) / np.linalg.norm(b - a)
             off = float(np.linalg.norm(p - a - ((p - a) @ d)[:, None] * d, axis=1).max())
@@ -197,8 +200,8 @@ def laws(splines: int) -> None:
             ours, theirs = [], []
             for _ in range(rounds):  # all splines ours, all splines theirs, in turn: the best round of each counts
                 began = time.process_time()
-                paths = [finer(Knots(s, curve(s), curve(s, 1))) for curve in curves]
-                mine = [optimal(path, Bounds(v, a, np.full(len(path.s), np.inf))) for path in paths]
+                paths = [refine_knots(Knots(s, curve(s), curve(s, 1))) for curve in curves]
+                mine = [optimal_law(path, Bounds(v, a, np.full(len(path.s), np.inf))) for path in paths]
                 between = time.process_time()
                 made = [algorithm.TOPPRA(bounds, c, gridpoints=s).compute_parameterization(0, 0)[1] for c in theirs_of]
                 ours.append(between - began)

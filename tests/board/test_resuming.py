@@ -19,7 +19,7 @@ from armkin.board.ports import note_path
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board.sim.sim_port import SimPort
 from armkin.board_catalogue import BOARDS
-from armkin.motion.joint_moves import straight
+from armkin.motion.joint_moves import straight_move
 from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import joints, places
 from command_line import ROOT, THREE_DOF, run
@@ -252,7 +252,7 @@ def test_a_way_of_less_than_a_step_is_taken() -> None:
     here = joints(one, [128, -1193, 1333])
     for steps in ([0.55, -0.55, 0], [0, 0, 0.7], [-0.6, 0, 0.6], [1.51, -0.55, 2.6]):
         goal = here + joints(one, steps) - one.home
-        way = cut(Trajectory(one, here, (straight(one, here, goal),)), [128, -1193, 1333], min_interval=448)
+        way = cut(Trajectory(one, here, (straight_move(one, here, goal),)), [128, -1193, 1333], min_interval=448)
         assert _moves(way) == way.end.tolist() != way.start.tolist()
 
 

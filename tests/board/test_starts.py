@@ -12,8 +12,8 @@ import yaml
 import armkin
 from armkin.board.backend.motion_start import StartError
 from armkin.errors import NoSolutionError
-from armkin.motion.joint_moves import plan as plan_joints
-from armkin.motion.joint_moves import straight
+from armkin.motion.joint_moves import plan_joint_moves as plan_joints
+from armkin.motion.joint_moves import straight_move
 from armkin.motion.timing.trajectory import Trajectory
 from command_line import run
 from starting_elsewhere import ELSEWHERE, EXAMPLES, KINDS, PATHS, Kind, carried_out, on
@@ -116,7 +116,7 @@ def test_an_arm_outside_its_limits_may_come_back_and_go_no_farther(kind: str) ->
         jogged(one, 0, 5, 0.5)
     with pytest.raises(NoSolutionError, match=r"nothing was moved"):
         armkin.path(arm, {"moves": [{"line": [-230, 330, 300]}]}, start=machine.joints())
-    farther = Trajectory(arm, machine.joints(), (straight(arm, machine.joints(), np.deg2rad([126, 95, -90])),))
+    farther = Trajectory(arm, machine.joints(), (straight_move(arm, machine.joints(), np.deg2rad([126, 95, -90])),))
     with pytest.raises(NoSolutionError, match=r"q1 = 12[45][.\d]* deg is outside"):
         machine.lay(farther, np.array(begin))
     assert machine.counts() == begin

@@ -17,8 +17,8 @@ from armkin.keep_out.displacement_bounds import levers
 from armkin.keep_out.motion_geometry import Cubics
 from armkin.keep_out.motion_proof import hit_samples
 from armkin.model.arm import Arm
-from armkin.motion.joint_moves import plan
-from armkin.motion.plan.trajectory_proof import check_free, prove_trajectory, seconds
+from armkin.motion.joint_moves import plan_joint_moves
+from armkin.motion.plan.trajectory_proof import check_free, hit_time, prove_trajectory
 from armkin.motion.timing.trajectory import Trajectory
 
 TABLE = "keep_out:\n  - self\n  - floor: -20\n  - box: {min: [300, -400, 0], max: [700, 400, 180]}\n    name: table\n"
@@ -64,7 +64,7 @@ def test_random_motions_are_free_when_proved_and_hit_when_not(kind: str, table: 
     held, q = guard(arm), _postures(arm, 400, 5)
     share, free = np.linspace(0.0, 1.0, 1500)[:, None], 0
     for a, b in zip(q[:60], q[-60:], strict=True):
-        found = prove_trajectory(plan(arm, a, b))
+        found = prove_trajectory(plan_joint_moves(arm, a, b))
         assert found is not None
         least = float(held.clearances(a + share * (b - a)).min())
         assert least >= 0.0 if found.free else least < 0.05
@@ -129,11 +129,11 @@ def test_a_path_through_the_table_is_refused_with_the_place(table: Path) -> None
 
 def test_the_first_hit_is_where_the_clearance_runs_out(table: Path) -> None:
     arm = armkin.load("three_dof", scene=table)
-    way = plan(arm, np.deg2rad([0, 90, -90]), np.deg2rad([[30, 90, -90], [30, 0, -45]]))
+    way = plan_joint_moves(arm, np.deg2rad([0, 90, -90]), np.deg2rad([[30, 90, -90], [30, 0, -45]]))
     found = prove_trajectory(way)
     assert found is not None
     assert (found.free, found.stretch, found.body, found.keep_out) == (False, 1, "q3", "table")
-    at = seconds(way, found)
+    at = hit_time(way, found)
     assert way.q(at) == pytest.approx(found.joints, abs=1e-6)
     assert abs(float(armkin.clearance(arm, found.joints).mm)) < 0.02
     with pytest.raises(NoSolutionError, match="q3 would hit table on the way to waypoint 2"):
@@ -144,14 +144,14 @@ def test_an_arm_in_a_hit_may_leave_it_and_not_go_deeper(table: Path) -> None:
     arm = armkin.load("three_dof", scene=table)
     inside, free = np.deg2rad([0, 20, -45]), np.deg2rad([0, 90, -90])
     assert armkin.clearance(arm, inside).mm < -5
-    found = prove_trajectory(plan(arm, inside, free))
+    found = prove_trajectory(plan_joint_moves(arm, inside, free))
     assert found is not None
     assert found.free
     assert found.escaping == (("q3", "table"),)
     with pytest.raises(NoSolutionError, match="q3 would go deeper into table"):
-        check_free(plan(arm, inside, np.deg2rad([0, 15, -45])))
+        check_free(plan_joint_moves(arm, inside, np.deg2rad([0, 15, -45])))
     with pytest.raises(NoSolutionError, match="q3 would"):  # out, and in again
-        check_free(plan(arm, inside, np.stack([free, inside])))
+        check_free(plan_joint_moves(arm, inside, np.stack([free, inside])))
 
 
 def test_hits_of_a_chain_are_those_of_each_sample(table: Path) -> None:
@@ -163,6 +163,6 @@ def test_hits_of_a_chain_are_those_of_each_sample(table: Path) -> None:
 
 def test_without_keep_outs_nothing_is_proved() -> None:
     arm = armkin.load("three_dof")
-    way = plan(arm, arm.home, np.zeros((1, 3)))
+    way = plan_joint_moves(arm, arm.home, np.zeros((1, 3)))
     assert prove_trajectory(way) is None
     check_free(Trajectory(arm, arm.home, ()))

@@ -7,7 +7,7 @@ import numpy as np
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.motion.tool_path.path_pieces import Piece, Spot, line, spot
+from armkin.motion.tool_path.path_pieces import Piece, Spot, line, split_target
 
 
 def random_line(arm: armkin.Arm, rng: np.random.Generator) -> Piece:
@@ -16,6 +16,6 @@ def random_line(arm: armkin.Arm, rng: np.random.Generator) -> Piece:
     low = np.where(np.isfinite(arm.lower), arm.lower, -np.pi)
     high = np.where(np.isfinite(arm.upper), arm.upper, np.pi)
     q = rng.uniform(low, high)
-    a = spot(task, targets_of(task, armkin.fk(arm, q)[None], q[None])[0])
+    a = split_target(task, targets_of(task, armkin.fk(arm, q)[None], q[None])[0])
     d = rng.normal(size=len(a.p))
     return line(task, a, Spot(a.p + 300 * d / np.linalg.norm(d), a.sums, a.turned))

@@ -11,7 +11,7 @@ import armkin
 from armkin.board.firmware.segments.trajectory_to_counts import cut
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
-from armkin.motion.joint_moves import plan
+from armkin.motion.joint_moves import plan_joint_moves
 from armkin.motion.rounded_waypoints import round_waypoints
 
 
@@ -44,7 +44,7 @@ def test_corners_are_rounded_within_their_blend_and_all_limits(three_dof: Arm, h
     for row in rows:
         assert np.rad2deg(np.linalg.norm(q - row, axis=1).min()) < 10.0 / np.sqrt(2) + 0.1
     assert one.q(one.duration) == pytest.approx(rows[-1])
-    stopping = plan(three_dof, rows[0], rows[1:]).duration
+    stopping = plan_joint_moves(three_dof, rows[0], rows[1:]).duration
     assert stopping / one.duration > 1.4
 
 

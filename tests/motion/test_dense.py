@@ -260,7 +260,7 @@ def test_lines_between_tight_bends_are_as_fast_as_on_a_far_finer_grid(
         assert isinstance(stretch, Curve)
         pace = armkin.jacobian(three_dof, stretch.path.q)[:, :3] @ stretch.path.d[..., None]
         np.testing.assert_allclose(np.linalg.norm(pace, axis=1), 1.0, atol=1e-4)
-    defaults = branch_path.stretches.__kwdefaults__
+    defaults = branch_path.run_stretches.__kwdefaults__
     assert defaults is not None
     monkeypatch.setitem(defaults, "grid", 8000)
     fine = armkin.path(three_dof, points, corners="tolerance", tool_speed=20.0)
@@ -296,9 +296,9 @@ def test_an_empty_cell_of_blend_or_speed_leaves_it_to_what_is_said_of_all(three_
 def test_a_way_shown_with_too_few_samples_is_shown_best_where_it_bends_most(three_dof: Arm) -> None:
     plan = armkin.path(three_dof, np.concatenate([[CENTRE - [0, 240, 0]], circle(60, 20.0)]), corners="tolerance")
     begins = plan.motion.begins.tolist()
-    whole, off = playback_times.times(three_dof, plan, begins, 0.02, 10_000)
+    whole, off = playback_times.sample_times(three_dof, plan, begins, 0.02, 10_000)
     assert off <= 0.02
-    few, worse = playback_times.times(three_dof, plan, begins, 0.02, len(whole) // 2)
+    few, worse = playback_times.sample_times(three_dof, plan, begins, 0.02, len(whole) // 2)
     assert len(few) == len(whole) // 2
     assert worse <= 6 * off  # halves are off by a quarter as much
 

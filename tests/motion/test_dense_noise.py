@@ -24,9 +24,9 @@ def test_noise_is_no_corner_and_a_small_square_is() -> None:
     rng = np.random.default_rng(5)
     x = np.linspace(0, 10, 200)
     noisy = np.stack([x, rng.uniform(-0.02, 0.02, 200), 0 * x], axis=1)
-    assert not fit_points.corners(noisy, 0.05).any()
+    assert not fit_points.corner_points(noisy, 0.05).any()
     small = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], dtype=float)
-    assert fit_points.corners(small, 0.05).tolist() == [False, True, True, False]
+    assert fit_points.corner_points(small, 0.05).tolist() == [False, True, True, False]
 
 
 def test_noise_in_a_tight_bend_is_no_corner() -> None:
@@ -38,10 +38,10 @@ def test_noise_in_a_tight_bend_is_no_corner() -> None:
     found = 0
     for seed in range(5):
         noise = np.random.default_rng(seed).uniform(-0.02, 0.02, way.shape)
-        found += int(fit_points.corners(way + noise, 0.05).sum())
+        found += int(fit_points.corner_points(way + noise, 0.05).sum())
     assert found <= 1  # 42 where it is seen from afar alone
     sharp = np.concatenate([np.linspace([0, 0], [10, 0], 100), np.linspace([10, 0], [10, 10], 100)[1:]])
-    assert np.flatnonzero(fit_points.corners(sharp, 0.05)).tolist() == [99]
+    assert np.flatnonzero(fit_points.corner_points(sharp, 0.05)).tolist() == [99]
 
 
 def test_noise_in_tight_bends_takes_little_time(three_dof: armkin.Arm) -> None:
@@ -72,5 +72,5 @@ def test_noise_in_a_cusp_is_no_row_of_corners() -> None:
     found = 0
     for seed in range(5):
         noise = np.random.default_rng(seed).uniform(-0.02, 0.02, cusp.shape)
-        found += int(fit_points.corners(cusp + noise, 0.05).sum())
+        found += int(fit_points.corner_points(cusp + noise, 0.05).sum())
     assert found <= 1

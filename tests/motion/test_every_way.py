@@ -11,7 +11,7 @@ import pytest
 from lines import random_line
 
 import armkin
-from armkin.motion.branches.branch_chains import chains, fewest
+from armkin.motion.branches.branch_chains import chains_of_columns, fewest_runs
 from armkin.motion.branches.linked_branches import link_branches
 
 
@@ -24,13 +24,13 @@ def test_reach_is_that_of_brute_force(name: str) -> None:
         columns = link_branches(
             arm, way.targets, np.linspace(0, way.length, 150), task=None, tolerance=0.05, near=arm.home
         )
-        all_ = chains(arm, columns)
+        all_ = chains_of_columns(arm, columns)
         mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
         dense = np.linspace(0, way.length, 401)
         found = brute.reach(arm, way.targets(dense), 0.05)
         assert mine <= (dense[min(found + 1, 400)] if found >= 0 else 0.0) + 1e-6
         assert mine >= (dense[found] if found >= 0 else -1.0) - 1e-6
-        runs = fewest(all_, len(columns.s))
+        runs = fewest_runs(all_, len(columns.s))
         for a, b in pairwise(runs):
             assert b.first >= a.last
 
@@ -44,7 +44,7 @@ def test_the_tip_stays_within_the_tolerance_between_samples(name: str) -> None:
         columns = link_branches(
             arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home
         )
-        for chain in chains(arm, columns):
+        for chain in chains_of_columns(arm, columns):
             if len(chain.q) < 2:
                 continue
             a, b = chain.q[:-1, None], chain.q[1:, None]

@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.motion.tool_path.path_pieces import arc, blend, line, spot, turn
+from armkin.motion.tool_path.path_pieces import arc, blend, line, rotation_matrices, split_target
 
 TASK = task_for(armkin.load("three_dof"))
 
@@ -26,7 +26,7 @@ def test_an_arc_goes_through_its_points_once_and_no_farther(degrees: float, way:
 
     angle = way * math.radians(degrees)
     first, via, last = on_circle(0.3), on_circle(0.3 + 0.4 * angle), on_circle(0.3 + angle)
-    piece = arc(TASK, spot(TASK, first), via, spot(TASK, last))
+    piece = arc(TASK, split_target(TASK, first), via, split_target(TASK, last))
     assert piece.length == pytest.approx(radius * abs(angle), rel=1e-9)
     shares = np.linspace(0.0, 1.0, 41)
     expected = np.array([on_circle(0.3 + share * angle) for share in shares])
@@ -39,7 +39,7 @@ def test_a_rounded_corner_turns_the_tool_on_as_the_next_line_does() -> None:
     places = [np.eye(4), np.eye(4), np.eye(4)]
     for place, xyz, rpy in zip(places, ([300, 0, 300], [400, 0, 300], [400, 100, 300]), (0.0, 0.9, -0.8), strict=True):
         place[:3, 3] = xyz
-        place[:3, :3] = turn(np.array([rpy, 0.4 * rpy**2, 0.3]))
-    spots = [spot(task, place) for place in places]
+        place[:3, :3] = rotation_matrices(np.array([rpy, 0.4 * rpy**2, 0.3]))
+    spots = [split_target(task, place) for place in places]
     _, rounded, after, _ = blend(task, line(task, *spots[:2]), line(task, *spots[1:]), 30.0, 100.0)
     np.testing.assert_allclose(rounded.direction(rounded.length), after.direction(0.0), atol=1e-4)

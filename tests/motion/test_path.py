@@ -12,7 +12,7 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
-from armkin.motion.branches.branch_path import samples
+from armkin.motion.branches.branch_path import route_samples
 from armkin.motion.plan.path_plan import PathPlan
 
 CIRCLE = {"circle": {"centre": [340, 80, 300], "normal": [0, 0, 1]}}
@@ -125,7 +125,7 @@ def test_a_way_of_many_turns_is_planned(three_dof: Arm) -> None:
 def test_a_very_long_way_is_solved_every_two_millimetres() -> None:
     """Farther apart no step is certified, and each is looked at one by one."""
     way: Any = SimpleNamespace(length=439_823.0, breaks=np.array([0.0, 439_823.0]))
-    assert np.diff(samples(way)).max() <= 2.001
+    assert np.diff(route_samples(way)).max() <= 2.001
 
 
 def test_branches_do_not_depend_on_the_blocks_they_are_solved_in(

@@ -70,7 +70,7 @@ def test_a_singular_home_is_left_or_the_wrist_turns_first(name: str) -> None:
 
 def test_many_boundaries_in_a_row_do_not_multiply_the_chains(monkeypatch: pytest.MonkeyPatch) -> None:
     """A myCobot 280 straight down from home: eight boundaries within 3 micrometres took all memory there is."""
-    joined = boundary_chains._joined
+    joined = boundary_chains._join_chains
     count = 0
 
     def counted(a: Chain, b: Chain) -> Chain:
@@ -79,7 +79,7 @@ def test_many_boundaries_in_a_row_do_not_multiply_the_chains(monkeypatch: pytest
         assert count <= 100
         return joined(a, b)
 
-    monkeypatch.setattr(boundary_chains, "_joined", counted)
+    monkeypatch.setattr(boundary_chains, "_join_chains", counted)
     arm = moving("mycobot_280")
     plan = armkin.path(arm, {"start": "home", "moves": [{"offset": {"xyz": [0, 0, -20]}}]})
     down = armkin.fk(arm, arm.home)[:3, 3] - np.array([0, 0, 20])
@@ -96,7 +96,7 @@ def test_a_stretched_arm_stands_at_its_path_s_start() -> None:
         T[:, 2, 3] += s
         return T
 
-    found = Samples(arm, up, None, arm.home, 20.0).solved(np.array([0.0, 20.0]))
+    found = Samples(arm, up, None, arm.home, 20.0).solve_at(np.array([0.0, 20.0]))
     assert found.valid.any(axis=1).tolist() == [True, False]
 
 

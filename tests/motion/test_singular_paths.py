@@ -13,7 +13,7 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.rotation import rpy
-from armkin.motion.branch_report import answer, passes
+from armkin.motion.branch_report import plan_fields, wrist_pass_lines
 from armkin.motion.branches import wrist_turn
 from armkin.motion.branches.branch_columns import Columns, Samples
 from armkin.plot.path_picture import plot_path
@@ -154,12 +154,12 @@ def test_beside_a_singularity_a_line_takes_as_long_as_straight_through_it(name: 
 def test_a_plan_says_where_and_how_a_singularity_is_passed() -> None:
     for turn, how in ((0.0, "the tip at most 0.0045 mm aside"), (0.002, "the tool turned by at most 0.0017 deg")):
         plan, _ = beside(with_rates("puma560"), QS["puma560"], 0.01, turn)
-        [said] = passes(plan)
+        [said] = wrist_pass_lines(plan)
         assert said.startswith("a wrist singularity is passed between 35.817 and 134.741 mm: ")
         assert how in said
-        names = [branch["name"] for branch in answer(plan)["branches"]]
+        names = [branch["name"] for branch in plan_fields(plan)["branches"]]
         assert len(names) == len(set(names))
-        [one] = answer(plan)["wrists_passed"]
+        [one] = plan_fields(plan)["wrists_passed"]
         assert (one["aside_mm"] > 0) == (turn == 0)
         assert (one["turned_deg"] > 0) == (turn > 0)
 
@@ -219,7 +219,7 @@ def test_a_whole_stretch_of_singular_postures_is_solved_at_few_samples(
     way: list[float], split: bool, carried: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From the Stanford arm's home: straight up joints 4 and 6 are free all along, and divided steps multiplied."""
-    seen, solved = [], Samples.solved
+    seen, solved = [], Samples.solve_at
 
     def counted(self: Samples, s: np.ndarray, examine: bool = True) -> Columns:
         seen.append(len(s))
@@ -263,13 +263,13 @@ def test_a_way_that_is_singular_throughout_has_one_place_where_its_wrist_is_stra
 ) -> None:
     """Rounding made every other sample one, each with windows to plan: 8.5 s of a core for a second's motion."""
     found: list[int] = []
-    straight = wrist_turn._straight
+    straight = wrist_turn._straight_samples
 
     def counted(*arguments: Any) -> list[int]:
         places = straight(*arguments)
         found.append(len(places))
         return places
 
-    monkeypatch.setattr(wrist_turn, "_straight", counted)
+    monkeypatch.setattr(wrist_turn, "_straight_samples", counted)
     test_free_joints_stay_where_the_whole_way_is_singular("puma560")
     assert max(found) == 1

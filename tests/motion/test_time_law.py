@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.motion.timing.time_optimal import knots
+from armkin.motion.timing.time_optimal import knots_of_samples
 
 
 def way(seed: int, samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -48,6 +48,6 @@ def test_a_long_way_takes_little_memory_beside_its_own() -> None:
 
 def test_slopes_do_not_depend_on_the_parts_of_a_long_way(monkeypatch: pytest.MonkeyPatch) -> None:
     s, q = way(1, 500, 3)
-    whole = knots(s, q, (100, 250))
+    whole = knots_of_samples(s, q, (100, 250))
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 37)
-    np.testing.assert_array_equal(knots(s, q, (100, 250)).d, whole.d)
+    np.testing.assert_array_equal(knots_of_samples(s, q, (100, 250)).d, whole.d)

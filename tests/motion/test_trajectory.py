@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from armkin.model import build_arm as arms
 from armkin.model.arm import Arm, from_links
-from armkin.motion.joint_moves import plan
+from armkin.motion.joint_moves import plan_joint_moves
 from armkin.motion.timing.profile import trapezoid
 from armkin.motion.timing.trajectory import Straight
 
@@ -37,7 +37,7 @@ def test_a_trapezoid_is_bounded_and_ends_at_rest(length: float, speed: float, ac
 
 def test_position_speed_and_acceleration_belong_together(three_dof: Arm) -> None:
     goals = np.deg2rad([[-30, 5, -5], [20, 60, -60], [20, 60, -60], [0, 90, -90]])
-    one = plan(three_dof, three_dof.home, goals, speed=0.7)
+    one = plan_joint_moves(three_dof, three_dof.home, goals, speed=0.7)
     t, h = np.linspace(0, one.duration, 4001)[1:-1], 1e-5
     laws = [s.law for s in one.stretches if isinstance(s, Straight)]
     assert len(laws) == len(one.stretches)
@@ -59,4 +59,4 @@ def test_an_arm_without_drives_has_trajectories() -> None:
         max_accel=arm.max_accel,
     )  # fmt: skip
     goal = np.deg2rad([60, 90, -90])
-    assert plan(bare, [0, np.pi / 2, -np.pi / 2], goal).duration == pytest.approx(1.5)
+    assert plan_joint_moves(bare, [0, np.pi / 2, -np.pi / 2], goal).duration == pytest.approx(1.5)

@@ -15,7 +15,7 @@ from served import Page
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
-from armkin.motion.jog_line import axes, jog_line
+from armkin.motion.jog_line import jog_axes, jog_line
 
 BENT = [0.0, 60.0, -60.0]  # three_dof, far from its edges
 
@@ -165,5 +165,5 @@ def test_where_no_way_leads_it_says_so() -> None:
         jog_line(arm, arm.home, "x", "base", 0.2)
     with pytest.raises(UsageError, match="none of x, y, z, rx, ry, rz"):
         jog_line(arm, arm.home, "phi", "base", 0.2)
-    assert axes(armkin.load("planar_2dof")) == ("x", "y")
-    assert axes(armkin.load("panda")) == ()
+    assert jog_axes(armkin.load("planar_2dof")) == ("x", "y")
+    assert jog_axes(armkin.load("panda")) == ()

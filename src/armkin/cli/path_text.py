@@ -26,7 +26,7 @@ def text(plan: PathPlan, answer: dict[str, Any]) -> str:
 
 def _heads(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     """How long it is and takes, what is held, and which branch carries which part of it."""
-    from armkin.motion.branch_report import words
+    from armkin.motion.branch_report import reason_text
 
     lines = [f"{plan.arm.name}: {answer['length_mm']:.3f} mm of path"]
     if answer["duration_s"] is not None:
@@ -43,7 +43,7 @@ def _heads(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
             for k, one in enumerate(run["branches"])
         )
         lines.append(f"  {run['s_mm'][0]:.3f} to {run['s_mm'][1]:.3f} mm: {names}")
-    ends = [f"  at {one.s:.3f} mm: {words(plan.arm, one)}" for one in plan.reconfigurations]
+    ends = [f"  at {one.s:.3f} mm: {reason_text(plan.arm, one)}" for one in plan.reconfigurations]
     return lines + list(dict.fromkeys(ends))  # several branches end there for one reason
 
 
@@ -58,7 +58,7 @@ def _clearance_text(near: dict[str, Any]) -> str:
 
 def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     """What it takes of the joints' limits, how near it comes to a singularity and to the path, what was changed."""
-    from armkin.motion.branch_report import closeness, passes
+    from armkin.motion.branch_report import deviation_text, wrist_pass_lines
 
     rows = [["share of", *plan.arm.joint_names]]
     rows += [[key, *(f"{100 * share:.1f} %" for share in each.values())] for key, each in answer["limits"].items()]
@@ -67,7 +67,7 @@ def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     if worst is not None:
         size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
         lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
-    lines += [closeness(plan), *passes(plan)]
+    lines += [deviation_text(plan), *wrist_pass_lines(plan)]
     reduced = plan.reduced
     if reduced.count:
         lines.append(

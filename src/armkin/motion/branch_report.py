@@ -10,9 +10,9 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion.branches.branch_chains import Chain, why_ended
-from armkin.motion.branches.joint_steps import change
+from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.plan.path_plan import Branch, Passed, PathPlan, PathRun, Reconfiguration
-from armkin.motion.plan.trajectory_proof import hits_said
+from armkin.motion.plan.trajectory_proof import hit_text
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -30,13 +30,13 @@ _WHY = {
 }
 
 
-def note(plan: PathPlan, carried: CarriedRoute, near: Array) -> None:
+def note_runs(plan: PathPlan, carried: CarriedRoute, near: Array) -> None:
     """Add runs, branches and breaks of a group of moves to the plan."""
     c, base, arm = carried.columns, plan.length, plan.arm
     plan.samples += len(c.s)
     plan.complete = plan.complete and c.complete
     if not plan.branches:
-        plan.branches = _branches(arm, carried, near)
+        plan.branches = _start_branches(arm, carried, near)
     for k, run in enumerate(carried.runs):
         for window in run.chain.windows:
             if c.s[run.first] <= window.begin and window.end <= c.s[run.last]:
@@ -44,55 +44,57 @@ def note(plan: PathPlan, carried: CarriedRoute, near: Array) -> None:
         q = run.chain.run(run.first, run.last, near)
         begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
         if end > begin:
-            plan.runs.append(PathRun(begin, end, _names(c, run, base), q[0].copy(), q[-1].copy()))
+            plan.runs.append(PathRun(begin, end, _branch_names(c, run, base), q[0].copy(), q[-1].copy()))
         if run.last < len(c.s) - 1 or k + 1 < len(carried.runs):
-            plan.reconfigurations.append(_break(arm, c, run.chain, run.first, base))
+            plan.reconfigurations.append(_reconfiguration_at(arm, c, run.chain, run.first, base))
 
 
-def _names(c: Columns, run: Run, base: float) -> list[tuple[float, str]]:
+def _branch_names(c: Columns, run: Run, base: float) -> list[tuple[float, str]]:
     """Where each branch name begins on a run."""
     labels = run.chain.labels[run.first - run.chain.first : run.last - run.chain.first + 1]
     changes = [0, *(1 + np.flatnonzero(np.diff(labels))).tolist()]
-    return [(base + float(c.s[run.first + i]), _name(c, int(labels[i]))) for i in changes]
+    return [(base + float(c.s[run.first + i]), _branch_name(c, int(labels[i]))) for i in changes]
 
 
-def _branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch]:
+def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch]:
     """The branches at the start, the one that carries farthest first; of equals the one that is taken."""
-    c, found, chosen = carried.columns, [], None
+    c, ranked, chosen = carried.columns, [], None
     for chain in carried.chains:
         if chain.first == 0:
             e = chain.carries(0)
             q = (chain.run(0, e, near) if e >= 0 else chain.q)[0].copy()  # a view would keep the whole chain
             far = float(c.s[e]) if e >= 0 else 0.0
-            why = words(arm, _break(arm, c, chain, 0, 0.0))
-            found.append((e, Branch(_name(c, int(chain.labels[0])), q, far, why)))
+            why = reason_text(arm, _reconfiguration_at(arm, c, chain, 0, 0.0))
+            ranked.append((e, Branch(_branch_name(c, int(chain.labels[0])), q, far, why)))
             if carried.runs and chain is carried.runs[0].chain:
-                chosen = found[-1][1]
-    found.sort(key=lambda one: (-round(one[1].carries, 2), one[1] is not chosen))
-    one_each: list[Branch] = []  # with and without the wrist straight through a singularity is one branch
-    for _, branch in found:
+                chosen = ranked[-1][1]
+    ranked.sort(key=lambda pair: (-round(pair[1].carries, 2), pair[1] is not chosen))
+    distinct: list[Branch] = []  # with and without the wrist straight through a singularity is one branch
+    for _, branch in ranked:
         q = branch.start_joints
-        if not any(b.name == branch.name and np.abs(change(arm, b.start_joints, q)).max() < _SAME for b in one_each):
-            one_each.append(branch)
-    return one_each
+        if not any(
+            b.name == branch.name and np.abs(joint_change(arm, b.start_joints, q)).max() < _SAME for b in distinct
+        ):
+            distinct.append(branch)
+    return distinct
 
 
-def _name(c: Columns, label: int) -> str:
+def _branch_name(c: Columns, label: int) -> str:
     return c.names[label] if 0 <= label < len(c.names) else ""
 
 
-def _break(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Reconfiguration:
+def _reconfiguration_at(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Reconfiguration:
     """Where and why a run from a sample ends."""
     why, joint, value, beyond = why_ended(c, chain, first)
     e = max(chain.carries(first), 0)
     q = chain.q[min(e + 1, chain.last) - chain.first].copy() if why == "hit" else None
-    hit = "" if q is None else hits_said(arm, q)
+    hit = "" if q is None else hit_text(arm, q)
     return Reconfiguration(
         base + float(c.s[e]), why, None if joint is None else arm.joint_names[joint], joint, value, beyond, hit, q
     )
 
 
-def words(arm: Arm, reconfiguration: Reconfiguration) -> str:
+def reason_text(arm: Arm, reconfiguration: Reconfiguration) -> str:
     """Why a branch carries no farther."""
     if reconfiguration.hit:
         return reconfiguration.hit
@@ -102,7 +104,7 @@ def words(arm: Arm, reconfiguration: Reconfiguration) -> str:
     return f"{reconfiguration.joint} meets its limit {reconfiguration.value / size:.6g} {unit}"
 
 
-def closeness(plan: PathPlan) -> str:
+def deviation_text(plan: PathPlan) -> str:
     """How far the motion leaves the path, or the points that it was fitted to."""
     if plan.rounded_most is None:
         bound = np.ceil(plan.deviation * 1e4) / 1e4  # what it says is a bound, too
@@ -113,19 +115,20 @@ def closeness(plan: PathPlan) -> str:
     )
 
 
-def passes(plan: PathPlan) -> list[str]:
+def wrist_pass_lines(plan: PathPlan) -> list[str]:
     """How each wrist singularity is passed straight through."""
-    said = []
-    for one in plan.passed:
-        tip = f"the tip at most {one.aside:.2g} mm aside, the tool not turned"
-        tool = f"the tip on the path, the tool turned by at most {one.turned / units.DEGREE:.2g} deg"
-        said.append(
-            f"a wrist singularity is passed between {one.begin:.3f} and {one.end:.3f} mm: {tool if one.turned else tip}"
+    lines = []
+    for singularity in plan.passed:
+        tip = f"the tip at most {singularity.aside:.2g} mm aside, the tool not turned"
+        tool = f"the tip on the path, the tool turned by at most {singularity.turned / units.DEGREE:.2g} deg"
+        how = tool if singularity.turned else tip
+        lines.append(
+            f"a wrist singularity is passed between {singularity.begin:.3f} and {singularity.end:.3f} mm: {how}"
         )
-    return said
+    return lines
 
 
-def answer(plan: PathPlan) -> dict[str, Any]:
+def plan_fields(plan: PathPlan) -> dict[str, Any]:
     """A plan as data of JSON [mm, deg, s]; of one that was refused what is known of it."""
     arm = plan.arm
     worst = plan.nearest_singularity
@@ -141,9 +144,11 @@ def answer(plan: PathPlan) -> dict[str, Any]:
         "joint_units": units.names(arm),
         "start_joints": None,
         "joints": None,
-        "runs": [_run(arm, run) for run in plan.runs],
-        "reconfigurations": [_reconfiguration(arm, one) for one in plan.reconfigurations],
-        "branches": [_branch(arm, branch) for branch in plan.branches],
+        "runs": [_run_fields(arm, run) for run in plan.runs],
+        "reconfigurations": [
+            _reconfiguration_fields(arm, reconfiguration) for reconfiguration in plan.reconfigurations
+        ],
+        "branches": [_branch_fields(arm, branch) for branch in plan.branches],
         "limits": None,
         "nearest_singularity": None
         if worst is None
@@ -167,19 +172,19 @@ def _motion_fields(plan: PathPlan) -> dict[str, Any]:
 
 def _optional_fields(plan: PathPlan) -> dict[str, Any]:
     """Keys that a plan without such things does not have."""
-    said: dict[str, Any] = {"held": held_joint_values(plan)} if plan.held else {}
+    fields: dict[str, Any] = {"held": held_joint_values(plan)} if plan.held else {}
     if plan.turned is not None:
-        said["turned_deg"] = float(np.rad2deg(plan.turned))
+        fields["turned_deg"] = float(np.rad2deg(plan.turned))
     if plan.passed:
-        said["wrists_passed"] = [_singularity_fields(one) for one in plan.passed]
+        fields["wrists_passed"] = [_singularity_fields(singularity) for singularity in plan.passed]
     if plan.approach is not None:
-        said["approach"] = _approach(plan.approach)
+        fields["approach"] = _approach_fields(plan.approach)
     if plan.clearance is not None:
-        said["clearance"] = plan.clearance
-    return said
+        fields["clearance"] = plan.clearance
+    return fields
 
 
-def _run(arm: Arm, run: PathRun) -> dict[str, Any]:
+def _run_fields(arm: Arm, run: PathRun) -> dict[str, Any]:
     return {
         "s_mm": [run.begin, run.end],
         "branches": [{"s_mm": s, "name": name} for s, name in run.names],
@@ -188,7 +193,7 @@ def _run(arm: Arm, run: PathRun) -> dict[str, Any]:
     }
 
 
-def _reconfiguration(arm: Arm, change: Reconfiguration) -> dict[str, Any]:
+def _reconfiguration_fields(arm: Arm, change: Reconfiguration) -> dict[str, Any]:
     return {
         "s_mm": change.s,
         "why": change.why,
@@ -198,7 +203,7 @@ def _reconfiguration(arm: Arm, change: Reconfiguration) -> dict[str, Any]:
     }
 
 
-def _branch(arm: Arm, branch: Branch) -> dict[str, Any]:
+def _branch_fields(arm: Arm, branch: Branch) -> dict[str, Any]:
     return {
         "name": branch.name,
         "start_joints": units.joints_out(arm, branch.start_joints).tolist(),
@@ -220,7 +225,7 @@ def held_joint_values(plan: PathPlan) -> dict[str, float]:
     return {name: _in_units(plan.arm, plan.arm.joint_names.index(name), value) for name, value in plan.held.items()}
 
 
-def _approach(move: Trajectory) -> dict[str, Any]:
+def _approach_fields(move: Trajectory) -> dict[str, Any]:
     return {"from_joints": units.joints_out(move.arm, move.start).tolist(), "duration_s": move.duration}
 
 
@@ -231,7 +236,7 @@ def _in_units(arm: Arm, joint: int, value: float) -> float:
 
 def path_refusal(plan: PathPlan, carried: CarriedRoute, branch: str | None = None) -> NoSolutionError:
     """The error of a path that is not carried, `branch` being asked for; `plan` of it tells the rest."""
-    best, at = plan.branches[0] if plan.branches else None, None
+    best, joints = plan.branches[0] if plan.branches else None, None
     length = carried.route.length
     if best is None:
         text = "the path's first point is out of reach"
@@ -243,15 +248,15 @@ def path_refusal(plan: PathPlan, carried: CarriedRoute, branch: str | None = Non
     else:
         far = float(carried.columns.s[carried.runs[0].last])
         text = f"no branch carries the whole path: {far:.3f} of {length:.3f} mm, then "
-        text += words(plan.arm, plan.reconfigurations[0])
-        at = plan.reconfigurations[0].joints
+        text += reason_text(plan.arm, plan.reconfigurations[0])
+        joints = plan.reconfigurations[0].joints
         changes = len(carried.runs) - 1
         if carried.covered:
             text += f"; with {changes} change{'s' * (changes > 1)} of branch it can be done"
     plan.length += length
     fields: dict[str, Any] = {"splittable": carried.covered}
-    if at is not None:
-        fields["joints"] = units.joints_out(plan.arm, at).tolist()
+    if joints is not None:
+        fields["joints"] = units.joints_out(plan.arm, joints).tolist()
     error = NoSolutionError(f"{text}: nothing was moved", **fields)
     error.plan = plan
     return error

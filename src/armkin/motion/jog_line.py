@@ -31,7 +31,7 @@ SLOWEST = 0.1  # of TOP: where joints at their full speed carry the tool slower 
 Frame = Literal["base", "tool"]
 
 
-def axes(arm: Arm) -> tuple[str, ...]:
+def jog_axes(arm: Arm) -> tuple[str, ...]:
     """The axes of a tip that may be jogged: the task's own numbers; of a pose x y z and turns about these.
 
     None of an arm with a joint to spare: a line of its tip is no one motion.
@@ -52,13 +52,13 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
     """
     check_rates(arm)
     task = task_for(arm, None)
-    if axis not in axes(arm):
-        raise UsageError(f"axis: '{axis}' is none of {', '.join(axes(arm))}")
+    if axis not in jog_axes(arm):
+        raise UsageError(f"axis: '{axis}' is none of {', '.join(jog_axes(arm))}")
     turns = axis not in ("x", "y", "z")
     top = TURNING if turns else TOP
     step = np.sign(share) * (STEP / 100 if turns else STEP)
     most = max(int(min(LONGEST * abs(share) * top, np.pi * 0.9 if turns else 2 * arm.reach) / abs(step)), 1)
-    count, why = _carried(arm, task, q, axis, frame, step, most)
+    count, why = _steps_carried(arm, task, q, axis, frame, step, most)
     while count:
         target = _shifted_target(arm, task, q, axis, frame, step * count)
         [line] = targets_out(task.labels, target[None])
@@ -72,29 +72,29 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
     raise NoSolutionError(f"the tip does not move along {axis} of the {frame}: {why}")
 
 
-def _carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step: float, most: int) -> tuple[int, str]:
+def _steps_carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step: float, most: int) -> tuple[int, str]:
     """How many steps the arm's own branch follows, and what ends it."""
-    unit, here = radian_or_reach(arm), q
+    unit, posture = radian_or_reach(arm), q
     top = TOP if axis in ("x", "y", "z") else TURNING
     stuck = bool(arm.keep_out) and float(clearance(arm, q).mm) < 0
     before, leaving = np.inf, False  # an arm that stands near a singularity may leave it
     for k in range(1, most + 1):
         goal = _shifted_target(arm, task, q, axis, frame, step * k)[None]
-        r, J = scaled(arm, task, here[None], goal)
+        r, J = scaled(arm, task, posture[None], goal)
         move = np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0]
-        lost = np.linalg.norm(J[0] @ move - r[0]) > 0.1 * np.linalg.norm(r[0])  # no joint speed leads there
+        blocked = np.linalg.norm(J[0] @ move - r[0]) > 0.1 * np.linalg.norm(r[0])  # no joint speed leads there
         first = move * unit
         slow = float(np.max(np.abs(first) / arm.max_speed)) * SLOWEST * top / abs(step)
-        if lost or (slow > 1.0 and slow >= before):
+        if blocked or (slow > 1.0 and slow >= before):
             return 0 if leaving and k == 2 else k - 1, "a singularity is near"
         before, leaving = slow, slow > 1.0
-        here = here + first
+        posture = posture + first
         for _ in range(3):
-            r, J = scaled(arm, task, here[None], goal)
-            here = here + np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0] * unit
-        if not float(np.abs(scaled(arm, task, here[None], goal)[0]).max()) < 1e-7:
+            r, J = scaled(arm, task, posture[None], goal)
+            posture = posture + np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0] * unit
+        if not float(np.abs(scaled(arm, task, posture[None], goal)[0]).max()) < 1e-7:
             return k - 1, "it is out of reach" if k > 1 else "a singularity is near"
-        if why := _why_not_there(arm, here, stuck):
+        if why := _why_not_there(arm, posture, stuck):
             return k - 1, why
     return most, ""
 
@@ -120,7 +120,7 @@ def _shifted_target(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, dis
         return target
     unit: Array = np.eye(3)["xyz".index(axis[-1])]
     if axis[0] == "r":
-        turn = _about(unit, distance)
+        turn = _rotation_about(unit, distance)
         target[:3, :3] = T[:3, :3] @ turn if frame == "tool" else turn @ T[:3, :3]
         return target
     way = distance * (T[:3, :3] @ unit if frame == "tool" else unit)
@@ -129,8 +129,8 @@ def _shifted_target(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, dis
     return target
 
 
-def _about(axis: Array, angle: float) -> Array:
+def _rotation_about(axis: Array, angle: float) -> Array:
     """The rotation (3, 3) by an angle about an axis of the frame (Rodrigues)."""
     K = np.cross(np.eye(3), axis).T
-    out: Array = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
-    return out
+    rotation: Array = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+    return rotation

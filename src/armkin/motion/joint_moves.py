@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LEAST_SHARE = 1e-4  # of a joint's max_speed or max_accel
 
 
-def plan(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) -> Trajectory:
+def plan_joint_moves(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) -> Trajectory:
     """Moves from joint values through joint targets, stopping at each, all joints together.
 
     start: (n,); targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
@@ -31,7 +31,7 @@ def plan(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) 
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")
-    >>> p = plan(arm, arm.home, np.deg2rad([-30, 5, -5]))
+    >>> p = plan_joint_moves(arm, arm.home, np.deg2rad([-30, 5, -5]))
     >>> round(p.duration, 4), np.rad2deg(p.top_speed).round().tolist()
     (1.9167, [21.0, 60.0, 60.0])
     """
@@ -39,11 +39,11 @@ def plan(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) 
     check_share("speed", speed)
     goals = np.atleast_2d(np.asarray(targets, dtype=float))
     check_limits(arm, goals)
-    at = np.asarray(start, dtype=float)
+    begin = np.asarray(start, dtype=float)
     stretches = []
     for goal in goals:
-        stretches.append(straight(arm, at, goal, speed))
-        at = goal
+        stretches.append(straight_move(arm, begin, goal, speed))
+        begin = goal
     return Trajectory(arm, np.asarray(start, dtype=float), tuple(stretches))
 
 
@@ -54,7 +54,7 @@ def check_share(name: str, value: float) -> None:
         raise UsageError(f"{name} {100 * value:g} % is not possible; it goes from {low:g} to 100 percent")
 
 
-def straight(
+def straight_move(
     arm: Arm, start: Array, end: Array, speed: float = 1.0, share: float = 1.0, jerk: Array | None = None
 ) -> Straight:
     """The fastest straight line in joint space from rest to rest: (n,), (n,) [rad | mm].
@@ -81,17 +81,17 @@ def straight(
     return Straight(start, end, seven_phases(1.0, top, accel, float((jerk[moving] / change[moving]).min())))
 
 
-def approach(
+def approach_move(
     arm: Arm, standing: Array, start: Array, speed: float = 1.0, share: float = 1.0, jerk: Array | None = None
 ) -> Trajectory | None:
     """The joint move from where an arm stands, (n,), to where a plan starts; None if it stands there.
 
-    An arm whose motors have the same counts in both stands there. speed, share, jerk: as in `straight`.
+    An arm whose motors have the same counts in both stands there. speed, share, jerk: as in `straight_move`.
     """
     near = np.abs(start - standing).max() <= 1e-12
     if near or (arm.motors and not undriven(arm) and np.array_equal(pulses(arm, start), pulses(arm, standing))):
         return None
-    return Trajectory(arm, standing, (straight(arm, standing, start, speed, share, jerk),))
+    return Trajectory(arm, standing, (straight_move(arm, standing, start, speed, share, jerk),))
 
 
 def check_jerk(arm: Arm, jerk: ArrayLike | None) -> Array | None:
@@ -109,11 +109,11 @@ def check_jerk(arm: Arm, jerk: ArrayLike | None) -> Array | None:
 
 def missing_rates(arm: Arm) -> dict[str, list[str]]:
     """Keys that motion needs and the robot file lacks: {"max_speed": [joint, ...], ...}."""
-    found = {
+    missing = {
         key: [name for name, value in zip(arm.joint_names, values, strict=True) if np.isnan(value)]
         for key, values in (("max_speed", arm.max_speed), ("max_accel", arm.max_accel))
     }
-    return {key: names for key, names in found.items() if names}
+    return {key: names for key, names in missing.items() if names}
 
 
 _EXAMPLES = {("deg", "max_speed"): 30, ("deg", "max_accel"): 60, ("mm", "max_speed"): 20, ("mm", "max_accel"): 50}
@@ -125,11 +125,11 @@ def rate_lines(arm: Arm) -> list[str]:
     lines = []
     for key, names in missing_rates(arm).items():
         for size in ("deg", "mm"):
-            these = [name for name in names if unit[name] == size]
-            if these:
+            lacking = [name for name in names if unit[name] == size]
+            if lacking:
                 per = "s" if key == "max_speed" else "s2"
                 example = _EXAMPLES[size, key]
-                to = f"to joint{'s' * (len(these) > 1)} {', '.join(these)}"
+                to = f"to joint{'s' * (len(lacking) > 1)} {', '.join(lacking)}"
                 lines.append(f"{key}: {example}   # {size}/{per}, for example; {to}")
     return lines
 
@@ -142,12 +142,12 @@ def check_rates(arm: Arm) -> None:
                    for key, n in absent.items()]  # fmt: skip
         lines = rate_lines(arm)
         raise UsageError(
-            f"{', '.join(said_of)}: motion needs {'them' if len(lines) > 1 else 'one'}{_add(arm, lines)}",
+            f"{', '.join(said_of)}: motion needs {'them' if len(lines) > 1 else 'one'}{_advice_to_add(arm, lines)}",
             robot_file=arm.path,
             lines_to_add=lines,
         )
 
 
-def _add(arm: Arm, lines: list[str]) -> str:
+def _advice_to_add(arm: Arm, lines: list[str]) -> str:
     """The lines to add, said of the robot file."""
     return "".join([f"; add to {arm.path or arm.name}:", *(f"\n  {line}" for line in lines)])

@@ -81,11 +81,11 @@ def path(
     >>> armkin.fk(arm, plan.q(plan.duration))[:3, 3].round(6).tolist()
     [390.0, -80.0, 300.0]
     """
-    asked = PathRequest(
+    request = PathRequest(
         start, near, branch, task, tolerance, corners, blend, speed, accel, tool_speed, jerk, hold, split, samples
     )
     check_rates(arm)
-    file = path_numbers.moves(arm, moves, task)
-    if (spare := redundancy(arm, task or file.task)) is not None and path_numbers.of_tool(file):
-        return path_redundant(arm, file, spare, asked)
-    return plan_path(arm, file, asked)
+    file = path_numbers.as_path_file(arm, moves, task)
+    if (spare := redundancy(arm, task or file.task)) is not None and path_numbers.moves_tool(file):
+        return path_redundant(arm, file, spare, request)
+    return plan_path(arm, file, request)

@@ -12,7 +12,7 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.model.lock_joints import lock, unlock
-from armkin.motion.joint_moves import approach, check_jerk, check_rates, straight
+from armkin.motion.joint_moves import approach_move, check_jerk, check_rates, straight_move
 from armkin.motion.path_planner import PathRequest, plan_path
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.trajectory_proof import prove_plan
@@ -37,36 +37,36 @@ def path_held(
     """
     check_rates(arm)
     free = lock(arm, held)
-    kept = [k for k, name in enumerate(arm.joint_names) if name not in held]
-    here = request.start_joints(arm)
-    ready = unlock(arm, held, here[kept])
+    free_indices = [k for k, name in enumerate(arm.joint_names) if name not in held]
+    standing = request.start_joints(arm)
+    ready = unlock(arm, held, standing[free_indices])
     check_limits(arm, ready[None])
     near, jerk = (
-        None if value is None else np.broadcast_to(np.asarray(value, dtype=float), arm.n)[kept]
+        None if value is None else np.broadcast_to(np.asarray(value, dtype=float), arm.n)[free_indices]
         for value in (request.near, request.jerk)
     )
-    of_free = replace(request, start=here[kept], near=near, jerk=jerk)
+    of_free = replace(request, start=standing[free_indices], near=near, jerk=jerk)
     try:
-        plan = plan_path(free, path_numbers.moves(free, moves, request.task), of_free)
+        plan = plan_path(free, path_numbers.as_path_file(free, moves, request.task), of_free)
     except NoSolutionError as error:
         if error.plan is not None:
-            error.plan = _of_all(error.plan, arm, held)
+            error.plan = _plan_of_all_joints(error.plan, arm, held)
         raise
-    whole, begun = _of_all(plan, arm, held), unlock(arm, held, plan.motion.start)
-    made = [_widened(one, arm, held) for one in plan.motion.stretches]
+    full_plan, begun = _plan_of_all_joints(plan, arm, held), unlock(arm, held, plan.motion.start)
+    stretches = [_unlock_stretch(item, arm, held) for item in plan.motion.stretches]
     pace = plan.speed, request.accel, check_jerk(arm, request.jerk)
-    if begin is not None and (first := straight(arm, begin, begun, *pace)).duration > 0:
-        made, begun, shift = [first, *made], begin, 1
+    if begin is not None and (first := straight_move(arm, begin, begun, *pace)).duration > 0:
+        stretches, begun, shift = [first, *stretches], begin, 1
     else:
         shift = 0
     for k, (_, base) in plan.on_path.items():
-        whole.along(k + shift, made[k + shift], base)
-    whole.approach = approach(arm, here, begun, *pace)
-    markers = [replace(one, before=one.before + shift) for one in plan.markers]
-    return prove_plan(whole.finished(begun, made, markers))
+        full_plan.note_stretch(k + shift, stretches[k + shift], base)
+    full_plan.approach = approach_move(arm, standing, begun, *pace)
+    markers = [replace(item, before=item.before + shift) for item in plan.markers]
+    return prove_plan(full_plan.set_motion(begun, stretches, markers))
 
 
-def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
+def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
     """What is known of a plan's branches, with the values of all joints; without its motion."""
 
     def whole(q: Array) -> Array:
@@ -90,17 +90,17 @@ def _of_all(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
     )
 
 
-def _widened(stretch: Stretch, arm: Arm, held: Mapping[str, float]) -> Stretch:
+def _unlock_stretch(stretch: Stretch, arm: Arm, held: Mapping[str, float]) -> Stretch:
     """The same motion with the held joints at rest."""
     if isinstance(stretch, Smoothed):
-        return replace(stretch, curve=_curve(stretch.curve, arm, held))
+        return replace(stretch, curve=_unlock_curve(stretch.curve, arm, held))
     if isinstance(stretch, Curve):
-        return _curve(stretch, arm, held)
+        return _unlock_curve(stretch, arm, held)
     assert isinstance(stretch, Straight)
     return replace(stretch, start=unlock(arm, held, stretch.start), end=unlock(arm, held, stretch.end))
 
 
-def _curve(curve: Curve, arm: Arm, held: Mapping[str, float]) -> Curve:
+def _unlock_curve(curve: Curve, arm: Arm, held: Mapping[str, float]) -> Curve:
     still = dict.fromkeys(held, 0.0)
     way = curve.path
     return Curve(Knots(way.s, unlock(arm, held, way.q), unlock(arm, still, way.d)), curve.x)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.path_file import Move, PathFile
 
 
-def routes(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Array]]:
+def route_targets(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Array]]:
     """The task, and the targets of every way that the tool goes on one branch, about `step` [mm] apart.
 
     Between them are joint moves, which may change the branch; a point without a way has one target. Raises UsageError
@@ -31,7 +31,7 @@ def routes(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Array]]:
     pace = Pace(tolerance=file.tolerance or TOLERANCE)
     outline = _Outline(arm, file, pace, arm.home, PathOptions(file.task, corner, None, None, False, None))
     outline.step, outline.targets_per_route = step, []
-    outline.walked(MOVES)
+    outline.plan_all(MOVES)
     if not outline.targets_per_route:
         raise UsageError("the path has no target of the tool: it says nothing of where to put an arm")
     return outline.task, outline.targets_per_route

@@ -58,14 +58,14 @@ def plan_path(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
     check_robot(file, arm.name, arm.path)
     pace = _pace(arm, file, request)
     if pace.turn:
-        wrist_turn.check(arm)
-    here = request.start_joints(arm)
+        wrist_turn.check_wrist(arm)
+    standing = request.start_joints(arm)
     if arm.motors and not undriven(arm):
-        here = legal_with_same_pulses(arm, here)
+        standing = legal_with_same_pulses(arm, standing)
     near = None if request.near is None else np.asarray(request.near, dtype=float)
     wish = corners_wished(file, request.corners, request.blend)
     options = PathOptions(request.task, wish, near, request.branch, request.split, request.samples)
-    return prove_plan(Walk(arm, file, pace, here, options).walked(MOVES))
+    return prove_plan(Walk(arm, file, pace, standing, options).plan_all(MOVES))
 
 
 def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:
@@ -75,9 +75,9 @@ def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:
     check_share("speed", request.speed)
     check_share("accel", request.accel)
     for name, least, unit in (("tool_speed", LEAST_TOOL_SPEED, "mm/s"), ("tolerance", LEAST_TOLERANCE, "mm")):
-        given = getattr(request, name)
-        if given is not None and not least <= given < np.inf:
-            raise UsageError(f"{name} {given:g} is not possible; it is at least {least:g} {unit}")
+        value = getattr(request, name)
+        if value is not None and not least <= value < np.inf:
+            raise UsageError(f"{name} {value:g} is not possible; it is at least {least:g} {unit}")
     return Pace(
         (file.speed or 100.0) / 100 * request.speed,
         request.accel,
@@ -95,13 +95,13 @@ def corners_wished(file: PathFile, corners: str | None, blend: float | None) -> 
         raise UsageError("corners and blend both say how corners are passed: give one of them")
     if blend is not None:
         return blend
-    said = corners or file.corners
-    if said == "blend" and file.blend is None:
+    wish = corners or file.corners
+    if wish == "blend" and file.blend is None:
         advice = "blend=5, or blend: 5 at the head of the file"
         raise UsageError("corners: blend needs a radius in mm", advice=advice, needs="blend")
-    known: dict[str | None, float | None] = {"stop": 0.0, "blend": file.blend, "tolerance": None}
-    if said is None:
+    blends: dict[str | None, float | None] = {"stop": 0.0, "blend": file.blend, "tolerance": None}
+    if wish is None:
         return "default" if file.blend is None else file.blend
-    if said not in known:
-        raise UsageError(f"corners '{said}' is none of {', '.join(map(str, known))}")
-    return known[said]
+    if wish not in blends:
+        raise UsageError(f"corners '{wish}' is none of {', '.join(map(str, blends))}")
+    return blends[wish]

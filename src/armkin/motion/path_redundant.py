@@ -19,7 +19,7 @@ from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.keep_out.clearance import clearance
 from armkin.model.arm import actual
 from armkin.motion.path_held import path_held
-from armkin.motion.path_outline import routes
+from armkin.motion.path_outline import route_targets
 from armkin.motion.tool_path import path_numbers
 
 if TYPE_CHECKING:
@@ -44,15 +44,15 @@ def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, request: PathReq
     if that carries the path, or the nearest value that does. Raises as `armkin.path` does, UsageError also for joint
     moves that want the joint at different values.
     """
-    name, here = arm.joint_names[spare.joint], request.start_joints(arm)
-    begin = _begin(arm, file, here)
-    said = _redundant_start(arm, file, spare.joint, here)
-    stands = here if begin is None else begin
+    name, standing = arm.joint_names[spare.joint], request.start_joints(arm)
+    begin = _start_posture(arm, file, standing)
+    fixed = _redundant_start(arm, file, spare.joint, standing)
+    stands = standing if begin is None else begin
     close = stands if request.near is None else np.asarray(request.near, dtype=float)
-    others = _of_others(arm, file, spare.joint)
+    others = _path_of_other_joints(arm, file, spare.joint)
     refused: NoSolutionError | None = None
     near = float(close[spare.joint]), float(stands[spare.joint])
-    for value in _values(arm, file, request.task, *near) if said is None else [said]:
+    for value in _values_to_try(arm, file, request.task, *near) if fixed is None else [fixed]:
         try:
             return path_held(arm, others, {name: value}, request, begin)
         except NoSolutionError as error:
@@ -63,30 +63,30 @@ def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, request: PathReq
 
 def values_to_hold(arm: Arm, file: PathFile, spare: Redundancy) -> tuple[float, ...]:
     """Values of the redundant joint at which a path from home may be carried [rad]: the nearest to its start first."""
-    if (said := _redundant_start(arm, file, spare.joint, arm.home)) is not None:
-        return (said,)
-    begin = _begin(arm, file, arm.home)
+    if (fixed := _redundant_start(arm, file, spare.joint, arm.home)) is not None:
+        return (fixed,)
+    begin = _start_posture(arm, file, arm.home)
     close = float((arm.home if begin is None else begin)[spare.joint])
-    t = np.unique(_over_range(arm, spare.joint, close))
+    t = np.unique(_values_over_range(arm, spare.joint, close))
     return tuple(t[np.argsort(np.abs(t - close), kind="stable")].tolist())
 
 
-def _over_range(arm: Arm, joint: int, close: float) -> Array:
+def _values_over_range(arm: Arm, joint: int, close: float) -> Array:
     """Values over a joint's range [rad], and the one that it had best have, within it."""
     low, high = float(arm.lower[joint]), float(arm.upper[joint])
     low, high = (low if np.isfinite(low) else close - np.pi), (high if np.isfinite(high) else close + np.pi)
     return np.append(np.linspace(low, high, VALUES), close if low <= close <= high else low)
 
 
-def _begin(arm: Arm, file: PathFile, standing: Array) -> Array | None:
+def _start_posture(arm: Arm, file: PathFile, standing: Array) -> Array | None:
     """The posture (n,) that the file's start fixes, if it does."""
     value = file.start if file.start is None or isinstance(file.start, str) else file.start.joints
-    return None if value is None else _joints(arm, standing, value, file.place("start"))
+    return None if value is None else _joint_values(arm, standing, value, file.place("start"))
 
 
-def _joints(arm: Arm, standing: Array, value: Any, place: str) -> Array:
+def _joint_values(arm: Arm, standing: Array, value: Any, place: str) -> Array:
     try:
-        return path_numbers.joints(arm, standing, value)
+        return path_numbers.joint_values(arm, standing, value)
     except UsageError as error:
         raise error.within(place) from None
 
@@ -98,7 +98,7 @@ def _redundant_start(arm: Arm, file: PathFile, joint: int, standing: Array) -> f
         if move.joint is None:
             continue
         place = file.place_of(k, k)
-        value = float(_joints(arm, standing, move.joint, place)[joint])
+        value = float(_joint_values(arm, standing, move.joint, place)[joint])
         if isinstance(move.joint, Mapping) and name not in move.joint:
             continue
         if first is None:
@@ -111,25 +111,25 @@ def _redundant_start(arm: Arm, file: PathFile, joint: int, standing: Array) -> f
     return first
 
 
-def _of_others(arm: Arm, file: PathFile, joint: int) -> PathFile:
+def _path_of_other_joints(arm: Arm, file: PathFile, joint: int) -> PathFile:
     """The path as one of the joints that are not held."""
     name = arm.joint_names[joint]
 
-    def without(value: Any) -> Any:
+    def without_joint(value: Any) -> Any:
         if isinstance(value, Mapping):
             return {key: angle for key, angle in value.items() if key != name}
         return value if isinstance(value, str) else [v for k, v in enumerate(value) if k != joint]
 
-    def move(one: Move) -> Move:
-        return one if one.joint is None else one.model_copy(update={"joint": without(one.joint)})
+    def free_move(item: Move) -> Move:
+        return item if item.joint is None else item.model_copy(update={"joint": without_joint(item.joint)})
 
     start = file.start
     if start is not None and not isinstance(start, str) and start.joints is not None:
-        start = start.model_copy(update={"joints": without(start.joints)})
-    return file.model_copy(update={"start": start, "moves": [move(one) for one in file.moves]})
+        start = start.model_copy(update={"joints": without_joint(start.joints)})
+    return file.model_copy(update={"start": start, "moves": [free_move(item) for item in file.moves]})
 
 
-def _values(arm: Arm, file: PathFile, task: str | None, close: float, start: float) -> Iterator[float]:
+def _values_to_try(arm: Arm, file: PathFile, task: str | None, close: float, start: float) -> Iterator[float]:
     """Values of the redundant joint to plan for [rad]: those at which targets along all ways have a branch.
 
     Those at which it hits nothing come first, and of these those that keep `AWAY`; then the nearest to `close`. Where
@@ -140,15 +140,15 @@ def _values(arm: Arm, file: PathFile, task: str | None, close: float, start: flo
     assert spare is not None
     j = spare.joint
     try:
-        _, ways = routes(arm, file.model_copy(update={"task": task or file.task}), STEP * arm.reach)
+        _, ways = route_targets(arm, file.model_copy(update={"task": task or file.task}), STEP * arm.reach)
     except UsageError:  # what is wrong with it, if anything, is said by its plan
         yield start
         return
-    t = _over_range(arm, j, close)
-    at = t * arm.ratio[j]
+    t = _values_over_range(arm, j, close)
+    joint_angles = t * arm.ratio[j]
     lacking = np.zeros((1, len(t)), int)
     for way in ways:
-        lacking += _lacking(turned, spare, way, at, ASKED, [])
+        lacking += _count_lacking(turned, spare, way, joint_angles, ASKED, [])
     order = np.argsort(np.abs(t - close), kind="stable")
     carried = order[lacking[0, order] == lacking.min()]
     if turned.keep_out and not turned.ignores_keep_out and len(carried) > 1:
@@ -157,32 +157,32 @@ def _values(arm: Arm, file: PathFile, task: str | None, close: float, start: flo
         count = max(POSTURES // (len(carried) * len(ways)), 2)
         near = np.zeros((3, len(carried)), int)
         for way in ways:
-            near += _lacking(turned, spare, way, at[carried], min(count, ASKED), margins)
+            near += _count_lacking(turned, spare, way, joint_angles[carried], min(count, ASKED), margins)
         carried = carried[np.lexsort((near[2] > 0, near[1]))]
     yield from t[carried[: MOST if lacking.min() == 0 else 1]].tolist()
 
 
-def _lacking(
+def _count_lacking(
     arm: Arm, spare: Redundancy, way: Array, values: Array, count: int, margins: list[float]
 ) -> NDArray[np.intp]:
     """How many of some targets of a way lack a branch at each of the redundant joint's values (V,), and how many one
     that keeps each of the margins [mm] besides: (1 + margins, V). Where branches have names it is one all the way.
     """
-    some = way[np.unique(np.linspace(0, len(way) - 1, count).astype(int))]
-    goals = np.repeat(some[None], len(values), axis=0).reshape(-1, *some.shape[1:])
-    own = np.repeat(values, len(some))
-    s = ik(spare.rest, moved(arm, spare, goals, own), spare.task.name, examine=False)
+    sample = way[np.unique(np.linspace(0, len(way) - 1, count).astype(int))]
+    goals = np.repeat(sample[None], len(values), axis=0).reshape(-1, *sample.shape[1:])
+    joint_angles = np.repeat(values, len(sample))
+    s = ik(spare.rest, moved(arm, spare, goals, joint_angles), spare.task.name, examine=False)
     legal = s.within_limits
     kinds = [legal]
     if margins:
-        q = np.insert(s.q, spare.joint, own[:, None], axis=2)
+        q = np.insert(s.q, spare.joint, joint_angles[:, None], axis=2)
         mm = np.full(legal.shape, -np.inf)
         mm[legal] = clearance(arm, q[legal]).mm
         kinds += [mm >= margin for margin in margins]
-    found = []
+    counts = []
     for good in kinds:
-        each = good.any(axis=1, keepdims=True)
+        solved = good.any(axis=1, keepdims=True)
         if spare.geometry.ordered:
-            each = (good[:, :, None] & (s.branch[:, :, None] == np.arange(len(s.names)))).any(axis=1)
-        found.append(len(some) - each.reshape(len(values), len(some), -1).sum(axis=1).max(axis=1))
-    return np.array(found)
+            solved = (good[:, :, None] & (s.branch[:, :, None] == np.arange(len(s.names)))).any(axis=1)
+        counts.append(len(sample) - solved.reshape(len(values), len(sample), -1).sum(axis=1).max(axis=1))
+    return np.array(counts)

@@ -21,10 +21,10 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, outside_text
 from armkin.motion import branch_report
-from armkin.motion.branches.branch_path import Pace, carry, starts_at, stretches
-from armkin.motion.branches.route_grid import Missed, deviation, largest_miss
+from armkin.motion.branches.branch_path import Pace, carry_route, run_stretches, starts_at
+from armkin.motion.branches.route_grid import Missed, largest_miss, route_deviation
 from armkin.motion.branches.wrist_window import with_detours
-from armkin.motion.joint_moves import approach, straight
+from armkin.motion.joint_moves import approach_move, straight_move
 from armkin.motion.plan.path_plan import Marker, PathPlan
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, way_of, ways_of
@@ -33,7 +33,7 @@ from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import path_numbers, path_pieces
 from armkin.motion.tool_path.dense_points import FIT, PLAN, Polyline
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
-from armkin.motion.tool_path.path_pieces import Piece, Spot
+from armkin.motion.tool_path.path_pieces import Piece, Spot, split_target
 from armkin.motion.tool_path.route import ReducedBlends, join_pieces
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ class Walk:
 
     def __init__(self, arm: Arm, file: PathFile, pace: Pace, start: Array, options: PathOptions) -> None:
         self.arm, self.file, self.pace, self.options = arm, file, pace, options
-        with _of_key(file, "task"):
-            self.plan = PathPlan(arm, _task(arm, file, options.task or file.task), pace.tolerance, pace.speed)
+        with _errors_of_key(file, "task"):
+            self.plan = PathPlan(arm, _task_or_none(arm, file, options.task or file.task), pace.tolerance, pace.speed)
         self.q = start  # where the joints are when all so far is done
         self.stretches: list[Stretch] = []
         self.markers: list[Marker] = []  # what happens between stretches
@@ -88,7 +88,7 @@ class Walk:
         if self.dense is not None:
             return self.dense.last
         if self._spot is None:
-            self._spot = path_pieces.spot(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
+            self._spot = split_target(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
         return self._spot
 
     def clear(self, goal: Spot | None, branch: str | None = None) -> None:
@@ -100,10 +100,10 @@ class Walk:
         self.dense: Polyline | None = None  # points that have gathered for one curve
         self.pauses: dict[int, list[tuple[str, Any]]] = {}
 
-    def walked(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]]) -> PathPlan:
+    def plan_all(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]]) -> PathPlan:
         """The plan of all moves; kinds: what each kind of them does."""
-        here = self.q
-        with _of_key(self.file, "start"):
+        q = self.q
+        with _errors_of_key(self.file, "start"):
             self._begin()
         number = 0
         while number <= len(self.file.moves):
@@ -115,18 +115,18 @@ class Walk:
                 if not self.untried_postures:
                     raise self.refused from None
                 number = self._restore()
-        self.plan.approach = approach(self.arm, here, self.begun, self.pace.speed, self.pace.accel, self.pace.jerk)
-        return self.plan.finished(self.begun, self.stretches, self.markers)
+        self.plan.approach = approach_move(self.arm, q, self.begun, self.pace.speed, self.pace.accel, self.pace.jerk)
+        return self.plan.set_motion(self.begun, self.stretches, self.markers)
 
     def _carry_out_move(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]], number: int) -> None:
         """Do a move; behind the last one, what has gathered."""
         if number == len(self.file.moves):
-            with _of_moves(self):
+            with _errors_of_moves(self):
                 self.close()
             return
         move = self.file.moves[number]
         self.current_moves = number, number
-        with _of_moves(self):
+        with _errors_of_moves(self):
             kinds[move.kind](self, move, getattr(move, move.kind))
 
     def take_posture(self) -> None:
@@ -134,12 +134,12 @@ class Walk:
         if self.goal is None or self.pieces:
             self.close()
             return
-        found = self.untried_postures or _postures(self, self.goal, self.goal_branch)
-        self.goal_branch, self.untried_postures = None, found[1:]
+        postures = self.untried_postures or _postures(self, self.goal, self.goal_branch)
+        self.goal_branch, self.untried_postures = None, postures[1:]
         if self.untried_postures:
             self.saved_state = {}, {}
-            self.saved_state = _copied_state(vars(self)), _copied_state(vars(self.plan))
-        self.append_joint_move(found[0], self.leads)
+            self.saved_state = _copy_state(vars(self)), _copy_state(vars(self.plan))
+        self.append_joint_move(postures[0], self.leads)
         for kind, value in self.pauses.get(0, ()):
             self.emit_event(kind, value)
         self.goal = None
@@ -148,9 +148,9 @@ class Walk:
         """Be again where a posture was taken, with the others left; the number of that move."""
         others, refused, (state, plan) = self.untried_postures, self.refused, self.saved_state
         vars(self).update(
-            {**_copied_state(state), "untried_postures": others, "refused": refused, "saved_state": self.saved_state}
+            {**_copy_state(state), "untried_postures": others, "refused": refused, "saved_state": self.saved_state}
         )
-        vars(self.plan).update(_copied_state(plan))
+        vars(self.plan).update(_copy_state(plan))
         return self.current_moves[0]
 
     def _begin(self) -> None:
@@ -159,11 +159,11 @@ class Walk:
         value = start if start is None or isinstance(start, str) else start.joints
         if start is not None and value is None:
             goal = self.target(start.point)  # type: ignore[union-attr, arg-type]
-            _reached(self, goal, None)  # refused here, of this key
+            _nearest_posture(self, goal, None)  # refused here, of this key
             self.clear(goal)
             self.opening = True
         elif value is not None:
-            self.q = path_numbers.joints(self.arm, self.q, value)
+            self.q = path_numbers.joint_values(self.arm, self.q, value)
             check_limits(self.arm, self.q[None])
             self.clear(None)
         self.begun = self.q
@@ -174,12 +174,12 @@ class Walk:
             return
         dense, self.dense = self.dense, None
         self._spot = dense.last
-        made = dense.pieces(self.pace.tolerance)
-        self.pieces += made
+        pieces = dense.pieces(self.pace.tolerance)
+        self.pieces += pieces
         # curves of points meet where the way turns back: a blend there would pass the points beside it by
-        self.blends += [None if a.dense is None and b.dense is None else 0.0 for a, b in pairwise(made)] + [corner]
+        self.blends += [None if a.dense is None and b.dense is None else 0.0 for a, b in pairwise(pieces)] + [corner]
 
-    def corner(self, move: Move, inner: bool = False) -> float | None:
+    def corner_blend(self, move: Move, inner: bool = False) -> float | None:
         """How the corner at a move's end is passed: the radius of its blend, None: by the tolerance."""
         if move.blend is not None:
             return move.blend
@@ -187,7 +187,7 @@ class Walk:
             return None if inner else 0.0
         return self.options.corner
 
-    def typed(self, sums: Array) -> None:
+    def keep_typed_turns(self, sums: Array) -> None:
         """Where the tool is, sums of angles keep the whole turns that were typed."""
         turns = np.rint((sums - self.spot.sums) / (2 * np.pi))
         self._spot = replace(self.spot, sums=self.spot.sums + 2 * np.pi * turns)
@@ -212,32 +212,30 @@ class Walk:
     def add(self, move: Move, piece: Piece) -> None:
         """Gather a piece of the tool's way; move: whose speed and blend it has."""
         speed = None if move.speed is None else move.speed / 100 * self.pace.speed
-        self.group = (
-            (self.group if self.goal is not None or self.pieces else self.current_moves)[0],
-            self.current_moves[1],
-        )
+        first = (self.group if self.goal is not None or self.pieces else self.current_moves)[0]
+        self.group = first, self.current_moves[1]
         self.lay_dense()
         self.pieces.append(replace(piece, speed=speed, tool_speed=move.tool_speed or piece.tool_speed))
-        self.blends.append(self.corner(move))
+        self.blends.append(self.corner_blend(move))
         self._spot = piece.last
 
     def target(self, value: list[float]) -> Spot:
         """A target from where the tool is: what it leaves out stays."""
-        return path_numbers.target(self.task, self.spot, value)
+        return path_numbers.target_spot(self.task, self.spot, value)
 
     # Groups
 
     def close(self) -> None:
         """Plan the group of tool moves that has gathered; what is wrong with it is said of its moves."""
-        now, self.current_moves = self.current_moves, self.group
+        moves_now, self.current_moves = self.current_moves, self.group
         self.lay_dense()
         self._plan_group()
-        self.current_moves = now
+        self.current_moves = moves_now
 
     def _plan_group(self) -> None:
         if not self.pieces:
             if self.goal is not None:
-                self.append_joint_move(_reached(self, self.goal, self.goal_branch), self.leads)
+                self.append_joint_move(_nearest_posture(self, self.goal, self.goal_branch), self.leads)
                 for kind, value in self.pauses.get(0, ()):
                     self.emit_event(kind, value)
             self.goal = None
@@ -252,10 +250,10 @@ class Walk:
         s, runs = self._runs(route, near, free=free)
         for k, run in enumerate(runs):
             fixed = self.q if not free and k == 0 and run.first == 0 and starts_at(run.chain, self.q) else None
-            curves, given = _curves(self.arm, self.pace, route, s, run, near, fixed)
+            curves, misses = _timed_curves(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
                 self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
-            self.append_curves(with_detours(route, run.chain.windows), curves, order, given)
+            self.append_curves(with_detours(route, run.chain.windows), curves, order, misses)
             near = self.q
         for kind, value in self.pauses.get(len(self.pieces), ()):
             self.emit_event(kind, value)
@@ -266,30 +264,30 @@ class Walk:
     def _runs(self, route: Route, near: Array, *, free: bool) -> tuple[Array, list[Run]]:
         """A route's samples and the runs that carry it; the other branches, of many samples, are forgotten."""
         branch = (self.goal_branch or self.options.branch) if free else None
-        carried = carry(
+        carried = carry_route(
             self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
             fixed=None if free else self.q, branch=branch, count=self.options.samples,
         )  # fmt: skip
-        branch_report.note(self.plan, carried, near)
+        branch_report.note_runs(self.plan, carried, near)
         if not carried.whole and not (self.options.split and carried.covered):
             raise branch_report.path_refusal(self.plan, carried, branch)
-        return carried.columns.s, carried.moving
+        return carried.columns.s, carried.moving_runs
 
     def append_curves(
         self, route: Route, curves: list[Curve | Smoothed], number_of_curve: dict[int, int], misses: Missed
     ) -> None:
         """Put a run's curves into the plan, with the pauses where they begin; misses: of the given points."""
-        at = {
+        events = {
             round(float(route.ends[number_of_curve[k]]), 6): self.pauses[k] for k in self.pauses if k in number_of_curve
         }
         for curve in curves:
             path_ = way_of(curve)
-            for kind, value in at.pop(round(float(path_.s[0]), 6), ()):
+            for kind, value in events.pop(round(float(path_.s[0]), 6), ()):
                 self.emit_event(kind, value)
-            self.plan.along(len(self.stretches), curve, self.plan.length)
+            self.plan.note_stretch(len(self.stretches), curve, self.plan.length)
             self.stretches.append(curve)
             self.q = curve.end
-        _measure(self.plan, route, ways_of(curves), misses)
+        _note_deviation(self.plan, route, ways_of(curves), misses)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
@@ -300,75 +298,77 @@ class Walk:
         if self.opening:  # the path begins here, and what leads here is none of its moves
             self.begun, self.opening = goal, False
         else:
-            one = straight(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
-            self.stretches += [one] if one.duration > 0 else []
+            stretch = straight_move(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
+            self.stretches += [stretch] if stretch.duration > 0 else []
         self.q = goal
 
 
-def _curves(
+def _timed_curves(
     arm: Arm, pace: Pace, route: Route, s: Array, run: Run, near: Array, fixed: Array | None
 ) -> tuple[list[Curve | Smoothed], Missed]:
     """A run in time, and what it misses of given points: a route fitted to them leaves it little tolerance."""
     if not len(route.given_points[0]):
-        return stretches(arm, route, s, run, near, pace, fixed=fixed), None
+        return run_stretches(arm, route, s, run, near, pace, fixed=fixed), None
     for share in PLAN:
         tight = replace(pace, tolerance=share * pace.tolerance)
-        made = stretches(arm, route, s, run, near, tight, fixed=fixed)
-        given = largest_miss(arm, route, ways_of(made))
-        off = 0.0 if given is None else given[0]
-        if off <= pace.tolerance:
-            return made, given
+        made = run_stretches(arm, route, s, run, near, tight, fixed=fixed)
+        misses = largest_miss(arm, route, ways_of(made))
+        largest = 0.0 if misses is None else misses[0]
+        if largest <= pace.tolerance:
+            return made, misses
     raise NoSolutionError(
-        f"a given point would lie {off:.4f} mm off the motion, tolerance {pace.tolerance:g} mm: give a larger "
+        f"a given point would lie {largest:.4f} mm off the motion, tolerance {pace.tolerance:g} mm: give a larger "
         "tolerance, or fewer points at a time; nothing was moved",
-        deviation_mm=off,
+        deviation_mm=largest,
         tolerance_mm=pace.tolerance,
     )
 
 
-def _measure(plan: PathPlan, route: Route, path: Knots, misses: Missed) -> None:
+def _note_deviation(plan: PathPlan, route: Route, path: Knots, misses: Missed) -> None:
     """Note how far a curve leaves the route, or given points, and how near it comes to a singularity."""
-    off = route.largest_detour + deviation(plan.arm, route, path) if misses is None else misses[0]
-    if misses is not None and off > plan.deviation:
+    deviation_mm = route.largest_detour + route_deviation(plan.arm, route, path) if misses is None else misses[0]
+    if misses is not None and deviation_mm > plan.deviation:
         plan.rounded_most = plan.length + misses[1]
-    plan.deviation = max(plan.deviation, off)
-    plan.nearer_singularity(path.q, path.s)
+    plan.deviation = max(plan.deviation, deviation_mm)
+    plan.note_singularity(path.q, path.s)
 
 
-def _reached(walk: Walk, goal: Spot, branch: str | None) -> Array:
+def _nearest_posture(walk: Walk, goal: Spot, branch: str | None) -> Array:
     """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
     return _postures(walk, goal, branch)[0]
 
 
 def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
     """Joint values of a target on all branches within limits, or on the named one, the nearest first."""
-    found = ik(walk.arm, path_pieces.line(walk.task, goal, goal).targets(np.zeros(1))[0], walk.task.name, near=walk.q)
-    meant = find(found.names, wanted) if (wanted := branch or walk.options.branch) else None
-    free = found.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
-    good = found.valid & found.within_limits & (True if free is None else free)
-    postures = tuple(found.q[b] for b in found.order if good[b] and (meant is None or found.branch[b] in meant))
+    target = path_pieces.line(walk.task, goal, goal).targets(np.zeros(1))[0]
+    solutions = ik(walk.arm, target, walk.task.name, near=walk.q)
+    numbers = find(solutions.names, branches) if (branches := branch or walk.options.branch) else None
+    free = solutions.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
+    good = solutions.valid & solutions.within_limits & (True if free is None else free)
+    named = [b for b in solutions.order if numbers is None or solutions.branch[b] in numbers]
+    postures = tuple(solutions.q[b] for b in named if good[b])
     if not postures:
-        raise _no_posture(found, goal, wanted, free)
+        raise _no_posture(solutions, goal, branches, free)
     return postures
 
 
 def _no_posture(solutions: Solutions, goal: Spot, branches: str | None, free: Bool | None) -> NoSolutionError:
     """Why a target has none: it is out of reach, or of its `branches` none is free or within limits."""
-    what = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
+    point = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
     if solutions.status == Status.UNREACHABLE:
-        return NoSolutionError(f"{what} is out of reach: nothing was moved")
-    on = f" on branch '{branches}'" if branches else ""
+        return NoSolutionError(f"{point} is out of reach: nothing was moved")
+    on_branch = f" on branch '{branches}'" if branches else ""
     if free is not None and (solutions.within_limits & ~free).any():
-        return NoSolutionError(f"{what} has no solution{on} that hits nothing: nothing was moved")
-    return NoSolutionError(f"{what} has no solution within the limits{on}: nothing was moved")
+        return NoSolutionError(f"{point} has no solution{on_branch} that hits nothing: nothing was moved")
+    return NoSolutionError(f"{point} has no solution within the limits{on_branch}: nothing was moved")
 
 
-def _copied_state(state: dict[str, Any]) -> dict[str, Any]:
+def _copy_state(state: dict[str, Any]) -> dict[str, Any]:
     """A state whose lists do not change with the original's."""
-    return {key: copy(each) if isinstance(each, list | dict | ReducedBlends) else each for key, each in state.items()}
+    return {key: copy(v) if isinstance(v, list | dict | ReducedBlends) else v for key, v in state.items()}
 
 
-def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:
+def _task_or_none(arm: Arm, file: PathFile, name: str | None) -> Task | None:
     """What targets prescribe; None: no task fits the arm, and joint moves alone need none."""
     try:
         return task_for(arm, name)
@@ -379,7 +379,7 @@ def _task(arm: Arm, file: PathFile, name: str | None) -> Task | None:
 
 
 @contextmanager
-def _of_key(file: PathFile, key: str) -> Iterator[None]:
+def _errors_of_key(file: PathFile, key: str) -> Iterator[None]:
     """Errors inside are said of a key of the file, if it has that."""
     try:
         yield
@@ -390,7 +390,7 @@ def _of_key(file: PathFile, key: str) -> Iterator[None]:
 
 
 @contextmanager
-def _of_moves(walk: Walk) -> Iterator[None]:
+def _errors_of_moves(walk: Walk) -> Iterator[None]:
     """Errors inside are said of the moves that a walk does then."""
     try:
         yield

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.motion.joint_moves import straight
+from armkin.motion.joint_moves import straight_move
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.profile import at_rest, trapezoid
@@ -33,21 +33,21 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stre
     if np.array_equal(stretch.start, stretch.end):
         if np.array_equal(pulses(arm, standing), pulses(arm, stretch.end)):
             return Straight(stretch.end, stretch.end, at_rest(max(left, 0.0)))  # a pause
-        return straight(arm, standing, stretch.end)
+        return straight_move(arm, standing, stretch.end)
     if isinstance(stretch, Straight) and stretch.law.is_trapezoid:
         share = max(1.0 - float(stretch.law.evaluate(np.array([begin]))[0]), 1e-9)
         # Whole steps make a short way another one for some joints: they keep to their own limits there.
-        fastest = straight(arm, standing, stretch.end).law
+        fastest = straight_move(arm, standing, stretch.end).law
         top, accel = min(stretch.law.peak / share, fastest.peak), min(stretch.law.accel / share, fastest.accel)
         return Straight(standing, stretch.end, trapezoid(1.0, top, accel) if fastest.length else fastest)
     if left < _SHORT:
-        return straight(arm, standing, stretch.end)
-    s = _grid(stretch, begin)
+        return straight_move(arm, standing, stretch.end)
+    s = _grid_times(stretch, begin)
     path = Knots(s, stretch.evaluate(s), stretch.evaluate(s, 1))
     return Curve(path, _run_up(arm, path))
 
 
-def _grid(stretch: Stretch, begin: float) -> Array:
+def _grid_times(stretch: Stretch, begin: float) -> Array:
     """Times of the plan from `begin` to its end, 2 ms apart at most; where its acceleration jumps there is one."""
     jumps = stretch.times[stretch.times > begin + 1e-4] if isinstance(stretch, Curve) else np.array([stretch.duration])
     edges = np.concatenate([[begin], jumps])

@@ -16,7 +16,7 @@ from armkin.motion.joint_moves import check_rates
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
-from armkin.motion.timing.time_optimal import Bounds, optimal
+from armkin.motion.timing.time_optimal import Bounds, optimal_law
 from armkin.motion.timing.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -58,16 +58,16 @@ def round_waypoints(
     first = np.asarray(start, dtype=float)
     if len(corners) < 2:
         return Trajectory(arm, first, ())
-    path = _scaled(_grid(corners, blend), unit)
+    path = _scale_joints(_rounded_way(corners, blend), unit)
     cap = np.full(len(path.s), np.inf)
     if hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
         cap = hold_cap(arm, path, hold)
     bounds = Bounds(arm.max_speed * speed, arm.max_accel * accel, cap)
-    x = optimal(path, bounds, coupled_motors(arm, accel))
+    x = optimal_law(path, bounds, coupled_motors(arm, accel))
     return Trajectory(arm, first, (Curve(path, x, len(goals)),))
 
 
-def _grid(corners: Array, blend: float) -> Knots:
+def _rounded_way(corners: Array, blend: float) -> Knots:
     """The way with a point of the grid every so often; corners (w, n) no two of which are the same."""
     side = np.diff(corners, axis=0)
     length = np.linalg.norm(side, axis=1)
@@ -75,26 +75,26 @@ def _grid(corners: Array, blend: float) -> Knots:
     cut = np.concatenate([[0.0], np.minimum(blend, np.minimum(length[:-1], length[1:]) / 2), [0.0]])
     q, d, s = [corners[:1]], [way[:1]], [np.zeros(1)]
     f = np.linspace(0.0, 1.0, _NODES + 1)[1:, None]
-    at = 0.0
+    length_before = 0.0
     for k in range(len(side)):
         a = corners[k] + cut[k] * way[k]
         straight = length[k] - cut[k] - cut[k + 1]
         if straight > 1e-9 * length[k]:
             q.append(a + f * straight * way[k])
             d.append(np.repeat(way[k : k + 1], _NODES, axis=0))
-            s.append(at + f[:, 0] * straight)
-            at += straight
+            s.append(length_before + f[:, 0] * straight)
+            length_before += straight
         if k + 1 < len(side):  # a parabola: from the one side to the other, its tangents the sides
             r = cut[k + 1]
             begin, corner = corners[k + 1] - r * way[k], corners[k + 1]
             end = corner + r * way[k + 1]
             q.append((1 - f) ** 2 * begin + 2 * f * (1 - f) * corner + f**2 * end)
             d.append((1 - f) * way[k] + f * way[k + 1])
-            s.append(at + 2 * r * f[:, 0])
-            at += 2 * r
+            s.append(length_before + 2 * r * f[:, 0])
+            length_before += 2 * r
     return Knots(np.concatenate(s), np.concatenate(q), np.concatenate(d))
 
 
-def _scaled(path: Knots, unit: Array) -> Knots:
+def _scale_joints(path: Knots, unit: Array) -> Knots:
     """The same in [rad | mm]."""
     return Knots(path.s, path.q * unit, path.d * unit)

@@ -14,8 +14,8 @@ from armkin.motion.branches.branch_path import coupled_motors
 from armkin.motion.joint_moves import check_rates
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
-from armkin.motion.timing.limit_jerk import Smoothed, window
-from armkin.motion.timing.time_optimal import Bounds, finer, knots, optimal
+from armkin.motion.timing.limit_jerk import Smoothed, smoothing_window
+from armkin.motion.timing.time_optimal import Bounds, knots_of_samples, optimal_law, refine_knots
 from armkin.motion.timing.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def time_law(
         raise UsageError(f"a way has samples (N, {arm.n}), N at least 5, and s (N,); got {values.shape}, {way.shape}")
     if not (np.isfinite(values).all() and np.isfinite(way).all() and (np.diff(way) > 0).all()):
         raise UsageError("samples must be finite, and s must increase from each to the next")
-    path = finer(knots(way, values))
+    path = refine_knots(knots_of_samples(way, values))
     cap = np.full(len(path.s), np.inf)
     if tool_speed is not None:
         tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
@@ -76,8 +76,8 @@ def time_law(
     if hold is not None:
         cap = np.minimum(cap, hold_cap(arm, path, hold))
     limits: Array = arm.max_accel * accel
-    curve = Curve(path, optimal(path, Bounds(arm.max_speed * speed, limits, cap), coupled_motors(arm, accel)))
+    curve = Curve(path, optimal_law(path, Bounds(arm.max_speed * speed, limits, cap), coupled_motors(arm, accel)))
     made: Curve | Smoothed = curve
     if jerk is not None:
-        made = Smoothed(curve, window(limits, jerk))
+        made = Smoothed(curve, smoothing_window(limits, jerk))
     return Trajectory(arm, values[0], (made,))

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.forward import position
 from armkin.model import units
-from armkin.motion.branch_report import closeness
+from armkin.motion.branch_report import deviation_text
 from armkin.plot.canvas import flat, picture, space, true_proportions
 from armkin.view.skeleton import skeleton
 
@@ -36,7 +36,7 @@ def plot_path(plan: PathPlan, out: str) -> None:
     with picture(out, 11.5, 7.2) as figure:
         figure.text(0.03, 0.975, _title(plan), fontsize=11, va="top")
         figure.text(0.03, 0.94, _names(plan), fontsize=9, va="top")
-        figure.text(0.03, 0.915, "\n".join([closeness(plan), *_passes(plan)]), fontsize=9, va="top")
+        figure.text(0.03, 0.915, "\n".join([deviation_text(plan), *_passes(plan)]), fontsize=9, va="top")
         _in_space(plan, figure, q)
         rows = [figure.add_axes((0.60, bottom, 0.37, 0.185)) for bottom in (0.735, 0.51, 0.285, 0.06)]
         _joints(plan, rows[0], t, q)

@@ -48,9 +48,9 @@ def path_of(targets: Any) -> PathFile | None:
 
 def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
     """The task, and the targets of each way that one branch is to carry."""
-    from armkin.motion.path_outline import routes
+    from armkin.motion.path_outline import route_targets
 
-    task, found = routes(arm, file, STEP * arm.reach)
+    task, found = route_targets(arm, file, STEP * arm.reach)
     return task, [np.asarray(each) for each in found]
 
 

@@ -91,10 +91,10 @@ def _obstacles(arm: Arm) -> list[float]:
 
 def jogs(arm: Arm) -> list[str]:
     """The axes that the tip may be jogged along: none where no task fits."""
-    from armkin.motion.jog_line import axes
+    from armkin.motion.jog_line import jog_axes
 
     try:
-        return list(axes(arm))
+        return list(jog_axes(arm))
     except UsageError:
         return []
 

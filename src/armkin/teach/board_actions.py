@@ -145,11 +145,11 @@ class BoardActions:
         if "axis" not in fields:
             joint = request_checks.index(fields, "joint", self.arm.n)
             return lambda machine: self._jog(machine, joint, percent)
-        from armkin.motion.jog_line import axes
+        from armkin.motion.jog_line import jog_axes
 
         axis, frame = request_checks.text(fields, "axis", 10), request_checks.text(fields, "frame", 10)
-        if axis not in axes(self.arm) or frame not in ("base", "tool"):
-            raise UsageError(f"axis, frame: expected one of {', '.join(axes(self.arm))}, and base or tool")
+        if axis not in jog_axes(self.arm) or frame not in ("base", "tool"):
+            raise UsageError(f"axis, frame: expected one of {', '.join(jog_axes(self.arm))}, and base or tool")
         tool: Frame = "tool" if frame == "tool" else "base"
         return lambda machine: self._jog_tip(machine, axis, tool, percent / 100)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.forward import fk
 from armkin.model import units
-from armkin.motion.plan.playback_times import times
+from armkin.motion.plan.playback_times import sample_times
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -24,7 +24,7 @@ def playback(arm: Arm, plan: PathPlan) -> dict[str, Any]:
     `approach_s`: of the joint move that comes before it, from where the arm stands to its start.
     """
     begins = [] if plan.trajectory is None else plan.trajectory.begins.tolist()
-    t, off = times(arm, plan, begins, SHOWN, MOST)
+    t, off = sample_times(arm, plan, begins, SHOWN, MOST)
     q = plan.q(t)
     with np.errstate(invalid="ignore"):
         shares = np.nan_to_num(np.abs(plan.qd(t)) / arm.max_speed)

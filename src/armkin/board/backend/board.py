@@ -24,7 +24,7 @@ from armkin.board.backend.motion_start import check_jog, jog_goal
 from armkin.board.backend.sent_positions import plan_targets
 from armkin.board.ports import BAUD, SIM, SerialPort, list_ports
 from armkin.errors import LinkError, UsageError
-from armkin.motion.joint_moves import rate_lines, straight
+from armkin.motion.joint_moves import rate_lines, straight_move
 from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import legal_with_same_pulses
 
@@ -217,7 +217,7 @@ class Board(ABC):
             counts = self.machine.counts()
             here = legal_with_same_pulses(arm, self.machine.joints())
             goal = jog_goal(arm, here, joint, rate * piece, refuse=left == seconds)
-            way = straight(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
+            way = straight_move(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
             if not way.duration:
                 return  # at its limit, or before a keep-out
             self.machine.run([self.lay(Trajectory(arm, way.start, (way,)), np.array(counts))])

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.motion_start import StartedTrajectory
-from armkin.motion.joint_moves import plan
-from armkin.motion.timing.trajectory import brake
+from armkin.motion.joint_moves import plan_joint_moves
+from armkin.motion.timing.trajectory import brake_share
 from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
@@ -46,11 +46,11 @@ class Job(StartedTrajectory):
 def plan_targets(arm: Arm, start: Sequence[int], targets: Array, speed: float) -> tuple[Trajectory, NDArray[np.int64]]:
     """Moves from counts through joint targets (w, n) [rad | mm], and the counts (motors,) where they start."""
     counts = np.asarray(start, dtype=np.int64)
-    return plan(arm, joints(arm, counts), targets, speed=speed), counts
+    return plan_joint_moves(arm, joints(arm, counts), targets, speed=speed), counts
 
 
 def braking_time(trajectory: Trajectory) -> float:
     """Seconds in which the whole motion is slowed down to a stop, within the joints' max_accel; gently on curves."""
     with np.errstate(invalid="ignore", divide="ignore"):
         needed = trajectory.top_speed / trajectory.arm.max_accel
-    return float(np.nanmax(needed, initial=0.0)) / min(map(brake, trajectory.stretches), default=1.0)
+    return float(np.nanmax(needed, initial=0.0)) / min(map(brake_share, trajectory.stretches), default=1.0)

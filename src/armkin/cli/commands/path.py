@@ -311,10 +311,10 @@ def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | Non
 
 def _answer(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
     """The answer as data."""
-    from armkin.motion.branch_report import answer
+    from armkin.motion.branch_report import plan_fields
 
     segments = None if laid is None else sum(one.segments for one in laid[plan.approach is not None :])
-    return {**render.head(plan.arm), **answer(plan), "segments": segments}
+    return {**render.head(plan.arm), **plan_fields(plan), "segments": segments}
 
 
 def _files(plan: PathPlan, out: str | None, plot: str | None) -> None:

@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Status
 from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Columns
-from armkin.motion.branches.joint_steps import change, chord_bound, levers, turns_of
+from armkin.motion.branches.joint_steps import chord_bound, joint_change, levers, whole_turns
 from armkin.motion.branches.linked_branches import ENDS
 
 if TYPE_CHECKING:
@@ -33,55 +33,55 @@ def through_boundaries(
 ) -> list[Chain]:
     """Chains, and those that more of them make where they meet; fixed: (n,) the posture at the start, or None."""
     s, end = columns.s, len(columns.s) - 1
-    found = chains = _one_of_each_pair(s, chains, tolerance)
+    joined = chains = _bridge_pairs(s, chains, tolerance)
     if not end:
-        return found
+        return joined
     postures = columns.q[0][columns.valid[0]] if fixed is None else fixed[None]
-    found = _added_once(found, [one for c in chains for one in _leaving(s, c, 0, postures, tolerance)])
-    for j in _inner(columns, chains):
+    joined = _add_new_chains(joined, [part for c in chains for part in _chains_from(s, c, 0, postures, tolerance)])
+    for j in _boundary_samples(columns, chains):
         postures = columns.q[j][columns.valid[j]]
-        to = [one for c in found for one in _arriving(s, c, j, postures, tolerance)]
-        # Beyond it, what was joined at one before it is what its last part was: `chains` has that.
-        on = [one for c in chains for one in _leaving(s, c, j, postures, tolerance)]
-        ways = (_joined(a, b) for a, b in product(to, on) if _are_consecutive(a, b))
-        found += islice(ways, max(_WAYS - len(found), 0))
+        arriving = [part for c in joined for part in _chains_to(s, c, j, postures, tolerance)]
+        # Beyond it, what was joined at a boundary before it is what its last part was: `chains` has that.
+        leaving = [part for c in chains for part in _chains_from(s, c, j, postures, tolerance)]
+        ways = (_join_chains(a, b) for a, b in product(arriving, leaving) if _are_consecutive(a, b))
+        joined += islice(ways, max(_WAYS - len(joined), 0))
     postures = columns.q[end][columns.valid[end]]
-    return _added_once(found, [one for c in found for one in _arriving(s, c, end, postures, tolerance)])
+    return _add_new_chains(joined, [part for c in joined for part in _chains_to(s, c, end, postures, tolerance)])
 
 
-def _inner(columns: Columns, chains: list[Chain]) -> list[int]:
+def _boundary_samples(columns: Columns, chains: list[Chain]) -> list[int]:
     """Samples between start and end on a boundary beside which a chain ends; none where they are many."""
-    ends = np.unique([at for c in chains for at in (c.first, c.last)])
+    ends = np.unique([sample for c in chains for sample in (c.first, c.last)])
     inner = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
     rows = [j for j in inner.tolist() if len(ends) and np.abs(columns.s[ends] - columns.s[j]).min() <= _NEAR]
     return rows if len(rows) <= _MOST else []
 
 
-def _added_once(chains: list[Chain], new_chains: list[Chain]) -> list[Chain]:
+def _add_new_chains(chains: list[Chain], new_chains: list[Chain]) -> list[Chain]:
     """Chains, and more that are not among them."""
     return chains + [c for c in new_chains if c not in chains]
 
 
-def _one_of_each_pair(s: Array, chains: list[Chain], tolerance: float) -> list[Chain]:
+def _bridge_pairs(s: Array, chains: list[Chain], tolerance: float) -> list[Chain]:
     """Chains, one of each two that are one way: where a wrist is straight exactly, its posture there is any.
 
     The first ends a few micrometres before it, the other one begins behind it, at nearly the same joint values.
     """
-    found = list(chains)
+    bridged = list(chains)
     for a in chains:
-        behind = [b for b in found if a.last < b.first and s[b.first] - s[a.last] <= _NEAR and len(b.q) > 1]
+        behind = [b for b in bridged if a.last < b.first and s[b.first] - s[a.last] <= _NEAR and len(b.q) > 1]
         for b in behind[:_MOST] if len(a.q) > 1 else []:
-            step = change(a.arm, a.q[-1], b.q[0])
+            step = joint_change(a.arm, a.q[-1], b.q[0])
             if np.abs(step).max() > _ALIKE or float(chord_bound(levers(a.arm), step)) > tolerance:
                 continue
             share = (s[a.last + 1 : b.first + 1] - s[a.last]) / (s[b.first] - s[a.last])
             between = a.q[-1] + share[:, None] * step
             labels = np.concatenate([a.labels, np.repeat(b.labels[:1], len(share))])
-            found.append(_joined(Chain(a.arm, a.first, np.concatenate([a.q, between]), labels), b))
-    return found
+            bridged.append(_join_chains(Chain(a.arm, a.first, np.concatenate([a.q, between]), labels), b))
+    return bridged
 
 
-def _arriving(s: Array, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
+def _chains_to(s: Array, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
     """A chain as far as sample j: the part that leads there, or it and what is between it and a posture there."""
     if c.first < j <= c.last:
         return [c] if c.last == j else [Chain(c.arm, c.first, c.q[: j + 1 - c.first], c.labels[: j + 1 - c.first])]
@@ -90,19 +90,19 @@ def _arriving(s: Array, c: Chain, j: int, postures: Array, tolerance: float) -> 
         return []
     share = 1 - ((s[j] - s[c.last + 1 : j + 1]) / gap) ** 0.5  # joints leave a boundary as roots do
     made = []
-    for step in _steps(c, c.q[-1], postures, tolerance):
+    for step in _certified_steps(c, c.q[-1], postures, tolerance):
         labels = np.concatenate([c.labels, np.repeat(c.labels[-1:], j - c.last)])
         made.append(Chain(c.arm, c.first, np.concatenate([c.q, c.q[-1] + share[:, None] * step]), labels))
     return made
 
 
-def _leaving(s: Array, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
+def _chains_from(s: Array, c: Chain, j: int, postures: Array, tolerance: float) -> list[Chain]:
     """A chain from sample j on: that of the way back arrives there."""
     if c.first == j < c.last:
         return [c]
     N = len(s)
-    back = _arriving(-s[::-1], _reversed_chain(c, N), N - 1 - j, postures, tolerance)
-    return [_reversed_chain(one, N) for one in back]
+    back = _chains_to(-s[::-1], _reversed_chain(c, N), N - 1 - j, postures, tolerance)
+    return [_reversed_chain(part, N) for part in back]
 
 
 def _reversed_chain(c: Chain, N: int) -> Chain:
@@ -110,22 +110,22 @@ def _reversed_chain(c: Chain, N: int) -> Chain:
     return Chain(c.arm, N - 1 - c.last, c.q[::-1], c.labels[::-1])
 
 
-def _steps(c: Chain, q: Array, postures: Array, tolerance: float) -> list[Array]:
+def _certified_steps(c: Chain, q: Array, postures: Array, tolerance: float) -> list[Array]:
     """From a chain's end to the postures that are certified to be on the same way: (n,) each."""
     lever = levers(c.arm)
-    steps = [change(c.arm, q, posture) for posture in postures]
+    steps = [joint_change(c.arm, q, posture) for posture in postures]
     return [step for step in steps if float(chord_bound(lever, step)) <= tolerance]
 
 
 def _are_consecutive(a: Chain, b: Chain) -> bool:
     """Whether a chain begins where another ends, and is not its own continuation."""
-    step = change(a.arm, a.q[-1], b.q[0])
+    step = joint_change(a.arm, a.q[-1], b.q[0])
     same = np.shares_memory(a.q, b.q)  # parts of one chain
     return not same and float(np.abs(step).max()) < _SAME
 
 
-def _joined(a: Chain, b: Chain) -> Chain:
+def _join_chains(a: Chain, b: Chain) -> Chain:
     """One chain and then another that begins at its last sample."""
-    turns = np.where(a.arm.prismatic, 0.0, turns_of(a.arm))
-    offset = turns * np.rint((a.q[-1] - b.q[0]) / turns_of(a.arm))
+    turns = np.where(a.arm.prismatic, 0.0, whole_turns(a.arm))
+    offset = turns * np.rint((a.q[-1] - b.q[0]) / whole_turns(a.arm))
     return Chain(a.arm, a.first, np.concatenate([a.q, b.q[1:] + offset]), np.concatenate([a.labels, b.labels[1:]]))

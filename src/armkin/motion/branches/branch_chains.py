@@ -17,7 +17,7 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
 from armkin.motion.branches.branch_columns import Columns
-from armkin.motion.branches.joint_steps import turns_of
+from armkin.motion.branches.joint_steps import whole_turns
 from armkin.motion.branches.linked_branches import ENDS
 from armkin.motion.plan.trajectory_proof import hit_samples as motion_hits
 
@@ -52,9 +52,9 @@ class Chain:
 
         None: all are legal everywhere.
         """
-        out: list[tuple[Array, Int | None]] = []
+        copies: list[tuple[Array, Int | None]] = []
         least, most = self.extent
-        turns = turns_of(self.arm)
+        turns = whole_turns(self.arm)
         for j in range(self.arm.n):
             lower, upper, value = self.arm.lower[j] - SLACK, self.arm.upper[j] + SLACK, self.q[:, j]
             offsets, turn = np.zeros(1), turns[j]
@@ -67,15 +67,15 @@ class Chain:
                 offsets = turn * (middle + np.arange(-2, 3))
             legal = (least[j] + offsets >= lower) & (most[j] + offsets <= upper)
             if len(offsets) and legal.all():
-                out.append((offsets, None))
+                copies.append((offsets, None))
                 continue
             end = np.full((len(offsets), len(value)), len(value))
-            moved = value + offsets[~legal, None]
-            illegal = (moved < lower) | (moved > upper)
+            shifted = value + offsets[~legal, None]
+            illegal = (shifted < lower) | (shifted > upper)
             until = np.where(illegal, np.arange(len(value)), len(value))
             end[~legal] = np.minimum.accumulate(until[:, ::-1], axis=1)[:, ::-1]
-            out.append((offsets, end))
-        return out
+            copies.append((offsets, end))
+        return copies
 
     @cached_property
     def _joint_reach(self) -> Int:
@@ -100,10 +100,10 @@ class Chain:
         hit = motion_hits(self.arm, self.q)
         if hit is None or not hit.any():
             return None
-        at = np.where(hit, np.arange(len(hit)), len(hit))
-        return np.asarray(np.minimum.accumulate(at[::-1])[::-1])
+        samples = np.where(hit, np.arange(len(hit)), len(hit))
+        return np.asarray(np.minimum.accumulate(samples[::-1])[::-1])
 
-    def hits(self, i: int) -> bool:
+    def ends_by_hit(self, i: int) -> bool:
         """Whether a run from sample i ends because the arm hits something."""
         return self.hit_from is not None and self.hit_from[i - self.first] < self._joint_reach[i - self.first].min()
 
@@ -111,26 +111,26 @@ class Chain:
         """Last sample of a run from sample i, i - 1 if there is none."""
         return int(self.reach[i - self.first]) if self.first <= i <= self.last else i - 1
 
-    def stopper(self, i: int) -> int | None:
+    def limiting_joint(self, i: int) -> int | None:
         """The joint whose limit ends a run from sample i; None: the chain itself ends."""
         ends = self._joint_reach[i - self.first]
         return int(ends.argmin()) if ends.min() < len(self.q) else None
 
     def run(self, i: int, e: int, near: Array, fixed: Array | None = None) -> Array:
         """Joint values from sample i to e (e - i + 1, n), the legal copies nearest to `near` at i."""
-        offsets, turns = np.zeros(self.arm.n), turns_of(self.arm)
+        offsets, turns = np.zeros(self.arm.n), whole_turns(self.arm)
         for j, (choices, ends) in enumerate(self._copies):
-            here = self.q[i - self.first, j]
+            value = self.q[i - self.first, j]
             if not self.arm.prismatic[j] and not np.isfinite([self.arm.lower[j], self.arm.upper[j]]).any():
-                offsets[j] = turns[j] * np.rint((near[j] - here) / turns[j])
+                offsets[j] = turns[j] * np.rint((near[j] - value) / turns[j])
                 continue
             legal = choices if ends is None else choices[ends[:, i - self.first] > e - self.first]
             wanted = near[j] if fixed is None else fixed[j]
-            offsets[j] = legal[np.abs(here + legal - wanted).argmin()]
+            offsets[j] = legal[np.abs(value + legal - wanted).argmin()]
         return np.asarray(self.q[i - self.first : e - self.first + 1] + offsets)
 
 
-def chains(arm: Arm, columns: Columns) -> list[Chain]:
+def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
     """All chains of linked columns."""
     N, B = columns.q.shape[:2]
     valid = columns.valid
@@ -151,10 +151,10 @@ def chains(arm: Arm, columns: Columns) -> list[Chain]:
         open_ = {int(b): going.get(int(b), []) for b in np.flatnonzero(valid[event + 1])}
         begin = event + 1
     done += list(open_.values())
-    return [_assembled(arm, columns, blocks) for blocks in done]
+    return [_assemble_chain(arm, columns, blocks) for blocks in done]
 
 
-def _assembled(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -> Chain:
+def _assemble_chain(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -> Chain:
     size = blocks[-1][1] + 1 - blocks[0][0]
     # one joint after another in memory: whatever is asked of a chain is asked of its joints
     q = np.concatenate([columns.q[a : b + 1, c].T for a, b, c in blocks], axis=1, out=np.empty((arm.n, size))).T
@@ -162,7 +162,7 @@ def _assembled(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -
     made = Chain(arm, blocks[0][0], q, labels.astype(np.intp))
     least, most = made.extent
     for j in np.flatnonzero(~arm.prismatic & (most - least > np.pi)):  # principal values may jump by a turn
-        turn = turns_of(arm)[j]
+        turn = whole_turns(arm)[j]
         turns = np.rint(np.diff(q[:, j]) / turn)
         if turns.any():
             q[1:, j] -= turn * np.cumsum(turns)
@@ -179,14 +179,14 @@ class Run:
     last: int
 
 
-def fewest(chains: list[Chain], N: int, allowed: list[Chain] | None = None) -> list[Run]:
+def fewest_runs(chains: list[Chain], N: int, allowed: list[Chain] | None = None) -> list[Run]:
     """Runs one after another, each carrying as far as any can; a gap where nothing carries.
 
     allowed: the chains that may begin (those at the start's branch). Of runs that carry equally far the one with
     the least motion: the sum over the samples of the greatest |dq| / max_speed.
     """
     runs: list[Run] = []
-    i, alive = 0, _alive(chains, N)
+    i, alive = 0, _possible_starts(chains, N)
     while i < N:
         choices = allowed if allowed is not None and not runs and i == 0 else chains
         far = max((chain.carries(i) for chain in choices), default=i - 1)
@@ -200,7 +200,7 @@ def fewest(chains: list[Chain], N: int, allowed: list[Chain] | None = None) -> l
     return runs
 
 
-def _alive(chains: list[Chain], N: int) -> Bool:
+def _possible_starts(chains: list[Chain], N: int) -> Bool:
     """Samples at which some run may begin, and the end: (N + 1,)."""
     alive = np.zeros(N + 1, bool)
     alive[N] = True
@@ -231,16 +231,16 @@ def why_ended(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, 
     e = chain.carries(i)
     beyond = min(max(e + 1, 0), len(columns.s) - 1)
     status = Status(int(columns.status[beyond])).name.lower()
-    if chain.hits(i):
+    if chain.ends_by_hit(i):
         return "hit", None, None, status
-    joint = chain.stopper(i)
+    joint = chain.limiting_joint(i)
     arm = chain.arm
     if joint is not None:
-        at = min(max(e + 1, chain.first), chain.last) - chain.first
+        index = min(max(e + 1, chain.first), chain.last) - chain.first
         # Over or under: compare the copy that carried farthest
         q = chain.run(i, e, arm.home)[-1] if e >= i else chain.q[max(i - chain.first, 0)]
-        there = q[joint] + chain.q[at, joint] - chain.q[max(at - 1, 0), joint]
-        upper = abs(there - arm.upper[joint]) < abs(there - arm.lower[joint])
+        value_beyond = q[joint] + chain.q[index, joint] - chain.q[max(index - 1, 0), joint]
+        upper = abs(value_beyond - arm.upper[joint]) < abs(value_beyond - arm.lower[joint])
         limit = float(arm.upper[joint] if upper else arm.lower[joint])
         return "limit", joint, limit, status
     if beyond == e:

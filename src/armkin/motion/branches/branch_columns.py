@@ -17,7 +17,7 @@ from armkin.inverse.solve import isolated as ik
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.arm import actual
 from armkin.model.limits import outside
-from armkin.motion.branches.joint_steps import change
+from armkin.motion.branches.joint_steps import joint_change
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -45,38 +45,38 @@ class Columns:
         """Where a branch is: (N, B)."""
         return np.asarray(~np.isnan(self.q[:, :, 0]))
 
-    def rows(self, rows: Int) -> Columns:
+    def take_rows(self, rows: Int) -> Columns:
         """Some samples, without their links."""
         parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within_limits[rows])
         return Columns(*parts, self.names, self.complete)
 
-    def wider(self, B: int) -> Columns:
+    def padded_to(self, B: int) -> Columns:
         """The same with B columns of branches at least."""
         return Columns(
             self.s,
-            _widened(self.q, B),
-            _widened(self.name, B, -1),
+            _pad(self.q, B),
+            _pad(self.name, B, -1),
             self.status,
-            _widened(self.within_limits, B, 0),
+            _pad(self.within_limits, B, 0),
             self.names,
             self.complete,
-            _widened(self.partner, B, -1),
+            _pad(self.partner, B, -1),
         )
 
-    def inserted(self, rows: Int, new: Columns) -> Columns:
+    def insert_rows(self, rows: Int, new: Columns) -> Columns:
         """These samples with others before the rows `rows`; the links of both stay, as far as they have any."""
         B = max(self.q.shape[1], new.q.shape[1])
-        old, new = self.wider(B), new.wider(B)
+        wide, new = self.padded_to(B), new.padded_to(B)
         links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
         return Columns(
-            np.insert(old.s, rows, new.s),
-            np.insert(old.q, rows, new.q, axis=0),
-            np.insert(old.name, rows, new.name, axis=0),
-            np.insert(old.status, rows, new.status),
-            np.insert(old.within_limits, rows, new.within_limits, axis=0),
-            old.names,
-            old.complete and new.complete,
-            np.insert(old.partner, rows, links, axis=0),
+            np.insert(wide.s, rows, new.s),
+            np.insert(wide.q, rows, new.q, axis=0),
+            np.insert(wide.name, rows, new.name, axis=0),
+            np.insert(wide.status, rows, new.status),
+            np.insert(wide.within_limits, rows, new.within_limits, axis=0),
+            wide.names,
+            wide.complete and new.complete,
+            np.insert(wide.partner, rows, links, axis=0),
         )
 
 
@@ -91,40 +91,43 @@ class Samples:
     length: float
     stays: bool = False  # whether all of the route is singular: free joints then stay
 
-    def first(self, s: Array) -> Columns:
+    def solve_first(self, s: Array) -> Columns:
         """All branches at the first samples (N,), increasing.
 
         From a singular posture on, where all may be dear to examine, a few of them are solved first: between two that
         are out of reach nobody looks.
         """
-        if len(s) <= 2 * _APART or self.solved(s[:1]).status[0] != Status.SINGULAR:
-            return self.solved(s)
-        few = np.append(np.arange(0, len(s) - 1, _APART), len(s) - 1)
-        found = self.solved(s[few])
-        if (found.status == Status.SINGULAR).all():
+        if len(s) <= 2 * _APART or self.solve_at(s[:1]).status[0] != Status.SINGULAR:
+            return self.solve_at(s)
+        sparse = np.append(np.arange(0, len(s) - 1, _APART), len(s) - 1)
+        sampled = self.solve_at(s[sparse])
+        if (sampled.status == Status.SINGULAR).all():
             self.stays = True
-            return self.solved(s)
-        out = found.status == Status.UNREACHABLE
-        between = np.setdiff1d(np.arange(len(s)), few)
-        nobody = (out[:-1] & out[1:])[np.searchsorted(few, between) - 1]
-        parts = [found]
-        if not nobody.all():
-            parts.append(self.solved(s[between[~nobody]]))
-        if nobody.any():
-            empty, none = found.rows(np.flatnonzero(out)[[0] * int(nobody.sum())]), s[between[nobody]]
-            parts.append(replace(empty, s=none))
-        whole = _concatenated(parts)
-        return whole.rows(np.argsort(whole.s, kind="stable"))
+            return self.solve_at(s)
+        unreachable = sampled.status == Status.UNREACHABLE
+        between = np.setdiff1d(np.arange(len(s)), sparse)
+        unsolved = (unreachable[:-1] & unreachable[1:])[np.searchsorted(sparse, between) - 1]
+        parts = [sampled]
+        if not unsolved.all():
+            parts.append(self.solve_at(s[between[~unsolved]]))
+        if unsolved.any():
+            empty, lengths = (
+                sampled.take_rows(np.flatnonzero(unreachable)[[0] * int(unsolved.sum())]),
+                s[between[unsolved]],
+            )
+            parts.append(replace(empty, s=lengths))
+        columns = _concatenate(parts)
+        return columns.take_rows(np.argsort(columns.s, kind="stable"))
 
-    def solved(self, s: Array, examine: bool = True) -> Columns:
+    def solve_at(self, s: Array, examine: bool = True) -> Columns:
         """All branches at samples, not linked yet; of very many in parts, to bound the memory that takes."""
-        parts = [self._part(s[k : k + _BLOCK], examine) for k in range(0, len(s), _BLOCK)]
-        return parts[0] if len(parts) == 1 else _concatenated(parts)
+        parts = [self._solve_block(s[k : k + _BLOCK], examine) for k in range(0, len(s), _BLOCK)]
+        return parts[0] if len(parts) == 1 else _concatenate(parts)
 
-    def _part(self, s: Array, examine: bool) -> Columns:
-        found = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
-        q, name, within = found.q, found.branch.astype(np.int16), found.within_limits
-        singular = np.flatnonzero(found.status == Status.SINGULAR)
+    def _solve_block(self, s: Array, examine: bool) -> Columns:
+        solutions = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
+        q, name, within = solutions.q, solutions.branch.astype(np.int16), solutions.within_limits
+        singular = np.flatnonzero(solutions.status == Status.SINGULAR)
         if len(singular):
             # Exactly on a singularity some joints are free: 1e-7 of the path's length beside it they are determined.
             aside = np.clip(s[singular] + 1e-7 * self.length, 0.0, self.length)
@@ -133,35 +136,35 @@ class Samples:
             # Where there is nothing beside it, a stretched arm's wrist for example, the posture there stays.
             good = (beside.status != Status.SINGULAR) & beside.valid.any(axis=1)
             B = max(q.shape[1], beside.q.shape[1])
-            q, name, within = _widened(q, B).copy(), _widened(name, B, -1).copy(), _widened(within, B, 0).copy()
-            within[singular[good]] = _widened(beside.within_limits, B, 0)[good]
-            q[singular[good]] = _widened(beside.q, B)[good]
-            name[singular[good]] = _widened(beside.branch.astype(np.int16), B, -1)[good]
+            q, name, within = _pad(q, B).copy(), _pad(name, B, -1).copy(), _pad(within, B, 0).copy()
+            within[singular[good]] = _pad(beside.within_limits, B, 0)[good]
+            q[singular[good]] = _pad(beside.q, B)[good]
+            name[singular[good]] = _pad(beside.branch.astype(np.int16), B, -1)[good]
             if self.stays and len(stay := singular[~good]):
-                q[stay] = self._staying(q[stay], self.targets(s[stay]), found.free[stay], within[stay])
-        return _in_columns(found, s, q, name, within)
+                q[stay] = self._hold_free_joints(q[stay], self.targets(s[stay]), solutions.free[stay], within[stay])
+        return _columns_by_name(solutions, s, q, name, within)
 
-    def _staying(self, q: Array, target: Array, free: Bool, within_limits: Bool) -> Array:
+    def _hold_free_joints(self, q: Array, target: Array, free: Bool, within_limits: Bool) -> Array:
         """Singular postures (M, B, n) with their free joints (M, n) as near as they can be to where the arm stands."""
         rows, b = np.nonzero(~np.isnan(q[:, :, 0]) & within_limits)
         if not len(rows):
             return q
         arm, task = self.arm, task_for(self.arm, self.task)
         start, loose = q[rows, b], free[rows]
-        there, miss = correct(
+        postures, miss = correct(
             actual(arm), task, np.where(loose, self.near, start) * arm.ratio, target[rows], steps=_STEPS
         )
-        there /= arm.ratio
-        same = np.where(loose, 0.0, np.abs(change(arm, start, there))).max(axis=1) < _STAYS
-        good = same & (miss <= CONVERGING) & ~outside(arm, there).any(axis=1)
-        q[rows[good], b[good]] = there[good]
+        postures /= arm.ratio
+        same = np.where(loose, 0.0, np.abs(joint_change(arm, start, postures))).max(axis=1) < _STAYS
+        good = same & (miss <= CONVERGING) & ~outside(arm, postures).any(axis=1)
+        q[rows[good], b[good]] = postures[good]
         return q
 
 
-def _concatenated(parts: list[Columns]) -> Columns:
+def _concatenate(parts: list[Columns]) -> Columns:
     """Samples of all the parts, one part after another."""
     B = max(part.q.shape[1] for part in parts)
-    wide = [part.wider(B) for part in parts]
+    wide = [part.padded_to(B) for part in parts]
     return Columns(
         np.concatenate([part.s for part in wide]),
         np.concatenate([part.q for part in wide]),
@@ -173,29 +176,29 @@ def _concatenated(parts: list[Columns]) -> Columns:
     )
 
 
-def _in_columns(solutions: Solutions, s: Array, q: Array, name: NDArray[np.int16], within_limits: Bool) -> Columns:
+def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.int16], within_limits: Bool) -> Columns:
     """Rows of solutions with every named branch in the column of its number."""
     B = q.shape[1]
     wide = max(B, int(name.max(initial=-1)) + 1)
     status, complete = solutions.status.astype(np.int8), bool(np.all(solutions.complete))
-    moved = np.flatnonzero(((name >= 0) & (name != np.arange(B))).any(axis=1))
-    q, name, within_limits = (_widened(x, wide, fill) for x, fill in ((q, np.nan), (name, -1), (within_limits, 0)))
-    if len(moved):
+    misplaced = np.flatnonzero(((name >= 0) & (name != np.arange(B))).any(axis=1))
+    q, name, within_limits = (_pad(x, wide, fill) for x, fill in ((q, np.nan), (name, -1), (within_limits, 0)))
+    if len(misplaced):
         q, name, within_limits = q.copy(), name.copy(), within_limits.copy()
-        old_q, old_name, old_within = q[moved], name[moved], within_limits[moved]
-        q[moved], name[moved], within_limits[moved] = np.nan, -1, False
+        old_q, old_name, old_within = q[misplaced], name[misplaced], within_limits[misplaced]
+        q[misplaced], name[misplaced], within_limits[misplaced] = np.nan, -1, False
         row, column = np.nonzero((old_name >= 0) & ~np.isnan(old_q[:, :, 0]))
         place = old_name[row, column]
-        q[moved[row], place] = old_q[row, column]
-        name[moved[row], place] = place
-        within_limits[moved[row], place] = old_within[row, column]
+        q[misplaced[row], place] = old_q[row, column]
+        name[misplaced[row], place] = place
+        within_limits[misplaced[row], place] = old_within[row, column]
     return Columns(s, q, name, status, within_limits, solutions.names, complete)
 
 
-def _widened(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]
+def _pad(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]
     """The same with B columns on axis 1."""
     missing = B - values.shape[1]
     if missing <= 0:
         return values
-    more = np.full((values.shape[0], missing, *values.shape[2:]), fill, values.dtype)
-    return np.concatenate([values, more], axis=1)
+    padding = np.full((values.shape[0], missing, *values.shape[2:]), fill, values.dtype)
+    return np.concatenate([values, padding], axis=1)

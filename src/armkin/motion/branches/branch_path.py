@@ -16,18 +16,18 @@ from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find
 from armkin.motion.branches.boundary_chains import through_boundaries
-from armkin.motion.branches.branch_chains import Chain, Run, chains, fewest
+from armkin.motion.branches.branch_chains import Chain, Run, chains_of_columns, fewest_runs
 from armkin.motion.branches.branch_columns import Columns
-from armkin.motion.branches.joint_steps import change
+from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.branches.linked_branches import ENDS, link_branches
-from armkin.motion.branches.route_grid import Way, fine_enough
+from armkin.motion.branches.route_grid import Way, refine_grid
 from armkin.motion.branches.wrist_turn import ASIDE, has_wrist, through_wrists
 from armkin.motion.branches.wrist_window import with_detours
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
-from armkin.motion.timing.limit_jerk import Smoothed, window
-from armkin.motion.timing.time_optimal import Bounds, finer, optimal
+from armkin.motion.timing.limit_jerk import Smoothed, smoothing_window
+from armkin.motion.timing.time_optimal import Bounds, optimal_law, refine_knots
 from armkin.motion.tool_path.route import Route
 from armkin.motors import motor_accel
 
@@ -78,20 +78,20 @@ class CarriedRoute:
         return all(s[b.first] - s[a.last] <= ENDS for a, b in pairwise(self.runs))
 
     @property
-    def moving(self) -> list[Run]:
+    def moving_runs(self) -> list[Run]:
         """The runs that lead anywhere."""
         s = self.columns.s
         return self.runs if self.whole else [run for run in self.runs if s[run.last] - s[run.first] > ENDS]
 
 
-def samples(route: Route, count: int | None = None) -> Array:
+def route_samples(route: Route, count: int | None = None) -> Array:
     """Where a route is solved first: evenly, and at the ends of its pieces."""
     number = count or int(max(np.clip(np.ceil(route.length / _STEP), *_SAMPLES), route.length / _FARTHEST))
     even = np.linspace(0.0, route.length, max(number, 2))
     return np.asarray(_well_separated(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
 
 
-def carry(
+def carry_route(
     arm: Arm,
     route: Route,
     *,
@@ -108,24 +108,24 @@ def carry(
     of the branch to start on. Raises UsageError, which lists the names, if there is no branch of that name.
     """
     name = route.task.name
-    columns = link_branches(arm, route.targets, samples(route, count), task=name, tolerance=tolerance, near=near)
-    all_ = chains(arm, columns)
-    all_ = through_boundaries(arm, columns, all_, fixed, tolerance)
+    columns = link_branches(arm, route.targets, route_samples(route, count), task=name, tolerance=tolerance, near=near)
+    every_chain = chains_of_columns(arm, columns)
+    every_chain = through_boundaries(arm, columns, every_chain, fixed, tolerance)
     if route.task.orientation == "full" and has_wrist(arm):
         aside = 0.0 if len(route.given_points[0]) else ASIDE * tolerance  # a curve of points has little tolerance left
-        all_ = through_wrists(arm, route, columns, all_, pace.turn, aside)
-    starts = _starts(arm, all_, fixed)
+        every_chain = through_wrists(arm, route, columns, every_chain, pace.turn, aside)
+    starts = _start_chains(arm, every_chain, fixed)
     if branch is not None:
-        wanted = find(columns.names, branch)
-        starts = [c for c in starts if c.labels[0] in wanted]
+        labels = find(columns.names, branch)
+        starts = [c for c in starts if c.labels[0] in labels]
     end = len(columns.s) - 1
     complete = [Run(c, 0, end) for c in starts if c.carries(0) == end]
     if len(complete) > 1:
-        complete = [_fastest(arm, route, columns.s, complete, near, pace, fixed)]
-    return CarriedRoute(route, columns, all_, complete or fewest(all_, end + 1, starts))
+        complete = [_fastest_run(arm, route, columns.s, complete, near, pace, fixed)]
+    return CarriedRoute(route, columns, every_chain, complete or fewest_runs(every_chain, end + 1, starts))
 
 
-def _starts(arm: Arm, chains: list[Chain], fixed: Array | None) -> list[Chain]:
+def _start_chains(arm: Arm, chains: list[Chain], fixed: Array | None) -> list[Chain]:
     """The chains that may begin a route; fixed: (n,) where the arm stands, if it has no choice."""
     starts = [c for c in chains if c.first == 0]
     if fixed is None:
@@ -136,32 +136,34 @@ def _starts(arm: Arm, chains: list[Chain], fixed: Array | None) -> list[Chain]:
 
 def starts_at(chain: Chain, q: Array) -> bool:
     """Whether a chain begins in a posture (n,), whole turns apart."""
-    return float(np.abs(change(chain.arm, chain.q[0], q)).max()) < 1e-4
+    return float(np.abs(joint_change(chain.arm, chain.q[0], q)).max()) < 1e-4
 
 
-def _fastest(arm: Arm, route: Route, s: Array, runs: list[Run], near: Array, pace: Pace, fixed: Array | None) -> Run:
+def _fastest_run(
+    arm: Arm, route: Route, s: Array, runs: list[Run], near: Array, pace: Pace, fixed: Array | None
+) -> Run:
     """Of runs that take nearly the least time the one that is soonest begun; of equals the first."""
-    seconds = np.array([_seconds(arm, route, s, run, near, pace) for run in runs])
+    seconds = np.array([_run_time(arm, route, s, run, near, pace) for run in runs])
     return min(
         (run for run, t in zip(runs, seconds, strict=True) if t <= seconds.min() * 1.0005),
-        key=lambda run: _approach(run, near, fixed),
+        key=lambda run: _approach_time(run, near, fixed),
     )
 
 
-def _approach(run: Run, near: Array, fixed: Array | None) -> float:
+def _approach_time(run: Run, near: Array, fixed: Array | None) -> float:
     """How far the joints are from where the arm comes from, in seconds at least."""
     speed = np.where(np.isnan(run.chain.arm.max_speed), 1.0, run.chain.arm.max_speed)
     return float((np.abs(run.chain.run(0, run.last, near, fixed)[0] - near) / speed).max())
 
 
-def _seconds(arm: Arm, route: Route, s: Array, run: Run, near: Array, pace: Pace) -> float:
+def _run_time(arm: Arm, route: Route, s: Array, run: Run, near: Array, pace: Pace) -> float:
     """Time that a run takes for the whole route, on its own samples."""
     if np.isnan(arm.max_speed).any() or np.isnan(arm.max_accel).any():
         return float(np.abs(np.diff(run.chain.q, axis=0)).sum())
-    return sum(stretch.duration for stretch in stretches(arm, route, s, run, near, pace, grid=300))
+    return sum(stretch.duration for stretch in run_stretches(arm, route, s, run, near, pace, grid=300))
 
 
-def stretches(
+def run_stretches(
     arm: Arm,
     route: Route,
     s: Array,
@@ -179,23 +181,23 @@ def stretches(
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
     edges = [a for a, b in pairwise(edges) if b - a > 1e-9] + edges[-1:]
-    kept = None if grid < _GRID else pace.tolerance - route.largest_detour
+    allowed = None if grid < _GRID else pace.tolerance - route.largest_detour
     made: list[Curve | Smoothed] = []
-    for part in _groups(edges, s):
+    for part in _group_rests(edges, s):
         a, b, inner = part[0], part[-1], np.array(part[1:-1])
-        here = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
-        solved = len(s[here])  # a long way, of many turns for example, needs more points than a short one
+        samples = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
+        solved = len(s[samples])  # a long way, of many turns for example, needs more points than a short one
         number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
-        way = Way(route, s[here], q[here], a, b, run.chain.windows, inner)
-        path, off = fine_enough(arm, way, number, kept)
-        _check_kept(path, off + route.largest_detour, pace)
+        way = Way(route, s[samples], q[samples], a, b, run.chain.windows, inner)
+        path, deviations = refine_grid(arm, way, number, allowed)
+        _check_deviation(path, deviations + route.largest_detour, pace)
         if made:  # the stop is the same to the last digit
             path.q[0] = made[-1].end
-        made += _timed(arm, route, finer(path), pace)
+        made += _time_path(arm, route, refine_knots(path), pace)
     return made
 
 
-def _groups(edges: list[float], s: Array) -> list[list[float]]:
+def _group_rests(edges: list[float], s: Array) -> list[list[float]]:
     """Places of rest, from one to the next; where there are many, some together: between them all is independent."""
     if len(edges) <= _MANY:
         return [list(pair) for pair in pairwise(edges)]
@@ -203,7 +205,7 @@ def _groups(edges: list[float], s: Array) -> list[list[float]]:
     return [edges[a : b + 1] for a, b in pairwise([*first, len(edges) - 1])]
 
 
-def _check_kept(path: Knots, deviation: Array, pace: Pace) -> None:
+def _check_deviation(path: Knots, deviation: Array, pace: Pace) -> None:
     """Raise NoSolutionError where a grid's cubics may leave the path."""
     k = int(deviation.argmax())
     if deviation[k] > pace.tolerance:
@@ -213,16 +215,16 @@ def _check_kept(path: Knots, deviation: Array, pace: Pace) -> None:
         )
 
 
-def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | Smoothed]:
+def _time_path(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | Smoothed]:
     """The fastest law of time on a grid, from each rest to the next."""
-    cap, fraction = _caps(arm, route, path, pace)
+    cap, fraction = _speed_caps(arm, route, path, pace)
     accel = arm.max_accel * pace.accel
     mean = 0.0
     if pace.jerk is not None:
-        mean = window(accel, pace.jerk)
-        cap = np.minimum(cap, _narrow(arm, path, mean, pace.tolerance))
+        mean = smoothing_window(accel, pace.jerk)
+        cap = np.minimum(cap, _smoothing_cap(arm, path, mean, pace.tolerance))
     speed = fraction[:, None] * arm.max_speed
-    x = optimal(path, Bounds(speed, accel, cap), coupled_motors(arm, pace.accel))
+    x = optimal_law(path, Bounds(speed, accel, cap), coupled_motors(arm, pace.accel))
     made: list[Curve | Smoothed] = []
     for a, b in pairwise([0, *(path.rests + 1).tolist(), len(x)]):
         curve = Curve(Knots(path.s[a:b], path.q[a:b], path.d[a:b]), x[a:b])
@@ -230,14 +232,14 @@ def _timed(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | Smoo
     return made
 
 
-def _caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array, Array]:
+def _speed_caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array, Array]:
     """Greatest (ds/dt)^2 for the tool's speed and for holds, and the fraction of the joints' speeds: (N,) each."""
-    fraction, tool = route.limit(path.s, pace.speed, pace.tool_speed)
+    fraction, tool = route.speed_limits(path.s, pace.speed, pace.tool_speed)
     tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
     with np.errstate(over="ignore"):
-        each = (tool / np.maximum(tip, 1e-300)) ** 2
-    each = np.where(np.isfinite(tool), each, np.inf)
-    cap, least = (np.minimum(np.append(x, np.inf), np.append(np.inf, x)) for x in (each, fraction))
+        tool_cap = (tool / np.maximum(tip, 1e-300)) ** 2
+    tool_cap = np.where(np.isfinite(tool), tool_cap, np.inf)
+    cap, least = (np.minimum(np.append(x, np.inf), np.append(np.inf, x)) for x in (tool_cap, fraction))
     if pace.hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
         cap = np.minimum(cap, hold_cap(arm, path, pace.hold))
     return cap, least
@@ -249,7 +251,7 @@ def coupled_motors(arm: Arm, share: float) -> tuple[Array, Array] | None:
     return (np.asarray(arm.motor_gain[shared]), motor_accel(arm)[shared] * share) if len(shared) else None
 
 
-def _narrow(arm: Arm, path: Knots, mean: float, tolerance: float) -> Array:
+def _smoothing_cap(arm: Arm, path: Knots, mean: float, tolerance: float) -> Array:
     """x at which the moving average shifts the tip by half the tolerance: (N,).
 
     The average over T, `mean`, shifts q by T^2/24 (q'' x + q' u); the second part is along the path.
@@ -264,6 +266,6 @@ def _narrow(arm: Arm, path: Knots, mean: float, tolerance: float) -> Array:
 def _well_separated(s: Array, least: float) -> Array:
     """Sorted values without those that are closer than `least` to the one before; the last one stays."""
     keep = np.concatenate([[True], np.diff(s) > least])
-    out = s[keep]
-    out[-1] = s[-1]
-    return np.asarray(out)
+    separated = s[keep]
+    separated[-1] = s[-1]
+    return np.asarray(separated)

@@ -22,15 +22,15 @@ def levers(arm: Arm) -> Array:
     far = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
     size = size + np.where(arm.prismatic, np.where(np.isfinite(far), far, arm.reach), 0.0)
     beyond = np.cumsum(size[::-1])[::-1]  # from each joint's axis to the tip, at most
-    out = np.zeros((n, n))
+    bounds = np.zeros((n, n))
     for j in range(n):
         for k in range(n):
             first, later = min(j, k), max(j, k)
             if arm.prismatic[first]:
-                out[j, k] = 0.0
+                bounds[j, k] = 0.0
             else:
-                out[j, k] = 1.0 if arm.prismatic[later] else max(beyond[later], LEAST_LEVER)
-    return np.asarray(out * np.outer(arm.ratio, arm.ratio))
+                bounds[j, k] = 1.0 if arm.prismatic[later] else max(beyond[later], LEAST_LEVER)
+    return np.asarray(bounds * np.outer(arm.ratio, arm.ratio))
 
 
 def chord_bound(lever: Array, D: Array) -> Array:
@@ -46,15 +46,15 @@ def largest_form(arm: Arm, lever: Array) -> tuple[Array | None, float]:
     return (np.asarray(scale) if arm.prismatic.any() else None), top
 
 
-def turns_of(arm: Arm) -> Array:
+def whole_turns(arm: Arm) -> Array:
     """What a whole turn is in commanded values, for every joint: (n,) [rad]. A joint's ratio makes it more or less."""
     return np.asarray(TURN / arm.ratio)
 
 
-def change(arm: Arm, a: Array, b: Array) -> Array:
+def joint_change(arm: Arm, a: Array, b: Array) -> Array:
     """From joint values to others, the shorter way round: (..., n)."""
     D: Array = b - a
-    turn = turns_of(arm)
+    turn = whole_turns(arm)
     turns = D * (~arm.prismatic / turn)
     np.rint(turns, out=turns)
     turns *= turn

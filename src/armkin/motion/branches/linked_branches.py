@@ -16,7 +16,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Status
 from armkin.motion.branches.branch_columns import Columns, Samples
-from armkin.motion.branches.joint_steps import change, chord_bound, largest_form, levers, turns_of
+from armkin.motion.branches.joint_steps import chord_bound, joint_change, largest_form, levers, whole_turns
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -58,7 +58,7 @@ class _Linking:
         self.arm, self.tolerance, self.length = arm, tolerance, length
         self.samples = Samples(arm, targets, task, near, length)
         self.lever = levers(arm)
-        self.turn = turns_of(arm)
+        self.turn = whole_turns(arm)
         self.scale, self.top = largest_form(arm, self.lever)
         self.added = 0
         self.fresh = np.zeros(0, bool)  # samples that were added
@@ -72,7 +72,7 @@ class _Linking:
 
     def start(self, s: Array) -> None:
         """Solve the first samples and link them."""
-        self.columns = self.samples.first(s)
+        self.columns = self.samples.solve_first(s)
         N, B = len(s), self.columns.q.shape[1]
         self.columns.partner = np.full((N - 1, B), -1, np.int16)
         self.open = np.ones(N - 1, bool)  # steps to look at
@@ -88,10 +88,10 @@ class _Linking:
         if not len(steps):
             return
         rows = np.stack([np.maximum(steps - 1, 0), steps, steps + 1], axis=1).ravel()
-        given = self.samples
-        part = _Linking(given.arm, given.targets, given.task, self.tolerance, given.near, self.length)
-        part.samples = given
-        part.columns = c.rows(rows)
+        samples = self.samples
+        part = _Linking(samples.arm, samples.targets, samples.task, self.tolerance, samples.near, self.length)
+        part.samples = samples
+        part.columns = c.take_rows(rows)
         part.columns.partner = c.partner[rows[:-1]]
         part.columns.partner[2::3] = -1  # between the groups
         part.open = np.zeros(len(rows) - 1, bool)
@@ -107,16 +107,16 @@ class _Linking:
     def _take_over(self, part: _Linking, steps: Int, group: Int) -> None:
         """Take over what was added to the steps, and their links."""
         B = max(self.columns.q.shape[1], part.columns.q.shape[1])
-        c, p, new = self.columns.wider(B), part.columns.wider(B), part.fresh
-        at = np.repeat(steps + 1, np.bincount(group[new], minlength=len(steps)))
+        c, p, fresh = self.columns.padded_to(B), part.columns.padded_to(B), part.fresh
+        positions = np.repeat(steps + 1, np.bincount(group[fresh], minlength=len(steps)))
         links = np.append(p.partner, np.full((1, B), -1, np.int16), axis=0)
         # the left end of each step is the second sample of its group
-        second = np.flatnonzero(~new)[1::3]
+        second = np.flatnonzero(~fresh)[1::3]
         c.partner = c.partner.copy()
         c.partner[steps] = links[second]
-        added = p.rows(np.flatnonzero(new))
-        added.partner = links[new]
-        self.columns = c.inserted(at, added)
+        added = p.take_rows(np.flatnonzero(fresh))
+        added.partner = links[fresh]
+        self.columns = c.insert_rows(positions, added)
 
     def divide(self) -> bool:
         """Divide what has no partner yet, or holds an end that is not known finely enough; False: all is done.
@@ -127,29 +127,29 @@ class _Linking:
         c = self.columns
         h = np.diff(c.s)
         least = np.where(self.both, max(SHORTEST * self.length, 1e-9), ENDS)
-        todo = np.flatnonzero((self.torn | self.crossing) & (h > 1.5 * least))
+        steps = np.flatnonzero((self.torn | self.crossing) & (h > 1.5 * least))
         # Ends need no more than the formulas; their samples on edges are dear to examine.
         singular = c.status == Status.SINGULAR
-        plain = ~(self.both | singular[:-1] | singular[1:])[todo]
+        plain = ~(self.both | singular[:-1] | singular[1:])[steps]
         quick = bool(plain.any())
-        todo = todo[plain] if quick else todo
-        if not len(todo) or self.added > _MOST:
+        steps = steps[plain] if quick else steps
+        if not len(steps) or self.added > _MOST:
             return False
-        parts = int(np.clip(_AT_ONCE // len(todo), *_PARTS))
+        parts = int(np.clip(_AT_ONCE // len(steps), *_PARTS))
         f = np.arange(1, parts) / parts
-        new = (c.s[todo, None] + h[todo, None] * f).ravel()
-        found = self.samples.solved(new, examine=not quick)
-        self.where = where = np.repeat(todo + 1, parts - 1)
+        lengths = (c.s[steps, None] + h[steps, None] * f).ravel()
+        columns = self.samples.solve_at(lengths, examine=not quick)
+        self.where = where = np.repeat(steps + 1, parts - 1)
         self.fresh = np.insert(self.fresh, where, True)
-        self.added += len(new)
-        self.columns = c.inserted(where, found)
+        self.added += len(lengths)
+        self.columns = c.insert_rows(where, columns)
         fresh = np.zeros(len(c.s) - 1, bool)
-        fresh[todo] = True
+        fresh[steps] = True
         self.open = np.insert(fresh, where, True)
         self.torn = np.insert(self.torn & ~fresh, where, False)
         self.both = np.insert(self.both & ~fresh, where, False)
         self.crossing = np.insert(self.crossing & ~fresh, where, False)
-        begins = np.flatnonzero(fresh) + (parts - 1) * np.arange(len(todo))  # of the divided steps
+        begins = np.flatnonzero(fresh) + (parts - 1) * np.arange(len(steps))  # of the divided steps
         self._link()
         self._give_up(begins[:, None] + np.arange(parts))
         return True
@@ -165,26 +165,26 @@ class _Linking:
         """Find partners in the open steps."""
         rows, valid = np.flatnonzero(self.open), self.columns.valid
         for k in range(0, len(rows), _BLOCK):
-            self._link_some(rows[k : k + _BLOCK], valid)
+            self._link_rows(rows[k : k + _BLOCK], valid)
         self.open[:] = False
 
-    def _link_some(self, rows: Int, valid: Bool) -> None:
+    def _link_rows(self, rows: Int, valid: Bool) -> None:
         c, first, behind = self.columns, int(rows[0]), int(rows[-1]) + 1
         every = behind - first == len(rows)
         left, right = (slice(first, behind), slice(first + 1, behind + 1)) if every else (rows, rows + 1)
-        good, wrapped = self._certified(c.q[left], c.q[right], valid[left] & valid[right])
+        good, wrapped = self._certify(c.q[left], c.q[right], valid[left] & valid[right])
         column = np.arange(c.q.shape[1], dtype=np.int16)
         c.partner[rows] = np.where(good, column, np.int16(-1))
         straight = (good == (valid[left] | valid[right])).all(axis=1)
         self.torn[rows], self.both[rows] = False, False
         flips = (c.within_limits[left] != c.within_limits[right]) & good
         if self.wide:
-            flips |= self._crosses(c.q, left, right, wrapped) & good
+            flips |= self._crossed_limits(c.q, left, right, wrapped) & good
         self.crossing[rows] = flips.any(axis=1)
         for i in rows[~straight]:
-            self._match(int(i), valid)
+            self._match_step(int(i), valid)
 
-    def _certified(self, a: Array, b: Array, present: Bool) -> tuple[Bool, Bool]:
+    def _certify(self, a: Array, b: Array, present: Bool) -> tuple[Bool, Bool]:
         """Which branches (M, B, n) at steps' ends are one, by a cheap bound and where that is too coarse by the bound.
 
         present: (M, B). Returns that, and which of the cheaply refused ones go the other way round: (M, B) each.
@@ -197,16 +197,16 @@ class _Linking:
         k, j = np.nonzero(present & ~good)
         wrapped = np.zeros(good.shape, bool)
         if len(k):
-            shorter = change(self.arm, a[k, j], b[k, j])
+            shorter = joint_change(self.arm, a[k, j], b[k, j])
             good[k, j] = chord_bound(self.lever, shorter) <= self.tolerance
             wrapped[k, j] = np.abs(b[k, j] - a[k, j] - shorter).max(axis=1) > 1.0
         return good, wrapped
 
-    def _match(self, i: int, valid: Bool) -> None:
+    def _match_step(self, i: int, valid: Bool) -> None:
         """Partners of one step, whatever their columns: certified pairs, the smoothest first."""
         c, arm = self.columns, self.arm
         left, right = np.flatnonzero(valid[i]), np.flatnonzero(valid[i + 1])
-        D = change(arm, c.q[i, left][:, None], c.q[i + 1, right][None])
+        D = joint_change(arm, c.q[i, left][:, None], c.q[i + 1, right][None])
         ok = chord_bound(self.lever, D) <= self.tolerance
         guess = np.zeros((len(left), arm.n))
         if i > 0 and c.s[i] > c.s[i - 1]:
@@ -214,7 +214,7 @@ class _Linking:
             for k, b in enumerate(left):
                 before = np.flatnonzero(c.partner[i - 1] == b)
                 if len(before):
-                    guess[k] = change(arm, c.q[i - 1, before[0]], c.q[i, b]) * min(ratio, 10.0)
+                    guess[k] = joint_change(arm, c.q[i - 1, before[0]], c.q[i, b]) * min(ratio, 10.0)
         cost = np.where(ok, np.linalg.norm(D - guess[:, None], axis=2), np.inf)
         c.partner[i] = -1
         while np.isfinite(cost).any():
@@ -222,26 +222,26 @@ class _Linking:
             c.partner[i, left[a]] = right[b]
             cost[a, :], cost[:, b] = np.inf, np.inf
         # What no copy has within the limits at either end carries nothing: nobody asks where it goes on.
-        alone, other = left[c.partner[i, left] < 0], np.setdiff1d(right, c.partner[i])
-        self.torn[i] = c.within_limits[i, alone].any() or c.within_limits[i + 1, other].any()
-        self.both[i] = self.torn[i] and len(alone) and len(other)
+        alone, arriving = left[c.partner[i, left] < 0], np.setdiff1d(right, c.partner[i])
+        self.torn[i] = c.within_limits[i, alone].any() or c.within_limits[i + 1, arriving].any()
+        self.both[i] = self.torn[i] and len(alone) and len(arriving)
 
-    def _crosses(self, q: Array, starts: Int | slice, ends: Int | slice, wrapped: Bool) -> Bool:
+    def _crossed_limits(self, q: Array, starts: Int | slice, ends: Int | slice, wrapped: Bool) -> Bool:
         """Which columns of steps have a wide joint that passes one of its limits, whole turns apart: (M, B)."""
-        out = wrapped.copy()
+        crossed = wrapped.copy()
         for j in self.wide:
             value = q[:, :, j]
             for limit in (self.arm.lower[j], self.arm.upper[j]):
-                out |= np.floor((value[starts] - limit) / self.turn[j]) != np.floor(
+                crossed |= np.floor((value[starts] - limit) / self.turn[j]) != np.floor(
                     (value[ends] - limit) / self.turn[j]
                 )
         k, b = np.nonzero(wrapped)  # these go the other way round
         if len(k):
             start, end = q[starts][k, b], q[ends][k, b]
-            there = start + change(self.arm, start, end)
-            out[k, b] = False
+            unwrapped_end = start + joint_change(self.arm, start, end)
+            crossed[k, b] = False
             for j in self.wide:
                 for limit in (self.arm.lower[j], self.arm.upper[j]):
-                    before, after = (np.floor((x[:, j] - limit) / self.turn[j]) for x in (start, there))
-                    out[k, b] |= before != after
-        return out
+                    before, after = (np.floor((x[:, j] - limit) / self.turn[j]) for x in (start, unwrapped_end))
+                    crossed[k, b] |= before != after
+        return crossed

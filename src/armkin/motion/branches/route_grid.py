@@ -9,9 +9,9 @@ import numpy as np
 from armkin.formula.arrays import Array, Int
 from armkin.forward import jacobian, position
 from armkin.motion.branches.joint_steps import chord_bound, levers
-from armkin.motion.branches.solve_on_route import DAMPING, corrected_to_route, exact_cubics
+from armkin.motion.branches.solve_on_route import DAMPING, correct_to_route, exact_cubics
 from armkin.motion.timing.cubic_knots import Knots
-from armkin.motion.timing.time_optimal import knots
+from armkin.motion.timing.time_optimal import knots_of_samples
 from armkin.motion.tool_path.path_pieces import divide_spans
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Way(NamedTuple):
     stops: Array = np.zeros(0)  # (k,) [mm] where it rests on the way
 
 
-def fine_enough(arm: Arm, way: Way, number: int, tolerance: float | None, exact: bool = True) -> tuple[Knots, Array]:
+def refine_grid(arm: Arm, way: Way, number: int, tolerance: float | None, exact: bool = True) -> tuple[Knots, Array]:
     """A grid along a way: cubics, and how far they may leave the route.
 
     The grid has `number` points, and more in the intervals that may leave the route by more than `tolerance` [mm];
@@ -58,34 +58,34 @@ def fine_enough(arm: Arm, way: Way, number: int, tolerance: float | None, exact:
     """
     route = way.route
     exact = exact and len(route.spans) > 0 and not way.windows
-    where, breaks = _places(arm, way, number, _FEWEST if exact else _EACH[0])
+    where, breaks = _initial_grid(arm, way, number, _FEWEST if exact else _EACH[0])
     if exact:
-        where, breaks = _graded(where, breaks)
-    resting = _nearest(where[breaks], way.stops)
+        where, breaks = _grade_grid(where, breaks)
+    resting = _nearest_indices(where[breaks], way.stops)
     most = _TIMES * len(where)
     for damping in DAMPING:
-        known, before = None, None
+        solved, before = None, None
         for _ in range(_ROUNDS):
-            values = _solved(arm, way, where, damping, known)
+            values = _solve_points(arm, way, where, damping, solved)
             rests = breaks[resting]
-            found = exact_cubics(arm, route, where, values, rests, known) if exact else None
-            if exact and found is None:
-                return fine_enough(arm, way, number, tolerance, exact=False)
-            path = known = found or knots(where, values, breaks.tolist(), rests.tolist())
+            exact_path = exact_cubics(arm, route, where, values, rests, solved) if exact else None
+            if exact and exact_path is None:
+                return refine_grid(arm, way, number, tolerance, exact=False)
+            path = solved = exact_path or knots_of_samples(where, values, breaks.tolist(), rests.tolist())
             if tolerance is None:
                 return path, np.zeros(len(path.h))
-            every = interval_deviations(arm, route, path, before)
-            before = path, every
-            needed = _too_long(arm, path, every, tolerance, exact)
+            deviations = interval_deviations(arm, route, path, before)
+            before = path, deviations
+            needed = _excess_lengths(arm, path, deviations, tolerance, exact)
             if needed.max() <= 1.0 or len(where) > most:
                 break
-            where, breaks = _divided(where, breaks, _parts(needed, exact))
-        if np.delete(every, path.rests).max() <= tolerance:
+            where, breaks = _divide_intervals(where, breaks, _part_counts(needed, exact))
+        if np.delete(deviations, path.rests).max() <= tolerance:
             break
-    return path, every
+    return path, deviations
 
 
-def _nearest(ordered: Array, values: Array) -> Int:
+def _nearest_indices(ordered: Array, values: Array) -> Int:
     """The nearest of sorted numbers (N,) for each of the values: (k,)."""
     if not len(values):
         return np.zeros(0, np.intp)
@@ -95,22 +95,22 @@ def _nearest(ordered: Array, values: Array) -> Int:
     return np.asarray(np.where(values - ordered[i - 1] < ordered[i] - values, i - 1, i))
 
 
-def _places(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, Int]:
+def _initial_grid(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, Int]:
     """Grid points that follow way and joints, and which of them are breaks."""
     route, s, q, a, b, windows, stops = way
-    bends = np.sort(np.concatenate([route.breaks, *([one.begin, one.end] for one in windows)]))
+    bends = np.sort(np.concatenate([route.breaks, *([window.begin, window.end] for window in windows)]))
     first, last = np.searchsorted(bends, [a + 1e-9, b - 1e-9])
     edges = np.concatenate([[a], np.unique(bends[first:last]), [b]])
     moved = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
     measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
-    at = np.interp(edges, s, measure)
-    total = max(float(at[-1] - at[0]), 1e-12)
-    each = int(np.clip(2 * number / (len(edges) - 1), fewest, _EACH[1]))
-    share = _MOTION * np.diff(at) / total + (1 - _MOTION) * np.diff(edges) / (b - a)
-    least = np.full(len(share), each)
+    levels = np.interp(edges, s, measure)
+    total = max(float(levels[-1] - levels[0]), 1e-12)
+    least_count = int(np.clip(2 * number / (len(edges) - 1), fewest, _EACH[1]))
+    share = _MOTION * np.diff(levels) / total + (1 - _MOTION) * np.diff(edges) / (b - a)
+    least = np.full(len(share), least_count)
     if len(stops):
-        of = np.searchsorted(stops, (edges[:-1] + edges[1:]) / 2)  # which part between two stops
-        least = np.maximum(least, -(-_REST // np.bincount(of)[of]))
+        section_of = np.searchsorted(stops, (edges[:-1] + edges[1:]) / 2)  # which part between two stops
+        least = np.maximum(least, -(-_REST // np.bincount(section_of)[section_of]))
     count = np.maximum((number * share).astype(int), least)
     # places at equal steps of a level that rises with motion and way, in each section between two edges
     grid = np.unique(np.concatenate([edges, s[(s > a) & (s < b)]]))
@@ -121,20 +121,20 @@ def _places(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, Int]:
     where[begin] = edges[:-1]
     fine = route.spans
     inside = np.diff(np.searchsorted(fine, where))
-    return _divided(where, begin[1:], np.where(inside > 1, inside + 1, 1))
+    return _divide_intervals(where, begin[1:], np.where(inside > 1, inside + 1, 1))
 
 
-def _too_long(arm: Arm, path: Knots, distance: Array, tolerance: float, exact: bool) -> Array:
+def _excess_lengths(arm: Arm, path: Knots, distance: Array, tolerance: float, exact: bool) -> Array:
     """How many times too long intervals without rests are (M,), by `distance` from the route and the way from their
     chord."""
-    off, steps, h = (np.delete(each, path.rests) for each in (distance, _steps(arm, path), path.h))
+    deviations, steps, h = (np.delete(values, path.rests) for values in (distance, _chord_bounds(arm, path), path.h))
     coarse = np.sqrt(steps / max(tolerance, _COARSE))  # of second order in h
     if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
         coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
-    return np.maximum(np.cbrt(off / tolerance), coarse)  # of third order in h
+    return np.maximum(np.cbrt(deviations / tolerance), coarse)  # of third order in h
 
 
-def _parts(excess: Array, exact: bool) -> Int:
+def _part_counts(excess: Array, exact: bool) -> Int:
     """Into how many parts each interval is divided, which is `excess` times too long (M,)."""
     parts: Int = np.ceil(np.clip(1.15 * excess, 1.0, 6.0)).astype(int)
     if exact:
@@ -143,7 +143,7 @@ def _parts(excess: Array, exact: bool) -> Int:
     return np.asarray(np.maximum(parts, 1 + beside))  # slopes that neighbours tell want even steps
 
 
-def _graded(points: Array, breaks: Int) -> tuple[Array, Int]:
+def _grade_grid(points: Array, breaks: Int) -> tuple[Array, Int]:
     """Points (N,) with more where an interval is long beside its neighbour; breaks keep their places."""
     while True:
         h = np.diff(points)
@@ -151,38 +151,38 @@ def _graded(points: Array, breaks: Int) -> tuple[Array, Int]:
         long = np.flatnonzero(h > _GROWS * np.minimum(left, right))
         if not len(long):
             return points, breaks
-        at = np.where(left <= right, points[:-1] + left, points[1:] - right)[long]
-        points, breaks = np.insert(points, long + 1, at), breaks + np.searchsorted(long, breaks)
+        new_points = np.where(left <= right, points[:-1] + left, points[1:] - right)[long]
+        points, breaks = np.insert(points, long + 1, new_points), breaks + np.searchsorted(long, breaks)
 
 
-def _divided(points: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
+def _divide_intervals(points: Array, breaks: Int, parts: Int) -> tuple[Array, Int]:
     """Points (N,) with every interval in so many parts (N - 1,); breaks keep their places."""
     begin = np.cumsum(parts) - parts
     return np.append(divide_spans(points, parts), points[-1]), begin[breaks]
 
 
-def _solved(arm: Arm, way: Way, points: Array, damping: float, coarser: Knots | None) -> Array:
+def _solve_points(arm: Arm, way: Way, points: Array, damping: float, coarser: Knots | None) -> Array:
     """Joint values at the points, exact to the inverse kinematics; coarser: a grid whose points are among them."""
     route, windows = way.route, way.windows
     values, new = np.empty((len(points), arm.n), order="F"), np.ones(len(points), bool)  # long runs of numbers
     if coarser is not None:
-        old = np.searchsorted(points, coarser.s)
-        values[old], new[old] = coarser.q, False
+        positions = np.searchsorted(points, coarser.s)
+        values[positions], new[positions] = coarser.q, False
     if coarser is None or windows:
         guess = np.stack([np.interp(points[new], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
     else:  # they are nearer than chords of samples
         guess, _ = coarser.evaluate(points[new])
-    values[new] = corrected_to_route(arm, route.task, guess, route.targets(points[new]), damping)
-    for one in windows:
-        if one.detour is not None:  # the route is detoured itself
+    values[new] = correct_to_route(arm, route.task, guess, route.targets(points[new]), damping)
+    for window in windows:
+        if window.detour is not None:  # the route is detoured itself
             continue
-        inside = new & (points > one.begin) & (points < one.end)
+        inside = new & (points > window.begin) & (points < window.end)
         if inside.any():
-            values[inside] = one.joints(arm, route, points[inside], one.copy_of(arm, guess[inside[new]][0]))
+            values[inside] = window.joints(arm, route, points[inside], window.copy_of(arm, guess[inside[new]][0]))
     return values
 
 
-def deviation(arm: Arm, route: Route, path: Knots) -> float:
+def route_deviation(arm: Arm, route: Route, path: Knots) -> float:
     """An upper bound of the distance between the tip and the route on a grid's cubics [mm]."""
     return float(interval_deviations(arm, route, path).max(initial=0.0))
 
@@ -194,54 +194,56 @@ def interval_deviations(arm: Arm, route: Route, path: Knots, previous: tuple[Kno
     the near quarter and the other end is at most 4/3 of what is seen there, and e leaves it by h^3 / 96 |e'''|: the
     tip's is bounded by levers. previous: a coarser grid and its distances; where a cubic is the same, so are they.
     """
-    lever, off = levers(arm), np.zeros(len(path.h))
+    lever, deviations = levers(arm), np.zeros(len(path.h))
     open_ = path.s[1:] > path.s[:-1]
     if previous is not None:
-        known, distances = previous
-        at = np.searchsorted(path.s, known.s)
-        at += (np.diff(known.s, prepend=-1.0) == 0) & (path.s[np.minimum(at + 1, len(path.s) - 1)] == known.s)
-        alike = (path.d.T.take(at, axis=1) == known.d.T).all(axis=0)
-        same = np.flatnonzero((at[1:] == at[:-1] + 1) & alike[1:] & alike[:-1])
-        off[at[same]], open_[at[same]] = distances[same], False
-    some = np.flatnonzero(open_)
-    for part in (some[i : i + _BLOCK] for i in range(0, len(some), _BLOCK)):
-        off[part] = _deviations(arm, route, path, part, lever)
-    return off
+        coarser, distances = previous
+        positions = np.searchsorted(path.s, coarser.s)
+        positions += (np.diff(coarser.s, prepend=-1.0) == 0) & (
+            path.s[np.minimum(positions + 1, len(path.s) - 1)] == coarser.s
+        )
+        alike = (path.d.T.take(positions, axis=1) == coarser.d.T).all(axis=0)
+        same = np.flatnonzero((positions[1:] == positions[:-1] + 1) & alike[1:] & alike[:-1])
+        deviations[positions[same]], open_[positions[same]] = distances[same], False
+    open_intervals = np.flatnonzero(open_)
+    for part in (open_intervals[i : i + _BLOCK] for i in range(0, len(open_intervals), _BLOCK)):
+        deviations[part] = _deviations(arm, route, path, part, lever)
+    return deviations
 
 
-def _steps(arm: Arm, path: Knots) -> Array:
+def _chord_bounds(arm: Arm, path: Knots) -> Array:
     """Bounds of how far the tip leaves its chord in every interval: the law of time needs them small (N - 1,) [mm]."""
     lever, h = levers(arm), path.h[:, None]
     left, right = path.second_derivatives()
     bend = h**2 / 8 * np.maximum(np.abs(left), np.abs(right))
-    off = chord_bound(lever, np.diff(path.q, axis=0)) + bend @ np.where(arm.prismatic, 1.0, np.diag(lever))
-    off[path.rests] = 0.0
-    return np.asarray(off)
+    bounds = chord_bound(lever, np.diff(path.q, axis=0)) + bend @ np.where(arm.prismatic, 1.0, np.diag(lever))
+    bounds[path.rests] = 0.0
+    return np.asarray(bounds)
 
 
 def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
     """Greatest distance of a given point from the tip's motion on a grid, and where [mm]; None: there is none."""
     s, points = route.given_points
-    here = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)
-    s, points = s[here], points[here]
+    inside = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)
+    s, points = s[inside], points[inside]
     worst: Missed = None
     for i in range(0, len(s), _BLOCK):
-        at, given = s[i : i + _BLOCK], points[i : i + _BLOCK]
-        distance = np.full(len(at), np.inf)  # the least of what is met: in a tight corner the search may leave it
+        nearest, given_points = s[i : i + _BLOCK], points[i : i + _BLOCK]
+        distance = np.full(len(nearest), np.inf)  # the least of what is met: in a tight corner the search may leave it
         for _ in range(3):  # the nearest place is a little before or behind
-            q, slope = path.evaluate(np.clip(at, path.s[0], path.s[-1]))
-            off = given - position(arm, q)[:, : given.shape[1]]
-            distance = np.minimum(distance, np.linalg.norm(off, axis=1))
-            tangent = (np.asarray(jacobian(arm, q)[:, : given.shape[1]]) @ slope[:, :, None])[..., 0]
+            q, slope = path.evaluate(np.clip(nearest, path.s[0], path.s[-1]))
+            offsets = given_points - position(arm, q)[:, : given_points.shape[1]]
+            distance = np.minimum(distance, np.linalg.norm(offsets, axis=1))
+            tangent = (np.asarray(jacobian(arm, q)[:, : given_points.shape[1]]) @ slope[:, :, None])[..., 0]
             size = np.maximum((tangent**2).sum(axis=1), 1e-300)
-            at = at + np.clip((off * tangent).sum(axis=1) / size, -1.0, 1.0)
+            nearest = nearest + np.clip((offsets * tangent).sum(axis=1) / size, -1.0, 1.0)
         k, sure = -1, set[int]()
         while k not in sure:  # in a tight bend the search may have left it: the worst is looked for place by place
             sure.add(k)
             k = int(distance.argmax())
             near = np.clip(s[i + k] + np.linspace(-_AROUND, _AROUND, 401), path.s[0], path.s[-1])
-            off = given[k] - position(arm, path.evaluate(near)[0])[:, : given.shape[1]]
-            distance[k] = min(distance[k], float(np.linalg.norm(off, axis=1).min()))
+            offsets = given_points[k] - position(arm, path.evaluate(near)[0])[:, : given_points.shape[1]]
+            distance[k] = min(distance[k], float(np.linalg.norm(offsets, axis=1).min()))
         most = float(distance[k])
         if worst is None or most > worst[0] * (1 + _ALIKE):
             worst = most, float(s[i + int((distance >= most * (1 - _ALIKE)).argmax())])
@@ -251,13 +253,13 @@ def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
 
 def _deviations(arm: Arm, route: Route, path: Knots, intervals: Int, lever: Array) -> Array:
     (start, end), (d0, d1), h = path.ends(path.q, intervals), path.ends(path.d, intervals), path.h[intervals]
-    d0, d1, chord, seen = d0 * h, d1 * h, end - start, np.zeros(len(intervals))
+    d0, d1, chord, largest = d0 * h, d1 * h, end - start, np.zeros(len(intervals))
     for f in (0.25, 0.75):
         q = start + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
         wanted = route.targets(path.s[intervals] + f * h)
         wanted = wanted[:, :3, 3] if route.task.orientation == "full" else wanted[:, : route.task.position]
-        off = (position(arm, q.T)[:, : wanted.shape[1]] - wanted).T
-        seen = np.maximum(seen, np.sqrt((off**2).sum(axis=0)))
+        offsets = (position(arm, q.T)[:, : wanted.shape[1]] - wanted).T
+        largest = np.maximum(largest, np.sqrt((offsets**2).sum(axis=0)))
     # h, h^2 and h^3 times the greatest q', q'' and q''' of each joint
     first = np.maximum(np.maximum(np.abs(d0), np.abs(d1)), np.abs(3 * chord - d0 - d1))
     second = np.maximum(np.abs(6 * chord - 4 * d0 - 2 * d1), np.abs(6 * chord - 2 * d0 - 4 * d1))
@@ -265,4 +267,4 @@ def _deviations(arm: Arm, route: Route, path: Knots, intervals: Int, lever: Arra
     turned = np.where(arm.prismatic, 0.0, np.abs(arm.ratio)) @ first * (2.0 if arm.prismatic.any() else 1.0)
     levered = lever.T @ first
     tip = turned * (levered * first).sum(axis=0) + 3 * (levered * second).sum(axis=0)
-    return np.asarray(4 / 3 * seen + (tip + np.where(arm.prismatic, 1.0, np.diag(lever)) @ third) / 96)
+    return np.asarray(4 / 3 * largest + (tip + np.where(arm.prismatic, 1.0, np.diag(lever)) @ third) / 96)

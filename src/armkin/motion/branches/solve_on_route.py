@@ -26,7 +26,7 @@ _TELLING = 0.02  # [mm/rad] damping of slopes: rounding is multiplied little
 _LOST = 1e-5  # of a slope: where damping takes more a singularity is near
 
 
-def corrected_to_route(
+def correct_to_route(
     arm: Arm, task: Task, q: Array, target: Array, damping: float = DAMPING[0], steps: int = 6
 ) -> Array:
     """Joint values near the right ones, made exact by damped Newton steps; those of free joints stay: (N, n).
@@ -40,42 +40,42 @@ def corrected_to_route(
 
 def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
     unit = radian_or_reach(arm)
-    out, open_, before = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
+    solved, open_, before = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
     for _ in range(steps):
-        q = out[open_]
-        T, J = _scaled(arm, task, q)
+        q = solved[open_]
+        T, J = _pose_and_jacobian(arm, task, q)
         r = _residuals(arm, task, T, q, target[open_])
         step = _damped_steps(J, r, (damping / arm.reach) ** 2)
         size = np.abs(step).max(axis=0)
         step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
-        out[open_] = q + step.T * unit
+        solved[open_] = q + step.T * unit
         # where a step is so much shorter than the one before, the next one would be nothing
         going = (size >= _SETTLED) & ((size > _SHORT) | (size > _QUADRATIC * before))
         open_, before = open_[going], size[going]
         if not len(open_):
             break
-    return out
+    return solved
 
 
-def _scale(arm: Arm, task: Task) -> Array:
+def _row_scale(arm: Arm, task: Task) -> Array:
     """What a unit of each of the task's rows counts: (k,)."""
     scale = np.ones(task.position + len(task.sums) + (3 if task.orientation != "none" else 0))
     scale[: task.position] = 1 / arm.reach
     return scale
 
 
-def _scaled(arm: Arm, task: Task, q: Array) -> tuple[Array, Array]:
+def _pose_and_jacobian(arm: Arm, task: Task, q: Array) -> tuple[Array, Array]:
     """The tool's poses (M, 4, 4), and the task's Jacobians without units, column by column: (n, k, M)."""
-    k, p, scale = len(task.sums), task.position, _scale(arm, task)
-    each = radian_or_reach(arm)[:, None, None] * scale[:, None]  # (n, k, 1)
-    each[:, p : p + k] *= arm.ratio[:, None, None]
+    k, p, scale = len(task.sums), task.position, _row_scale(arm, task)
+    factor = radian_or_reach(arm)[:, None, None] * scale[:, None]  # (n, k, 1)
+    factor[:, p : p + k] *= arm.ratio[:, None, None]
     T, J = tip_and_jacobian(arm, q)
-    return T, np.multiply(task_jacobian(task, J, T).transpose(2, 1, 0), each, order="C")
+    return T, np.multiply(task_jacobian(task, J, T).transpose(2, 1, 0), factor, order="C")
 
 
 def _residuals(arm: Arm, task: Task, T: Array, q: Array, target: Array) -> Array:
     """What is missing to the targets, without units: (k, M)."""
-    return np.multiply(residual(task, T, q * arm.ratio, target).T, _scale(arm, task)[:, None], order="C")
+    return np.multiply(residual(task, T, q * arm.ratio, target).T, _row_scale(arm, task)[:, None], order="C")
 
 
 def _damped_steps(J: Array, r: Array, damping: float) -> Array:
@@ -111,31 +111,31 @@ def exact_cubics(arm: Arm, route: Route, points: Array, q: Array, rests: Int, co
     """
     twice = np.sort(np.concatenate([np.arange(len(points)), rests]))
     s, values = points[twice], np.asfortranarray(q[twice])
-    d, new = np.empty_like(values), np.ones(len(s), bool)
+    d, unsolved = np.empty_like(values), np.ones(len(s), bool)
     if coarser is not None:
-        old = np.searchsorted(s, coarser.s)
-        old += np.diff(coarser.s, prepend=-1.0) == 0
-        d[old], new[old] = coarser.d, False
+        positions = np.searchsorted(s, coarser.s)
+        positions += np.diff(coarser.s, prepend=-1.0) == 0
+        d[positions], unsolved[positions] = coarser.d, False
     ends = np.append(twice[1:] == twice[:-1], True)  # the slope there is that of the way before it
-    number = np.flatnonzero(new)
+    number = np.flatnonzero(unsolved)
     for part in (number[i : i + _BLOCK] for i in range(0, len(number), _BLOCK)):
-        found = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_ASIDE, _ASIDE))
-        if found is None:
+        slopes = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_ASIDE, _ASIDE))
+        if slopes is None:
             return None
-        d[part] = found
+        d[part] = slopes
     return Knots(s, values, d)
 
 
 def _slopes(arm: Arm, route: Route, s: Array, q: Array, detour_slope: Array) -> Array | None:
     """dq/ds (M, n) of J dq = dx, by what misses to the targets a little aside; None: J is singular, or nearly."""
-    if arm.n > len(_scale(arm, route.task)):
+    if arm.n > len(_row_scale(arm, route.task)):
         return None
-    T, J = _scaled(arm, route.task, q)
-    there = s + detour_slope
-    here, beside = (_residuals(arm, route.task, T, q, route.targets(x)) for x in (s, there))
-    rate = (beside - here) / (there - s)
+    T, J = _pose_and_jacobian(arm, route.task, q)
+    aside = s + detour_slope
+    misses, misses_aside = (_residuals(arm, route.task, T, q, route.targets(x)) for x in (s, aside))
+    rate = (misses_aside - misses) / (aside - s)
     d = _damped_steps(J, rate, (_TELLING / arm.reach) ** 2)
-    lost = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)
-    if not (lost <= _LOST * np.abs(rate).max(axis=0)).all():
+    unexplained = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)
+    if not (unexplained <= _LOST * np.abs(rate).max(axis=0)).all():
         return None
     return np.asarray(d.T * radian_or_reach(arm))

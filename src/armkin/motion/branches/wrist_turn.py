@@ -20,8 +20,8 @@ from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian
 from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Columns
-from armkin.motion.branches.joint_steps import LEAST_LEVER, change
-from armkin.motion.branches.solve_on_route import corrected_to_route
+from armkin.motion.branches.joint_steps import LEAST_LEVER, joint_change
+from armkin.motion.branches.solve_on_route import correct_to_route
 from armkin.motion.branches.wrist_window import Window, with_detours
 from armkin.motion.tool_path.route import Detour
 
@@ -49,7 +49,7 @@ def has_wrist(arm: Arm) -> bool:
     return arm.n == 6 and not arm.prismatic.any()
 
 
-def check(arm: Arm) -> None:
+def check_wrist(arm: Arm) -> None:
     """Raise UsageError for an arm whose last three joints are no wrist."""
     if not has_wrist(arm):
         raise UsageError(
@@ -65,25 +65,25 @@ def through_wrists(
 
     turn: [rad] by which the tool may be turned for it, tip_offset: [mm] that the tip may go.
     """
-    s, found, new = columns.s, list(chains), list(chains)
+    s, all_chains, latest = columns.s, list(chains), list(chains)
     near = _NEAR * max(np.sin(turn), tip_offset / LEAST_LEVER)
     for _ in range(_MOST):
-        made = []
-        for c in new:
-            for j in _straight(arm, c, near):
+        joined_chains = []
+        for c in latest:
+            for j in _straight_samples(arm, c, near):
                 if c.windows and s[j] <= c.windows[-1].end:
                     continue
                 for other in chains:
                     joined = _chain_through_window(arm, route, s, c, other, j, (turn, tip_offset))
-                    made += [] if joined is None else [joined]
-        found, new = found + made, made
-        if not made or len(found) > _MOST * len(chains):
+                    joined_chains += [] if joined is None else [joined]
+        all_chains, latest = all_chains + joined_chains, joined_chains
+        if not joined_chains or len(all_chains) > _MOST * len(chains):
             break
-    return found
+    return all_chains
 
 
 @lru_cache(maxsize=256)
-def _volumes(arm: Arm) -> tuple[float, float, float]:
+def _volumes_at_three(arm: Arm) -> tuple[float, float, float]:
     """Of the wrist's axes where joint 5 has turned by 0, 90 and 180 degrees."""
     tried = np.tile(arm.home, (3, 1))
     tried[:, 4] = np.array([0.0, 0.5, 1.0]) * np.pi / arm.ratio[4]
@@ -92,24 +92,24 @@ def _volumes(arm: Arm) -> tuple[float, float, float]:
     return a, b, c
 
 
-def _bent(arm: Arm, q: Array) -> Array:
+def _wrist_volume(arm: Arm, q: Array) -> Array:
     """The volume of the wrist's axes at joint values (N, n): 0 where it is straight; joint 5 alone tells: (N,)."""
-    a, b, c = _volumes(arm)
+    a, b, c = _volumes_at_three(arm)
     angle = q[:, 4] * arm.ratio[4]
     return np.asarray((a + c) / 2 + (a - c) / 2 * np.cos(angle) + (b - (a + c) / 2) * np.sin(angle))
 
 
-def _straight(arm: Arm, c: Chain, near: float) -> list[int]:
+def _straight_samples(arm: Arm, c: Chain, near: float) -> list[int]:
     """Samples at which a chain's wrist comes nearest to straight, and near enough."""
-    off = np.abs(_bent(arm, c.q))
-    off[off < _ROUNDING] = 0.0  # else every other sample of a way that is singular throughout were a least one
-    step = np.diff(off)
+    volumes = np.abs(_wrist_volume(arm, c.q))
+    volumes[volumes < _ROUNDING] = 0.0  # else every other sample of a way that is singular throughout were a least one
+    step = np.diff(volumes)
     least = np.append(True, step <= 0) & np.append(step > 0, True)
     between = np.maximum(np.append(0.0, np.abs(step)), np.append(np.abs(step), 0.0))  # it may be nearer by so much
-    return (c.first + np.flatnonzero(least & (off - between < near))).tolist()
+    return (c.first + np.flatnonzero(least & (volumes - between < near))).tolist()
 
 
-def _spans(route: Route, s: Array, c: Chain, next_chain: Chain, j: int) -> Iterator[tuple[int, int]]:
+def _window_spans(route: Route, s: Array, c: Chain, next_chain: Chain, j: int) -> Iterator[tuple[int, int]]:
     """First and last samples of windows about sample j, wider and wider, on one piece of the route."""
     k = int(np.searchsorted(route.breaks, s[j]))
     low, high = route.breaks[max(k - 1, 0)], route.breaks[min(k, len(route.breaks) - 1)]
@@ -123,7 +123,7 @@ def _spans(route: Route, s: Array, c: Chain, next_chain: Chain, j: int) -> Itera
             yield a, b
 
 
-def _passed(
+def _widest_window(
     arm: Arm, route: Route, window: Callable[[int], Window], numbers: range, allowed: tuple[float, float]
 ) -> tuple[int, Window] | None:
     """The widest window that turns the tool by little enough, else one about which the tip goes, and its number.
@@ -137,7 +137,7 @@ def _passed(
         around = _window_with_offset(arm, route, window(k))
         if around is None or around.tip_offset > aside:  # of a narrower one as well
             return None
-        if _passes(arm, route, around):
+        if _follows_detour(arm, route, around):
             return k, around
     return None
 
@@ -146,29 +146,29 @@ def _chain_through_window(
     arm: Arm, route: Route, s: Array, c: Chain, next_chain: Chain, j: int, allowed: tuple[float, float]
 ) -> Chain | None:
     """A chain up to a window about sample j, and from there on another one, or itself again; None: none is allowed."""
-    on = max(j, next_chain.first)  # exactly on the singularity one may end, and the other one begin behind it
-    if not (c.first <= j <= c.last and on <= next_chain.last and s[on] - s[j] <= _GAP):
+    next_sample = max(j, next_chain.first)  # exactly on the singularity one may end, and the other one begin behind it
+    if not (c.first <= j <= c.last and next_sample <= next_chain.last and s[next_sample] - s[j] <= _GAP):
         return None
-    step = change(arm, c.q[j - c.first], next_chain.q[on - next_chain.first])
+    step = joint_change(arm, c.q[j - c.first], next_chain.q[next_sample - next_chain.first])
     if np.abs(step[:3]).max() > _ARM:
         return None
-    spans = list(_spans(route, s, c, next_chain, j))
+    spans = list(_window_spans(route, s, c, next_chain, j))
 
     @cache
     def window(k: int) -> Window:
         a, b = spans[k]
-        return _window(arm, route, s[[a, b]], c.q[a - c.first], next_chain.q[b - next_chain.first])
+        return _window_between(arm, route, s[[a, b]], c.q[a - c.first], next_chain.q[b - next_chain.first])
 
-    best = _passed(arm, route, window, range(len(spans)), allowed)
+    best = _widest_window(arm, route, window, range(len(spans)), allowed)
     if best is None:
         return None
-    (a, b), one = spans[best[0]], best[1]
-    inside = _joints_in_window(arm, route, one, s[a + 1 : b])
-    offset = one.q[1] - next_chain.q[b - next_chain.first]
+    (a, b), chosen = spans[best[0]], best[1]
+    inside = _joints_in_window(arm, route, chosen, s[a + 1 : b])
+    offset = chosen.q[1] - next_chain.q[b - next_chain.first]
     q = np.concatenate([c.q[: a + 1 - c.first], inside, next_chain.q[b - next_chain.first :] + offset])
-    left, right = c.labels[: j - c.first], next_chain.labels[on - next_chain.first :]
+    left, right = c.labels[: j - c.first], next_chain.labels[next_sample - next_chain.first :]
     labels = np.concatenate([left, np.repeat(right[:1], len(q) - len(left) - len(right)), right])
-    return Chain(arm, c.first, q, labels, (*c.windows, one))
+    return Chain(arm, c.first, q, labels, (*c.windows, chosen))
 
 
 def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array:
@@ -176,12 +176,12 @@ def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array
     q = window.joints(arm, route, s)
     if window.detour is None or not len(s):
         return q
-    q = corrected_to_route(arm, route.task, q, with_detours(route, (window,)).targets(s), steps=12)
-    known = np.abs(_bent(arm, q)) > _TOLD  # nearer to straight joints 4 and 6 go on as they do beside it
-    at = np.concatenate([[window.begin], s[known], [window.end]])
-    beside = np.concatenate([window.q[:1], q[known], window.q[1:]])
+    q = correct_to_route(arm, route.task, q, with_detours(route, (window,)).targets(s), steps=12)
+    bent = np.abs(_wrist_volume(arm, q)) > _TOLD  # nearer to straight joints 4 and 6 go on as they do beside it
+    lengths = np.concatenate([[window.begin], s[bent], [window.end]])
+    beside = np.concatenate([window.q[:1], q[bent], window.q[1:]])
     for j in (3, 5):
-        q[~known, j] = np.interp(s[~known], at, beside[:, j])
+        q[~bent, j] = np.interp(s[~bent], lengths, beside[:, j])
     return q
 
 
@@ -189,46 +189,46 @@ def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None
     """The window with the tip aside, as little as it can be, to where the wrist is straight; None: it is nowhere."""
     s = np.linspace(window.begin, window.end, _LOOKED)
     q = window.joints(arm, route, s)
-    bent = _bent(arm, q)
+    bent = _wrist_volume(arm, q)
     flips = np.flatnonzero(bent[:-1] * bent[1:] <= 0)
     if len(flips) != 1:
         return None
     i = int(flips[0])
     f = float(bent[i] / (bent[i] - bent[i + 1]))
-    posture, at = q[i] + f * (q[i + 1] - q[i]), float(s[i] + f * (s[i + 1] - s[i]))
+    posture, length = q[i] + f * (q[i + 1] - q[i]), float(s[i] + f * (s[i + 1] - s[i]))
     free = [0, 1, 2, 3, 5]
     for _ in range(_STEPS):  # the tool's direction first, then the tip as near as it goes; joint 5 is straight
-        target, beyond = route.targets(np.array([at, at + _STEP]))
+        target, beyond = route.targets(np.array([length, length + _STEP]))
         along = (beyond - target)[:3, 3] / _STEP
         T, J = fk(arm, posture), jacobian(arm, posture)[:, free]
-        by = T[:3, 3] - target[:3, 3]
-        miss = np.concatenate([-_LEAST * by, _rotation(T, target)])
+        displacement = T[:3, 3] - target[:3, 3]
+        miss = np.concatenate([-_LEAST * displacement, _small_turns(T, target)])
         posture[free] += np.linalg.lstsq(np.concatenate([_LEAST * J[:3], J[3:]]), miss, rcond=1e-9)[0]
-        at += float(by @ along)  # what leads along the path is no way aside
-    return replace(window, turned=0.0, detour=Detour(window.begin, window.end, by))
+        length += float(displacement @ along)  # what leads along the path is no way aside
+    return replace(window, turned=0.0, detour=Detour(window.begin, window.end, displacement))
 
 
-def _passes(arm: Arm, route: Route, window: Window) -> bool:
+def _follows_detour(arm: Arm, route: Route, window: Window) -> bool:
     """Whether the joints follow a window's detour, all along."""
     s = np.linspace(window.begin, window.end, _LOOKED)
     T, goal = fk(arm, _joints_in_window(arm, route, window, s)), with_detours(route, (window,)).targets(s)
-    missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_rotation(T, goal)).max()
+    missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_small_turns(T, goal)).max()
     return bool(missed < _EXACT)
 
 
-def _rotation(T: Array, target: Array) -> Array:
+def _small_turns(T: Array, target: Array) -> Array:
     """Small turns from poses (..., 4, 4) to targets, in the base frame: (..., 3) [rad]."""
     R = target[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
     return np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1) / 2
 
 
-def _window(arm: Arm, route: Route, lengths: Array, start: Array, end: Array) -> Window:
+def _window_between(arm: Arm, route: Route, lengths: Array, start: Array, end: Array) -> Window:
     """From a posture to another one, (n,) each, at lengths `lengths` (2,)."""
-    q = np.stack([start, start + change(arm, start, end)])
+    q = np.stack([start, start + joint_change(arm, start, end)])
     slopes = []
-    for s, one in zip(lengths.tolist(), q, strict=True):
+    for s, posture in zip(lengths.tolist(), q, strict=True):
         both = np.clip([s - _STEP, s + _STEP], 0.0, route.length)
-        exact = corrected_to_route(arm, route.task, np.stack([one, one]), route.targets(both), steps=12)
+        exact = correct_to_route(arm, route.task, np.stack([posture, posture]), route.targets(both), steps=12)
         slopes.append((exact[1] - exact[0]) / (both[1] - both[0]))
     window = Window(float(lengths[0]), float(lengths[1]), q, np.array(slopes), np.inf)
     s = np.linspace(window.begin, window.end, _LOOKED)
@@ -236,5 +236,5 @@ def _window(arm: Arm, route: Route, lengths: Array, start: Array, end: Array) ->
     if np.linalg.norm(T[:, :3, 3] - target[:, :3, 3], axis=1).max() > 1e-6:
         return window
     trace = np.einsum("nij,nij->n", T[:, :3, :3], target[:, :3, :3])
-    angle = np.arctan2(2 * np.linalg.norm(_rotation(T, target), axis=1), trace - 1)
+    angle = np.arctan2(2 * np.linalg.norm(_small_turns(T, target), axis=1), trace - 1)
     return Window(window.begin, window.end, q, window.d, float(angle.max()))

@@ -14,7 +14,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.inverse.numeric.newton import nudged
-from armkin.motion.branches.joint_steps import turns_of
+from armkin.motion.branches.joint_steps import whole_turns
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -59,11 +59,11 @@ class Window:
 
     def copy_of(self, arm: Arm, q: Array) -> Array:
         """Whole turns (n,) from a window to the copy that a run is on; q: (n,) of it, somewhere inside."""
-        turns = turns_of(arm)
+        turns = whole_turns(arm)
         return np.asarray(turns * np.rint((q - self.q.mean(axis=0)) / turns))
 
 
 def with_detours(route: Route, windows: tuple[Window, ...]) -> Route:
     """A route with the detours of its windows."""
-    found = tuple(one.detour for one in windows if one.detour is not None)
-    return replace(route, detours=found) if found else route
+    detours = tuple(window.detour for window in windows if window.detour is not None)
+    return replace(route, detours=detours) if detours else route

@@ -133,9 +133,9 @@ class PathPlan:
     @property
     def turned(self) -> float | None:
         """By how much the tool is turned at wrist singularities [rad]; None: it never is."""
-        return max((one.turned for one in self.passed if one.turned), default=None)
+        return max((singularity.turned for singularity in self.passed if singularity.turned), default=None)
 
-    def along(self, number: int, stretch: Stretch, base: float) -> None:
+    def note_stretch(self, number: int, stretch: Stretch, base: float) -> None:
         """Note that a stretch is on the tool's way.
 
         Args:
@@ -145,7 +145,7 @@ class PathPlan:
         """
         self.on_path[number] = (stretch, base)
 
-    def nearer_singularity(self, q: Array, s: Array) -> None:
+    def note_singularity(self, q: Array, s: Array) -> None:
         """Note where joint values behind the present end come nearest to a singularity.
 
         Args:
@@ -153,14 +153,14 @@ class PathPlan:
             s: (N,) [mm] the lengths at which they are.
         """
         for i in range(0, len(q), _BLOCK):
-            some = _worst(self.arm, q[i : i + _BLOCK])
-            worst = condition(self.arm, q[i + some])
+            candidates = _worst_conditioned(self.arm, q[i : i + _BLOCK])
+            worst = condition(self.arm, q[i + candidates])
             k = int(np.argmax(worst))
             if self.nearest_singularity is None or worst[k] > self.nearest_singularity[1]:
-                at = i + some[k]
-                self.nearest_singularity = (self.length + float(s[at]), float(worst[k]), q[at].copy())
+                index = i + candidates[k]
+                self.nearest_singularity = (self.length + float(s[index]), float(worst[k]), q[index].copy())
 
-    def finished(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
+    def set_motion(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
         """The same with its motion from a posture on.
 
         Args:
@@ -228,16 +228,16 @@ class PathPlan:
             (...) [mm].
         """
         when = np.asarray(t, dtype=float).ravel()
-        out = np.zeros(len(when))
+        lengths = np.zeros(len(when))
         numbers = sorted(self.on_path)
         begins = self.motion.begins[numbers]
         last = np.searchsorted(begins, when, side="right") - 1  # on the way, or behind it
-        for i, here in group_numbers(last):
+        for i, rows in group_numbers(last):
             if i >= 0:
                 stretch, base = self.on_path[numbers[i]]
                 assert isinstance(stretch, Curve | Smoothed)
-                out[here] = base + stretch.lengths(when[here] - begins[i])
-        return out.reshape(np.shape(t))
+                lengths[rows] = base + stretch.lengths(when[rows] - begins[i])
+        return lengths.reshape(np.shape(t))
 
     def s_range(self, number: int) -> tuple[float, float]:
         """Where a stretch on the tool's way begins and ends.
@@ -290,7 +290,7 @@ class PathPlan:
         return shares
 
 
-def _worst(arm: Arm, q: Array) -> NDArray[np.intp]:
+def _worst_conditioned(arm: Arm, q: Array) -> NDArray[np.intp]:
     """Which of the joint values (N, n) may have the greatest condition number: of three joints few of them.
 
     The squares of three singular values are the eigenvalues of J J', in closed form (Smith, Eigenvalues of a symmetric

@@ -17,7 +17,7 @@ _FIRST = 0.5  # [s] between two of the first samples, at most
 _INSIDE = (0.21, 0.5, 0.79)  # where between two samples it is looked at
 
 
-def times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int) -> tuple[Array, float]:
+def sample_times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int) -> tuple[Array, float]:
     """Times [s] between which the tip drawn is off by `close` [mm] at most, or by what `most` of them leave; how much.
 
     Where they may be too few, those intervals are divided first that leave the most.
@@ -26,39 +26,39 @@ def times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int
     count = int(min(most / 4, plan.duration / _FIRST)) + 2
     t = np.unique(np.concatenate([np.linspace(0.0, plan.duration, count), begins]))
     a, b = t[:-1], t[1:]  # intervals that may be divided
-    off = _drawn_error(arm, plan, a, b)
-    done = [t]
+    errors = _drawn_error(arm, plan, a, b)
+    parts = [t]
     worst, room = 0.0, most - len(t)
     while True:
-        bad = (off > close) & (b - a > 1e-3)
-        worst = max(worst, float(off[~bad].max(initial=0.0)))
-        a, b, off = a[bad], b[bad], off[bad]
+        bad = (errors > close) & (b - a > 1e-3)
+        worst = max(worst, float(errors[~bad].max(initial=0.0)))
+        a, b, errors = a[bad], b[bad], errors[bad]
         if not len(a) or room <= 0:
             break
-        order = np.argsort(-off, kind="stable")[:room]
+        order = np.argsort(-errors, kind="stable")[:room]
         if 4 * len(order) > room:  # the others wait: they may be the least of what is left
-            order = order[off[order] > 0.5 * off[order[0]]]
+            order = order[errors[order] > 0.5 * errors[order[0]]]
         middle = (a[order] + b[order]) / 2
-        done.append(middle)
+        parts.append(middle)
         room -= len(middle)
         first, last = np.concatenate([a[order], middle]), np.concatenate([middle, b[order]])
-        a, b = (np.concatenate([np.delete(old, order), new]) for old, new in ((a, first), (b, last)))
-        off = np.concatenate([np.delete(off, order), _drawn_error(arm, plan, first, last)])
-    return np.unique(np.concatenate(done)), max(worst, float(off.max(initial=0.0)))
+        a, b = (np.concatenate([np.delete(values, order), added]) for values, added in ((a, first), (b, last)))
+        errors = np.concatenate([np.delete(errors, order), _drawn_error(arm, plan, first, last)])
+    return np.unique(np.concatenate(parts)), max(worst, float(errors.max(initial=0.0)))
 
 
 def _drawn_error(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:
     """How far the tip drawn is from the tip [mm], the most seen between the times a and b: (k,)."""
     first, last = plan.q(a), plan.q(b)
     tips = [position(arm, first), position(arm, last)]
-    off = np.zeros(len(a))
+    errors = np.zeros(len(a))
     for share in _INSIDE:
-        there = position(arm, plan.q(a + share * (b - a)))
-        arms = position(arm, first + share * (last - first))
-        off = np.maximum(off, np.linalg.norm(arms - there, axis=1))
+        true_tip = position(arm, plan.q(a + share * (b - a)))
+        joint_tip = position(arm, first + share * (last - first))
+        errors = np.maximum(errors, np.linalg.norm(joint_tip - true_tip, axis=1))
         # The way that is drawn: the distance to the chord.
         way = tips[1] - tips[0]
         long = np.maximum((way * way).sum(axis=1, keepdims=True), 1e-12)
-        along = np.clip(((there - tips[0]) * way).sum(axis=1, keepdims=True) / long, 0.0, 1.0)
-        off = np.maximum(off, np.linalg.norm(there - tips[0] - along * way, axis=1))
-    return np.asarray(off)
+        along = np.clip(((true_tip - tips[0]) * way).sum(axis=1, keepdims=True) / long, 0.0, 1.0)
+        errors = np.maximum(errors, np.linalg.norm(true_tip - tips[0] - along * way, axis=1))
+    return np.asarray(errors)

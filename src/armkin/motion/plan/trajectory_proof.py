@@ -50,12 +50,12 @@ class TrajectoryProof:
     postures: int
 
 
-class _OfCurve:
+class _SmoothedWay:
     """A smoothed curve as a way in time, one cell a grid interval of the curve."""
 
     def __init__(self, smoothed: Smoothed) -> None:
         self.smoothed, self.curve = smoothed, smoothed.curve
-        self.inner = Cubics(_points(smoothed.curve))
+        self.inner = Cubics(_control_points(smoothed.curve))
         self.step = float(np.median(np.diff(self.curve.times))) or smoothed.duration
         self.cells = max(int(np.ceil(smoothed.duration / self.step)), 1)
 
@@ -84,7 +84,7 @@ class _OfCurve:
         return np.minimum(place / self.cells, 1.0) * self.smoothed.duration
 
 
-def _points(stretch: Stretch) -> Array:
+def _control_points(stretch: Stretch) -> Array:
     """Control points (4, cells, n) of a stretch that is no mean."""
     if isinstance(stretch, Curve):
         q, h = stretch.path.q, stretch.path.h[:, None]
@@ -97,28 +97,28 @@ def _points(stretch: Stretch) -> Array:
 def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> TrajectoryProof | None:
     """What a proof finds of a trajectory; None for an arm without keep-outs. tight: see `prove`."""
     arm = trajectory.arm
-    whole, _ = whole_arm(arm, trajectory.start[None])
-    if not whole.keep_out:
+    full_arm, _ = whole_arm(arm, trajectory.start[None])
+    if not full_arm.keep_out:
         return None
     from armkin.keep_out.body_pairs import guard
 
-    held, allowed, found, postures = guard(whole), None, None, 0
+    bodies, allowed, nearest, postures = guard(full_arm), None, None, 0
     escaping: tuple[int, ...] = ()
     for first, way in _geometries(trajectory):
-        lifted = _UnlockedWay(arm, way)
-        proof = prove(held, lifted, tight=tight, ignored_pairs=allowed)
+        full_way = _UnlockedWay(arm, way)
+        proof = prove(bodies, full_way, tight=tight, ignored_pairs=allowed)
         postures += proof.postures
         if allowed is None:
             escaping = proof.escaping
         allowed = proof.escaping
-        here = _proof_on_trajectory(trajectory, held, first, proof, escaping, postures, way)
+        result = _proof_on_trajectory(trajectory, bodies, first, proof, escaping, postures, way)
         if not proof.free:
-            return here
-        if found is None or here.mm < found.mm:
-            found = here
-    if found is None:  # no stretch: the arm stays where it is
+            return result
+        if nearest is None or result.mm < nearest.mm:
+            nearest = result
+    if nearest is None:  # no stretch: the arm stays where it is
         return None
-    return TrajectoryProof(**{**vars(found), "postures": postures})
+    return TrajectoryProof(**{**vars(nearest), "postures": postures})
 
 
 def check_free(trajectory: Trajectory, place: str = "") -> None:
@@ -127,9 +127,9 @@ def check_free(trajectory: Trajectory, place: str = "") -> None:
     Costs nothing for an arm without keep-outs, or one that ignores them.
     """
     if trajectory.arm.keep_out and not trajectory.arm.ignores_keep_out:
-        found = prove_trajectory(trajectory)
-        if found is not None and not found.free:
-            raise refusal(trajectory, found, place)
+        proof = prove_trajectory(trajectory)
+        if proof is not None and not proof.free:
+            raise hit_refusal(trajectory, proof, place)
 
 
 def prove_plan(plan: PathPlan) -> PathPlan:
@@ -137,31 +137,33 @@ def prove_plan(plan: PathPlan) -> PathPlan:
 
     Nor may its approach hit anything.
     """
-    found = prove_trajectory(plan.motion, tight=True)
-    if found is None:
+    proof = prove_trajectory(plan.motion, tight=True)
+    if proof is None:
         return plan
-    s = float(plan.s(seconds(plan.motion, found)))
-    mm = found.mm if np.isfinite(found.mm) else None
-    plan.clearance = {"mm": mm, "s_mm": s, "body": found.body, "with": found.keep_out}
-    if found.free or plan.arm.ignores_keep_out:
+    s = float(plan.s(hit_time(plan.motion, proof)))
+    mm = proof.mm if np.isfinite(proof.mm) else None
+    plan.clearance = {"mm": mm, "s_mm": s, "body": proof.body, "with": proof.keep_out}
+    if proof.free or plan.arm.ignores_keep_out:
         if plan.approach is not None:
             check_free(plan.approach, " on the way to the path's start")
         return plan
-    error = refusal(plan.motion, found, f" at {s:.3f} mm of the path", s_mm=s)
+    error = hit_refusal(plan.motion, proof, f" at {s:.3f} mm of the path", s_mm=s)
     error.plan = plan
     raise error
 
 
-def refusal(trajectory: Trajectory, hit: TrajectoryProof, place: str = "", **fields: object) -> NoSolutionError:
+def hit_refusal(trajectory: Trajectory, hit: TrajectoryProof, place: str = "", **fields: object) -> NoSolutionError:
     """Why a motion is refused; place: where on a path."""
     arm = trajectory.arm
     values = units.joints_out(arm, hit.joints).tolist()
-    at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(arm.joint_names, values, strict=True))
+    joints_text = ", ".join(f"{name} = {value:.4g}" for name, value in zip(arm.joint_names, values, strict=True))
     stands = (hit.body, hit.keep_out) in hit.escaping
     many = f" on the way to waypoint {hit.stretch + 1}" if len(trajectory.stretches) > 1 and not place else ""
-    what = "would go deeper into" if stands else "would hit"
-    told = {"body": hit.body, "with": hit.keep_out, "joints": values, **fields}
-    return NoSolutionError(f"{hit.body} {what} {hit.keep_out}{place or many}, at {at}: nothing was moved", **told)
+    verb = "would go deeper into" if stands else "would hit"
+    details = {"body": hit.body, "with": hit.keep_out, "joints": values, **fields}
+    return NoSolutionError(
+        f"{hit.body} {verb} {hit.keep_out}{place or many}, at {joints_text}: nothing was moved", **details
+    )
 
 
 def free_way(arm: Arm, q: Array, goal: Array) -> tuple[float, NoSolutionError | None]:
@@ -169,10 +171,10 @@ def free_way(arm: Arm, q: Array, goal: Array) -> tuple[float, NoSolutionError | 
     if not arm.keep_out or arm.ignores_keep_out or np.array_equal(q, goal):
         return 1.0, None
     way = Trajectory(arm, q, (Straight(q, goal, trapezoid(1.0, 1.0, 1.0)),))
-    found = prove_trajectory(way)
-    if found is None or found.free:
+    proof = prove_trajectory(way)
+    if proof is None or proof.free:
         return 1.0, None
-    return found.cell, refusal(way, found)
+    return proof.cell, hit_refusal(way, proof)
 
 
 def hit_samples(arm: Arm, q: Array) -> NDArray[np.bool_] | None:
@@ -181,14 +183,14 @@ def hit_samples(arm: Arm, q: Array) -> NDArray[np.bool_] | None:
         return None
     from armkin.keep_out.body_pairs import guard
 
-    whole, full = whole_arm(arm, q)
-    return find_hits(guard(whole), full)
+    full_arm, full = whole_arm(arm, q)
+    return find_hits(guard(full_arm), full)
 
 
-def hits_said(arm: Arm, q: Array) -> str:
+def hit_text(arm: Arm, q: Array) -> str:
     """What a posture (n,) hits: ``q3 hits table``."""
-    [(_, found)] = hits(arm, q[None])
-    return f"{found[0]['body']} hits {found[0]['with']}" if found else "the arm hits something"
+    [(_, pairs)] = hits(arm, q[None])
+    return f"{pairs[0]['body']} hits {pairs[0]['with']}" if pairs else "the arm hits something"
 
 
 @dataclass(frozen=True)
@@ -209,24 +211,26 @@ class _UnlockedWay:
 
     def variation(self, begin: Array, end: Array) -> Array:
         """How far each joint of the whole arm goes between two places."""
-        arm, found = self.arm, self.way.variation(begin, end)
+        arm, way = self.arm, self.way.variation(begin, end)
         while arm.whole is not None:
             arm, held = arm.whole
-            found = unlock(arm, dict.fromkeys(held, 0.0), found)
-        return found
+            way = unlock(arm, dict.fromkeys(held, 0.0), way)
+        return way
 
 
 def _geometries(trajectory: Trajectory) -> list[tuple[int, Way]]:
     """The stretches' geometry, those that are cubics together; and the number of the first stretch of each."""
-    found: list[tuple[int, Way]] = []
+    geometries: list[tuple[int, Way]] = []
     numbered = enumerate(trajectory.stretches)
     for smooth, group in groupby(numbered, key=lambda item: isinstance(item[1], Smoothed)):
         part = list(group)
         if smooth:
-            found += [(k, _OfCurve(stretch)) for k, stretch in part if isinstance(stretch, Smoothed)]
+            geometries += [(k, _SmoothedWay(stretch)) for k, stretch in part if isinstance(stretch, Smoothed)]
         else:
-            found.append((part[0][0], Cubics(np.concatenate([_points(stretch) for _, stretch in part], axis=1))))
-    return found
+            geometries.append(
+                (part[0][0], Cubics(np.concatenate([_control_points(stretch) for _, stretch in part], axis=1)))
+            )
+    return geometries
 
 
 def _proof_on_trajectory(
@@ -235,36 +239,36 @@ def _proof_on_trajectory(
     """A proof in the terms of the trajectory."""
     stretch, cell = first, proof.place
     if isinstance(way, Cubics):
-        sizes = [_cells(one) for one in trajectory.stretches[first:]]
+        sizes = [_cell_count(later) for later in trajectory.stretches[first:]]
         while cell >= sizes[stretch - first] and stretch + 1 < len(trajectory.stretches):
             if not isinstance(trajectory.stretches[stretch + 1], Straight | Curve):
                 break
             cell -= sizes[stretch - first]
             stretch += 1
-    body, other = ("", "") if proof.pair is None else held.pair_names(proof.pair)
+    body, keep_out = ("", "") if proof.pair is None else held.pair_names(proof.pair)
     joints = way.joints_at(np.array([proof.place]))[0]
     pairs = tuple(held.pair_names(k) for k in escaping)
-    return TrajectoryProof(proof.free, proof.mm, stretch, cell, joints, body, other, pairs, postures)
+    return TrajectoryProof(proof.free, proof.mm, stretch, cell, joints, body, keep_out, pairs, postures)
 
 
-def _cells(stretch: Stretch) -> int:
+def _cell_count(stretch: Stretch) -> int:
     return len(stretch.path.h) if isinstance(stretch, Curve) else 1
 
 
-def seconds(trajectory: Trajectory, hit: TrajectoryProof) -> float:
+def hit_time(trajectory: Trajectory, hit: TrajectoryProof) -> float:
     """When, after the beginning, a trajectory is at the place that a proof has found [s]."""
     stretch = trajectory.stretches[hit.stretch]
     begin = float(trajectory.begins[hit.stretch])
     if isinstance(stretch, Smoothed):
-        return begin + min(hit.cell / _OfCurve(stretch).cells, 1.0) * stretch.duration
+        return begin + min(hit.cell / _SmoothedWay(stretch).cells, 1.0) * stretch.duration
     if isinstance(stretch, Curve):
         times = stretch.times
         i = min(int(hit.cell), len(times) - 2)
         return begin + float(times[i] + (hit.cell - i) * (times[i + 1] - times[i]))
-    return begin + _of_share(stretch, hit.cell)
+    return begin + _time_of_share(stretch, hit.cell)
 
 
-def _of_share(stretch: Stretch, share: float) -> float:
+def _time_of_share(stretch: Stretch, share: float) -> float:
     """When a straight line has gone so far: its law never goes back."""
     low, high = 0.0, stretch.duration
     way = stretch.end - stretch.start

@@ -48,7 +48,7 @@ class Knots:
 
     def slopes(self, intervals: slice | Int = slice(None)) -> tuple[Array, Array, Array]:
         """q' at the left end of intervals, q'' there and at the right end: (n, M) thrice, long runs of numbers."""
-        (q0, q1), (d0, d1) = (self.ends(each, intervals) for each in (self.q, self.d))
+        (q0, q1), (d0, d1) = (self.ends(values, intervals) for values in (self.q, self.d))
         h = self.h[intervals]
         chord = (q1 - q0) / h
         return d0, (6 * chord - 4 * d0 - 2 * d1) / h, (-6 * chord + 2 * d0 + 4 * d1) / h

@@ -9,7 +9,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.motion.timing.cubic_knots import Knots
-from armkin.motion.timing.speed_bounds import TINY, in_parts
+from armkin.motion.timing.speed_bounds import TINY, interval_parts
 from armkin.motion.timing.trajectory import BRAKE
 from armkin.motors import motor_accel
 
@@ -27,20 +27,20 @@ def hold_cap(arm: Arm, path: Knots, share: float) -> Array:
     BRAKE max_accel, so that what is kept at x is kept on the whole way down to rest.
     """
     parts = [
-        _hold_cap(arm, Knots(path.s[a : b + 1], path.q[a : b + 1], path.d[a : b + 1]), share)
-        for a, b in ((some.start, some.stop) for some in in_parts(len(path.s) - 1))
+        _part_cap(arm, Knots(path.s[a : b + 1], path.q[a : b + 1], path.d[a : b + 1]), share)
+        for a, b in ((intervals.start, intervals.stop) for intervals in interval_parts(len(path.s) - 1))
     ]
     for before, after in pairwise(parts):
         after[0] = min(before[-1], after[0])
     return np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]])
 
 
-def _hold_cap(arm: Arm, path: Knots, share: float) -> Array:
+def _part_cap(arm: Arm, path: Knots, share: float) -> Array:
     """`hold_cap` of a part of the way."""
     gain = arm.motor_gain
     brakes = BRAKE * motor_accel(arm)
     ends = path.second_derivatives()
-    out = np.full(len(path.s), np.inf)
+    caps = np.full(len(path.s), np.inf)
     rate = path.d @ gain.T
     m = (np.abs(rate) / brakes).argmax(axis=1)
     lead = rate[np.arange(len(m)), m]
@@ -52,6 +52,6 @@ def _hold_cap(arm: Arm, path: Knots, share: float) -> Array:
         turned = (second * gain[m[part]]).sum(axis=1)
         bend = second - ratio[part] * turned[:, None]
         left = most - np.sign(bend) * slowing[part]
-        cap = np.maximum(left, 0.0) / np.maximum(np.abs(bend), TINY)
-        out[part] = np.minimum(out[part], cap.min(axis=1))
-    return out
+        interval_cap = np.maximum(left, 0.0) / np.maximum(np.abs(bend), TINY)
+        caps[part] = np.minimum(caps[part], interval_cap.min(axis=1))
+    return caps

@@ -21,7 +21,7 @@ _X = np.array([0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9
 _W = np.array([0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692])
 
 
-def window(accel: Array, jerk: ArrayLike) -> float:
+def smoothing_window(accel: Array, jerk: ArrayLike) -> float:
     """Seconds over which a curve's mean has at most that jerk: (n,) [rad/s2 | mm/s2], (n,) [rad/s3 | mm/s3]."""
     return float((2 * accel / np.asarray(jerk, dtype=float)).max())
 
@@ -77,22 +77,22 @@ class Smoothed:
         inside = np.clip(t, 0.0, curve.duration)
         i = np.clip(np.searchsorted(curve.times, inside, side="right") - 1, 0, len(curve.times) - 2)
         step = inside - curve.times[i]
-        at = curve.times[i][:, None] + step[:, None] * _X
-        q = curve.evaluate(at.ravel()).reshape(*at.shape, -1) - self.start
+        nodes = curve.times[i][:, None] + step[:, None] * _X
+        q = curve.evaluate(nodes.ravel()).reshape(*nodes.shape, -1) - self.start
         part = (q * _W[:, None]).sum(axis=1) * step[:, None]
         beyond = np.maximum(t - curve.duration, 0.0)[:, None] * (self.end - self.start)
         return np.asarray(self._sums[i] + part + beyond)
 
     def evaluate(self, t: Array, derivative: int = 0) -> Array:
         """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
-        now = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
-        then = now - self.window
+        end = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        begin = end - self.window
         if derivative == 0:
-            return np.asarray(self.start + (self._integral(now) - self._integral(then)) / self.window)
-        change = self.curve.evaluate(now, derivative - 1) - self.curve.evaluate(then, derivative - 1)
+            return np.asarray(self.start + (self._integral(end) - self._integral(begin)) / self.window)
+        change = self.curve.evaluate(end, derivative - 1) - self.curve.evaluate(begin, derivative - 1)
         if derivative == 2:  # speeds before and after the curve are 0, whatever the clipped ends say
-            inside = [((t >= 0) & (t <= self.curve.duration))[:, None] for t in (now, then)]
-            change = self.curve.evaluate(now, 1) * inside[0] - self.curve.evaluate(then, 1) * inside[1]
+            inside = [((t >= 0) & (t <= self.curve.duration))[:, None] for t in (end, begin)]
+            change = self.curve.evaluate(end, 1) * inside[0] - self.curve.evaluate(begin, 1) * inside[1]
         return np.asarray(change / self.window)
 
 
@@ -103,7 +103,7 @@ def way_of(stretch: Curve | Smoothed) -> Knots:
 
 def ways_of(stretches: Sequence[Curve | Smoothed]) -> Knots:
     """The ways of stretches one after another as one, with a rest between each two."""
-    ways = [way_of(one) for one in stretches]
+    ways = [way_of(stretch) for stretch in stretches]
     if len(ways) == 1:
         return ways[0]
     return Knots(*(np.concatenate([getattr(way, part) for way in ways]) for part in ("s", "q", "d")))

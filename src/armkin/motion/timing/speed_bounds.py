@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Int
 from armkin.motion.timing.cubic_knots import Knots
-from armkin.motion.timing.speed_scan import Least, backward_step, concatenate, forward_step, least_of, scan
+from armkin.motion.timing.speed_scan import Least, backward_step, concatenate_least, forward_step, least_of, scan
 
 TINY = 1e-300
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
 _PAIRS = 4096  # intervals whose rows are compared pair by pair at once
 
-Some = slice | Int  # of the intervals
+Intervals = slice | Int  # of the intervals
 
 
 class Motion(NamedTuple):
@@ -74,7 +74,7 @@ class Bound:
         self.path, self.accel, self.weights = path, accel, rows
         self.count = path.q.shape[1] + (0 if rows is None else len(rows[0]))
 
-    def motion_in(self, intervals: Some) -> Motion:
+    def motion_in(self, intervals: Intervals) -> Motion:
         """What is bounded along some of the intervals."""
         first, left, right = self.path.slopes(intervals)
         low = np.minimum(self.accel[:-1][intervals], self.accel[1:][intervals]).T  # of two limits the lower one counts
@@ -92,46 +92,46 @@ class Fastest:
         self.bound, self.cap = bound, cap
         M = len(cap) - 1
         self.share = np.ones((bound.count, M), np.float32)  # of the accelerations
-        parts = [self._functions(some) for some in in_parts(M)]
-        self.backward_bounds = concatenate([one for one, _ in reversed(parts)])
-        self.forward_bounds = concatenate([one for _, one in parts])
+        parts = [self._functions(intervals) for intervals in interval_parts(M)]
+        self.backward_bounds = concatenate_least([bounds for bounds, _ in reversed(parts)])
+        self.forward_bounds = concatenate_least([bounds for _, bounds in parts])
         self.beta = scan(cap[::-1], self.backward_bounds)[::-1]
         self.x = scan(self.beta, self.forward_bounds)
 
     def lower_speeds(self, intervals: Int) -> None:
         """Lower x: cap or share has sunk in some intervals (k,), ascending, or at their ends."""
         M = len(self.cap) - 1
-        for part in in_parts(len(intervals)):
-            at = intervals[part]
-            behind, forth = self._functions(at)
-            self.backward_bounds = self.backward_bounds.replace_intervals(M - 1 - at[::-1], behind)
-            self.forward_bounds = self.forward_bounds.replace_intervals(at, forth)
+        for part in interval_parts(len(intervals)):
+            rows = intervals[part]
+            behind, forth = self._functions(rows)
+            self.backward_bounds = self.backward_bounds.replace_intervals(M - 1 - rows[::-1], behind)
+            self.forward_bounds = self.forward_bounds.replace_intervals(rows, forth)
         self.beta = scan(np.minimum(self.beta, self.cap)[::-1], self.backward_bounds)[::-1]
         self.x = scan(self.beta, self.forward_bounds, self.x)
 
-    def _functions(self, intervals: Some) -> tuple[Least, Least]:
+    def _functions(self, intervals: Intervals) -> tuple[Least, Least]:
         """What the next x, and the one before it, are at most, in some of the intervals; the cap sinks to suit."""
         motion = self.bound.motion_in(intervals)
-        P, R, C = _rows(motion._replace(accel=motion.accel * self.share[:, intervals]))
+        P, R, C = _constraint_rows(motion._replace(accel=motion.accel * self.share[:, intervals]))
         slope, level, h = R / P, C / P, motion.h
         # x + 2 h u >= x / 2 must leave room below the upper bounds of u: no interval may force more, since where they
         # are long beside a bend the greatest x would lead to rest, and the law may stand there forever
         steep = slope - 0.25 / h
         room = np.where(steep > 0, level / steep, np.inf).min(axis=0)
-        left = _meeting(np.minimum(self.cap[:-1][intervals], room), slope, level)
+        left = _largest_feasible(np.minimum(self.cap[:-1][intervals], room), slope, level)
         self.cap[:-1][intervals] = left
         forth, m = forward_step(h, slope, level), len(h)
-        a, b = (np.concatenate(each, axis=1) for each in zip(backward_step(*forth), forth, strict=True))
+        a, b = (np.concatenate(terms, axis=1) for terms in zip(backward_step(*forth), forth, strict=True))
         both = least_of(a, b, np.concatenate([self.cap[1:][intervals][::-1], left]))
         return both.part(0, m), both.part(m, 2 * m)
 
 
-def in_parts(intervals: int) -> list[slice]:
+def interval_parts(intervals: int) -> list[slice]:
     """The intervals in parts that are worked on at once: a long path in bounded memory."""
     return [slice(k, min(k + _AT_ONCE, intervals)) for k in range(0, max(intervals, 1), _AT_ONCE)]
 
 
-def _rows(motion: Motion) -> tuple[Array, Array, Array]:
+def _constraint_rows(motion: Motion) -> tuple[Array, Array, Array]:
     """P > 0, R, C of |P u + R x| <= C, x at the left end, for both ends of the intervals: (k, M)."""
     right = motion.left_slope + motion.bend
     p = np.concatenate([motion.first, motion.first + motion.h * (3 * motion.left_slope + 2.5 * motion.bend)])
@@ -141,26 +141,26 @@ def _rows(motion: Motion) -> tuple[Array, Array, Array]:
     return P, np.copysign(1.0, p) * r, np.concatenate([motion.accel, motion.accel])
 
 
-def _meeting(cap: Array, slope: Array, level: Array) -> Array:
+def _largest_feasible(cap: Array, slope: Array, level: Array) -> Array:
     """The largest x, up to cap, at which some u keeps to all rows: where the first two of them exclude each other.
 
     u is at least -level_i - slope_i x and at most level_j - slope_j x, for all i and j.
     """
-    out = cap.copy()
+    feasible = cap.copy()
     turned = slope * cap
     lowest, highest = -(level + turned).min(axis=0), (level - turned).min(axis=0)
     surely = lowest < highest - 1e-9 * np.abs(highest)  # cap itself leaves room for u
     close = (~surely).nonzero()[0]
-    i, j = _pairs(len(slope))
+    i, j = _index_pairs(len(slope))
     for begin in range(0, len(close), _PAIRS):
-        some = close[begin : begin + _PAIRS]
-        sl, lv = slope.take(some, axis=1), level.take(some, axis=1)
-        met = (lv.take(i, axis=0) + lv.take(j, axis=0)) / np.abs(sl.take(i, axis=0) - sl.take(j, axis=0))
-        out[some] = np.fmin(out[some], np.fmin.reduce(met, axis=0, initial=np.inf))
-    return out
+        rows = close[begin : begin + _PAIRS]
+        sl, lv = slope.take(rows, axis=1), level.take(rows, axis=1)
+        crossing = (lv.take(i, axis=0) + lv.take(j, axis=0)) / np.abs(sl.take(i, axis=0) - sl.take(j, axis=0))
+        feasible[rows] = np.fmin(feasible[rows], np.fmin.reduce(crossing, axis=0, initial=np.inf))
+    return feasible
 
 
 @cache
-def _pairs(k: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _index_pairs(k: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Every two of k rows."""
     return np.triu_indices(k, 1)

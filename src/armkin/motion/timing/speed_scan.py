@@ -31,27 +31,27 @@ class Least(NamedTuple):
 
     def values(self, y: Array) -> Array:
         """What every interval says of y: (M,) -> (M,)."""
-        out = np.minimum(self.a0 * y + self.b0, self.a1 * y + self.b1)
-        np.minimum.at(out, self.interval, self.slope * y[self.interval] + self.level)
-        return out
+        lowest = np.minimum(self.a0 * y + self.b0, self.a1 * y + self.b1)
+        np.minimum.at(lowest, self.interval, self.slope * y[self.interval] + self.level)
+        return lowest
 
     def part(self, lo: int, hi: int) -> Least:
         """The same of intervals lo to hi."""
         first, last = np.searchsorted(self.interval, [lo, hi])
-        a0, b0, a1, b1 = (each[lo:hi] for each in (self.a0, self.b0, self.a1, self.b1))
+        a0, b0, a1, b1 = (values[lo:hi] for values in (self.a0, self.b0, self.a1, self.b1))
         return Least(a0, b0, a1, b1, self.interval[first:last] - lo, self.slope[first:last], self.level[first:last])
 
-    def replace_intervals(self, intervals: Int, new: Least) -> Least:
+    def replace_intervals(self, intervals: Int, functions: Least) -> Least:
         """The same with other functions in some intervals (k,), ascending."""
-        for mine, one in zip(self[:4], new[:4], strict=True):
-            mine[intervals] = one
+        for own, values in zip(self[:4], functions[:4], strict=True):
+            own[intervals] = values
         fresh = np.zeros(len(self.a0), bool)
         fresh[intervals] = True
-        kept = ~fresh[self.interval]
-        at = np.concatenate([self.interval[kept], intervals[new.interval]])
-        order = np.argsort(at, kind="stable")
-        slope, level = (np.concatenate([a[kept], b])[order] for a, b in zip(self[5:], new[5:], strict=True))
-        return self._replace(interval=at[order], slope=slope, level=level)
+        unchanged = ~fresh[self.interval]
+        intervals_after = np.concatenate([self.interval[unchanged], intervals[functions.interval]])
+        order = np.argsort(intervals_after, kind="stable")
+        slope, level = (np.concatenate([a[unchanged], b])[order] for a, b in zip(self[5:], functions[5:], strict=True))
+        return self._replace(interval=intervals_after[order], slope=slope, level=level)
 
 
 def least_of(a: Array, b: Array, top: Array) -> Least:
@@ -66,14 +66,14 @@ def least_of(a: Array, b: Array, top: Array) -> Least:
     return Least(a0, b0, a1, b1, two[k], a[j, k], b[j, k])
 
 
-def concatenate(parts: list[Least]) -> Least:
+def concatenate_least(parts: list[Least]) -> Least:
     """The same of intervals one part after another."""
     if len(parts) == 1:
         return parts[0]
     begin = np.cumsum([0, *(len(part.a0) for part in parts)])
-    at = np.concatenate([part.interval + k for part, k in zip(parts, begin, strict=False)])
-    a0, b0, a1, b1, _, slope, level = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return Least(a0, b0, a1, b1, at, slope, level)
+    intervals = np.concatenate([part.interval + k for part, k in zip(parts, begin, strict=False)])
+    a0, b0, a1, b1, _, slope, level = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return Least(a0, b0, a1, b1, intervals, slope, level)
 
 
 def forward_step(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:
@@ -94,86 +94,86 @@ def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
     before it, nothing has to be done: in most intervals. Runs that begin where it is not are followed side by side,
     as long as there are many.
     """
-    out = (top if previous is None else previous).copy()
-    out[0] = top[0]
+    y = (top if previous is None else previous).copy()
+    y[0] = top[0]
     first = np.append(
         0, np.cumsum(np.bincount(least.interval, minlength=len(top) - 1))
     )  # of each interval's other functions
     for _ in range(_TIMES):
-        found = least.values(out[:-1])
-        k = (np.minimum(top[1:], np.where(found > 0.0, found, 0.0)) != out[1:]).nonzero()[0]
+        reached = least.values(y[:-1])
+        k = (np.minimum(top[1:], np.where(reached > 0.0, reached, 0.0)) != y[1:]).nonzero()[0]
         heads = k[np.diff(k, prepend=-2) > 1]  # the run of a first one passes those next to it
         if len(heads) <= _TOGETHER:
             break
-        _side_by_side(out, least, first, heads, top)
-    done = 0
+        _follow_runs(y, least, first, heads, top)
+    end = 0
     for begin in k.tolist():
-        if begin >= done:
-            done = _follow(out, least, first, begin, top)
-    return out
+        if begin >= end:
+            end = _follow_run(y, least, first, begin, top)
+    return y
 
 
-def _side_by_side(y: Array, least: Least, first: Int, heads: Int, top: Array) -> None:
+def _follow_runs(y: Array, least: Least, first: Int, heads: Int, top: Array) -> None:
     """Follow runs from places (r,), each up to where y is what comes there; write those that no other one passes."""
-    k, now, run, end = heads, y[heads], np.arange(len(heads)), len(y) - 1
+    k, current, run, end = heads, y[heads], np.arange(len(heads)), len(y) - 1
     ends = np.full(len(heads), end)
-    found: list[tuple[Int, Int, Array]] = []
+    steps: list[tuple[Int, Int, Array]] = []
     while len(k):
-        value = np.minimum(least.a0[k] * now + least.b0[k], least.a1[k] * now + least.b1[k])
+        value = np.minimum(least.a0[k] * current + least.b0[k], least.a1[k] * current + least.b1[k])
         begin = first[k]
         count = first[k + 1] - begin
         for i in range(int(count.max())):
-            some = (count > i).nonzero()[0]
-            row = begin[some] + i
-            value[some] = np.minimum(value[some], least.slope[row] * now[some] + least.level[row])
+            rows = (count > i).nonzero()[0]
+            row = begin[rows] + i
+            value[rows] = np.minimum(value[rows], least.slope[row] * current[rows] + least.level[row])
         k = k + 1
-        now = np.minimum(top[k], np.where(value > 0.0, value, 0.0))
-        other = now != y[k]
-        ends[run[~other]] = k[~other]
-        k, now, run = k[other], now[other], run[other]
-        found.append((run, k, now))
+        current = np.minimum(top[k], np.where(value > 0.0, value, 0.0))
+        differs = current != y[k]
+        ends[run[~differs]] = k[~differs]
+        k, current, run = k[differs], current[differs], run[differs]
+        steps.append((run, k, current))
         inside = k < end
-        k, now, run = k[inside], now[inside], run[inside]
-        if len(found) > _LONGEST and len(k) <= _TOGETHER:  # these are followed one by one
+        k, current, run = k[inside], current[inside], run[inside]
+        if len(steps) > _LONGEST and len(k) <= _TOGETHER:  # these are followed one by one
             ends[run] = k
             break
-    done, kept = 0, np.zeros(len(heads), bool)
+    end_of_last, written = 0, np.zeros(len(heads), bool)
     for i, (begin_, end_) in enumerate(zip(heads.tolist(), ends.tolist(), strict=True)):
-        if begin_ >= done:
-            kept[i], done = True, end_
-    for run, k, now in found:
-        some = kept[run]
-        y[k[some]] = now[some]
+        if begin_ >= end_of_last:
+            written[i], end_of_last = True, end_
+    for run, k, current in steps:
+        rows = written[run]
+        y[k[rows]] = current[rows]
 
 
-def _lists(least: Least, intervals: slice) -> dict[int, list[tuple[float, float]]]:
+def _functions_by_interval(least: Least, intervals: slice) -> dict[int, list[tuple[float, float]]]:
     """Some of the other functions, by the intervals that have them."""
-    more: dict[int, list[tuple[float, float]]] = {}
-    for at, slope, level in zip(*(each[intervals].tolist() for each in least[4:]), strict=True):
-        more.setdefault(at, []).append((slope, level))
-    return more
+    functions: dict[int, list[tuple[float, float]]] = {}
+    for interval, slope, level in zip(*(column[intervals].tolist() for column in least[4:]), strict=True):
+        functions.setdefault(interval, []).append((slope, level))
+    return functions
 
 
-def _follow(y: Array, least: Least, first: Int, k: int, most: Array) -> int:
+def _follow_run(y: Array, least: Least, first: Int, k: int, most: Array) -> int:
     """Put right y[k+1], ... up to some place where it is what comes there, and return that."""
-    now, size = float(y[k]), _FEWEST
+    current, size = float(y[k]), _FEWEST
     while True:
         end = min(k + size, len(y) - 1)
-        tops, last, found = most[k + 1 : end + 1].tolist(), y[end], []
-        rows = (each[k:end].tolist() for each in least[:4])
-        more = _lists(least, slice(first[k], first[end]))
+        tops, last, values = most[k + 1 : end + 1].tolist(), y[end], []
+        rows = (column[k:end].tolist() for column in least[:4])
+        functions = _functions_by_interval(least, slice(first[k], first[end]))
         for i, top, a0, b0, a1, b1 in zip(range(k, end), tops, *rows, strict=True):
-            value, other = a0 * now + b0, a1 * now + b1
-            if other < value:
-                value = other
-            if i in more:
-                for a, b in more[i]:
-                    other = a * now + b
-                    if other < value:
-                        value = other
-            now = top if top < value else value if value > 0.0 else 0.0
-            found.append(now)
-        y[k + 1 : end + 1] = found
-        if now == last or end == len(y) - 1:
+            value, candidate = a0 * current + b0, a1 * current + b1
+            if candidate < value:
+                value = candidate
+            if i in functions:
+                for a, b in functions[i]:
+                    candidate = a * current + b
+                    if candidate < value:
+                        value = candidate
+            current = top if top < value else value if value > 0.0 else 0.0
+            values.append(current)
+        y[k + 1 : end + 1] = values
+        if current == last or end == len(y) - 1:
             return end
         k, size = end, min(2 * size, _MOST)

@@ -24,7 +24,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int, numbers_within
 from armkin.motion.timing.cubic_knots import Knots
-from armkin.motion.timing.speed_bounds import TINY, Bound, Fastest, in_parts
+from armkin.motion.timing.speed_bounds import TINY, Bound, Fastest, interval_parts
 
 _NEIGHBOURS = 5  # samples that give a slope
 _SECTIONS = 16  # of samples, between breaks: more are worked on together
@@ -45,7 +45,7 @@ class Bounds:
     cap: Array  # (N,) of x: tool speed and whatever else bounds ds/dt
 
 
-def knots(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequence[int] = ()) -> Knots:
+def knots_of_samples(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequence[int] = ()) -> Knots:
     """Slopes of samples from five neighbours each, none of them beyond a break (indices where q'' jumps).
 
     s: (N,) increasing; q: (N, n). The slopes are exact to the fourth order of the spacing; at a break it is the
@@ -54,26 +54,29 @@ def knots(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequence[int] =
     N = len(s)
     edges = np.unique([0, N - 1, *breaks])
     if len(rests) or (len(edges) > _SECTIONS and np.diff(edges).min() >= _NEIGHBOURS - 1):
-        return _in_sections(s, q, edges, np.isin(edges[1:-1], rests))
+        return _knots_in_sections(s, q, edges, np.isin(edges[1:-1], rests))
     total, count = np.zeros_like(q), np.zeros(N)
     for lo, hi in pairwise(edges.tolist()):
-        for some in in_parts(hi + 1 - lo):
-            i = np.arange(lo + some.start, lo + some.stop)
+        for part in interval_parts(hi + 1 - lo):
+            i = np.arange(lo + part.start, lo + part.stop)
             total[i] += _slopes_at(s, q, i, np.full(len(i), lo), np.full(len(i), hi))
         count[lo : hi + 1] += 1
     total /= count[:, None]
     return Knots(s, q, total)
 
 
-def _in_sections(s: Array, q: Array, edges: Int, rests: Bool) -> Knots:
-    """`knots` of many short sections, all at once; rests: (k,) at which of the edges between two of them it rests."""
+def _knots_in_sections(s: Array, q: Array, edges: Int, rests: Bool) -> Knots:
+    """`knots_of_samples` of many short sections, all at once.
+
+    rests: (k,) at which of the edges between two of them it rests.
+    """
     size = np.diff(edges) + 1
     first = np.repeat(edges[:-1], size)
     begin = np.cumsum(size) - size
     i = numbers_within(size) + first
     last = np.repeat(edges[1:], size)
-    parts = [slice(some.start, some.stop) for some in in_parts(len(i))]
-    slopes = np.concatenate([_slopes_at(s, q, i[some], first[some], last[some]) for some in parts])
+    parts = [slice(part.start, part.stop) for part in interval_parts(len(i))]
+    slopes = np.concatenate([_slopes_at(s, q, i[part], first[part], last[part]) for part in parts])
     smooth = begin[1:][~rests]
     slopes[smooth - 1] = (slopes[smooth - 1] + slopes[smooth]) / 2
     keep = np.ones(len(i), bool)
@@ -88,20 +91,20 @@ def _slopes_at(s: Array, q: Array, i: Int, first: Int, last: Int) -> Array:
     (Berrut and Trefethen, Barycentric Lagrange interpolation, 2004, section 9).
     """
     w = min(_NEIGHBOURS, int((last - first).min(initial=_NEIGHBOURS)) + 1)
-    at = np.clip(i - w // 2, first, last + 1 - w) + np.arange(w)[:, None]  # (w, m)
-    x = s[at]
+    neighbours = np.clip(i - w // 2, first, last + 1 - w) + np.arange(w)[:, None]  # (w, m)
+    x = s[neighbours]
     inverse = [np.prod([x[j] - x[m] for m in range(w) if m != j], axis=0) for j in range(w)]  # 1 / l_j
-    mine = np.choose(i - at[0], inverse) if w > 1 else np.ones(len(i))
-    out = np.zeros_like(q[i])
+    mine = np.choose(i - neighbours[0], inverse) if w > 1 else np.ones(len(i))
+    slopes = np.zeros_like(q[i])
     for j in range(w):
         apart = x[j] - s[i]
-        there = apart != 0
-        weight = np.divide(mine, inverse[j] * -apart, out=np.zeros(len(i)), where=there)
-        out += weight[:, None] * (q[at[j]] - q[i])
-    return out
+        distinct = apart != 0
+        weight = np.divide(mine, inverse[j] * -apart, out=np.zeros(len(i)), where=distinct)
+        slopes += weight[:, None] * (q[neighbours[j]] - q[i])
+    return slopes
 
 
-def finer(path: Knots) -> Knots:
+def refine_knots(path: Knots) -> Knots:
     """The same cubics on more grid points, if there are few: u is constant between two of them.
 
     With 100 samples, twice as many points make the law of time 0.1 to 2 % faster.
@@ -111,21 +114,21 @@ def finer(path: Knots) -> Knots:
     parts = max(2, round(200 / len(path.s)))
     h, f = path.h[:, None], (np.arange(parts) / parts)[:, None, None]
     d0, d1, chord = path.d[:-1] * h, path.d[1:] * h, path.q[1:] - path.q[:-1]
-    off = d0 - chord
-    c3 = off + d1 - chord
-    c2 = -(off + c3)
+    excess = d0 - chord
+    c3 = excess + d1 - chord
+    c2 = -(excess + c3)
     s = path.s[:-1] + path.h * f[..., 0]
     q = path.q[:-1] + f * (d0 + f * (c2 + f * c3))
     d = (d0 + f * (2 * c2 + 3 * f * c3)) / h
-    return Knots(_woven(s, path.s[-1:]), _woven(q, path.q[-1:]), _woven(d, path.d[-1:]))
+    return Knots(_interleave(s, path.s[-1:]), _interleave(q, path.q[-1:]), _interleave(d, path.d[-1:]))
 
 
-def _woven(inside: Array, last: Array) -> Array:
+def _interleave(inside: Array, last: Array) -> Array:
     """Values at each fraction of every interval, (parts, N - 1, ...), one interval after the other, and the last."""
     return np.concatenate([inside.swapaxes(0, 1).reshape(-1, *last.shape[1:]), last])
 
 
-def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None) -> Array:
+def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None) -> Array:
     """x = (ds/dt)^2 of the fastest law from rest to rest: (N,).
 
     rows: weights (k, n) of joints and the greatest acceleration (k,) of each such sum: coupled motors.
@@ -137,9 +140,9 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         cap = np.minimum(bounds.cap, _MOST)
         speed = np.broadcast_to(bounds.speed, path.q.shape)
-        for some in in_parts(len(cap)):
-            rate = np.ascontiguousarray((speed[some] / np.maximum(np.abs(path.d[some]), TINY)).T).min(axis=0)
-            cap[some] = np.minimum(cap[some], rate**2)
+        for points in interval_parts(len(cap)):
+            rate = np.ascontiguousarray((speed[points] / np.maximum(np.abs(path.d[points]), TINY)).T).min(axis=0)
+            cap[points] = np.minimum(cap[points], rate**2)
         cap[0] = cap[-1] = cap[path.rests] = cap[path.rests + 1] = 0.0
         if len(cap) < 2:
             return np.asarray(cap)
@@ -147,8 +150,8 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
         law = Fastest(limits, cap)
         worst, moved = np.ones(len(path.h)), np.arange(len(path.h))
         for round_ in range(_ROUNDS):
-            for part in in_parts(len(moved)):
-                worst[moved[part]] = _lowered(law, limits, speed, moved[part], share=round_ < _SHARED)
+            for part in interval_parts(len(moved)):
+                worst[moved[part]] = _lower_law(law, limits, speed, moved[part], share=round_ < _SHARED)
             if worst.max() <= _EXCESS:
                 return law.x
             if round_ < _ROUNDS - 1:
@@ -161,7 +164,7 @@ def optimal(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None
         return np.asarray(law.x / np.append(np.repeat(slower, np.diff(np.append(begins, len(worst)))), slower[-1]))
 
 
-def _lowered(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, share: bool) -> Array:
+def _lower_law(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, share: bool) -> Array:
     """Greatest shares of the limits in some intervals (k,); where one is above 1, the law is given less there."""
     motion, x0, x1 = limits.motion_in(intervals), law.x[intervals], law.x[intervals + 1]
     over = motion.excess(x0, x1)
@@ -171,8 +174,8 @@ def _lowered(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, share
         law.share[:, intervals] /= np.where(over > _LITTLE, over, 1.0)
     less = rush if share else worst
     low = np.flatnonzero(less > _LITTLE)
-    for at, x in ((intervals[low], x0[low]), (intervals[low] + 1, x1[low])):
-        np.fmin.at(law.cap, at, x / less[low])
+    for points, x in ((intervals[low], x0[low]), (intervals[low] + 1, x1[low])):
+        np.fmin.at(law.cap, points, x / less[low])
     return np.asarray(worst)
 
 

@@ -74,7 +74,7 @@ class Straight:
         return np.asarray(self.start + along if derivative == 0 else along)
 
 
-def brake(stretch: Stretch) -> float:
+def brake_share(stretch: Stretch) -> float:
     """Share of the motors' accelerations with which a board stops on a stretch: all on a straight line."""
     return 1.0 if isinstance(stretch, Straight) else BRAKE
 
@@ -139,9 +139,9 @@ class Trajectory:
             (..., n) [rad | mm].
 
         >>> import armkin, numpy as np
-        >>> from armkin.motion.joint_moves import plan
+        >>> from armkin.motion.joint_moves import plan_joint_moves
         >>> arm = armkin.load("robots/three_dof.yaml")
-        >>> p = plan(arm, np.deg2rad([0, 90, -90]), np.deg2rad([60, 90, -90]))
+        >>> p = plan_joint_moves(arm, np.deg2rad([0, 90, -90]), np.deg2rad([60, 90, -90]))
         >>> p.duration, np.rad2deg(p.q([0, 0.75, 1.5]))[:, 0].round(6).tolist()
         (1.5, [0.0, 30.0, 60.0])
         """
@@ -190,12 +190,12 @@ class Trajectory:
     def _evaluate(self, t: ArrayLike, derivative: int) -> Array:
         when = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         flat = when.ravel()
-        out = np.tile(self.start if derivative == 0 else np.zeros(self.arm.n), (len(flat), 1))
-        which = np.searchsorted(self.begins, flat, side="right") - 1
-        which = np.clip(which, 0, max(len(self.stretches) - 1, 0))
-        for k, here in group_numbers(which) if self.stretches else ():
-            out[here] = self.stretches[k].evaluate(flat[here] - self.begins[k], derivative)
-        return out.reshape(*when.shape, self.arm.n)
+        values = np.tile(self.start if derivative == 0 else np.zeros(self.arm.n), (len(flat), 1))
+        numbers = np.searchsorted(self.begins, flat, side="right") - 1
+        numbers = np.clip(numbers, 0, max(len(self.stretches) - 1, 0))
+        for k, rows in group_numbers(numbers) if self.stretches else ():
+            values[rows] = self.stretches[k].evaluate(flat[rows] - self.begins[k], derivative)
+        return values.reshape(*when.shape, self.arm.n)
 
 
 def group_numbers(numbers: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:

@@ -37,17 +37,17 @@ class Layout:
     @staticmethod
     def from_points(u: Array, curve: Int, knot: Bool) -> Layout:
         """The layout of points u on curves (numbers from 0, in order), some of which are knots: (N,) each."""
-        at, which = u[knot], curve[knot]
-        inner = np.flatnonzero(which[1:] == which[:-1])  # knots at which an interval begins
+        places, curves = u[knot], curve[knot]
+        inner = np.flatnonzero(curves[1:] == curves[:-1])  # knots at which an interval begins
         number = np.cumsum(knot) - 1
         before = np.searchsorted(inner, number)  # intervals that begin before the point's knot
         interval = before - (before == np.searchsorted(inner, number, side="right"))  # a curve's last knot: the last
-        first = np.searchsorted(which, which[inner])
-        last = np.searchsorted(which, which[inner], side="right") - 1
+        first = np.searchsorted(curves, curves[inner])
+        last = np.searchsorted(curves, curves[inner], side="right") - 1
         around = np.clip(inner + np.arange(-2, 4)[:, None], first, last)
-        control = np.arange(len(inner)) + 3 * which[inner]
-        count = len(inner) + 3 * (int(which[-1]) + 1)
-        return Layout(u, interval, at[inner], at[inner + 1], at[around], control, which[inner], count)
+        control = np.arange(len(inner)) + 3 * curves[inner]
+        count = len(inner) + 3 * (int(curves[-1]) + 1)
+        return Layout(u, interval, places[inner], places[inner + 1], places[around], control, curves[inner], count)
 
     def values(self, control: Array) -> Array:
         """Points of the curves at the layout's parameters: control points (C, d) -> (N, d)."""
@@ -67,8 +67,8 @@ class Layout:
     def powers(self, control: Array) -> Array:
         """Coefficients of the cubics over the fraction of each interval: (M, 4, d)."""
         size = self.end - self.begin
-        at = [_basis(self.knots, self.begin + f * size) for f in _THIRDS]
-        values = np.stack([sum(N[k, :, None] * control[self.control + k] for k in range(4)) for N in at], axis=1)
+        bases = [_basis(self.knots, self.begin + f * size) for f in _THIRDS]
+        values = np.stack([sum(N[k, :, None] * control[self.control + k] for k in range(4)) for N in bases], axis=1)
         return np.asarray(_TO_POWERS @ values)
 
 
@@ -80,11 +80,11 @@ def least_squares(layout: Layout, y: Array, weight: Array, ends: Bool) -> Array:
     bands = np.zeros((4, layout.count))
     right = np.zeros((layout.count, y.shape[1]))
     for j in range(4):
-        wj, at = w * N[j], first + j
+        wj, rows = w * N[j], first + j
         for k in range(j, 4):
-            bands[k - j] += np.bincount(at, wj * N[k], layout.count)
+            bands[k - j] += np.bincount(rows, wj * N[k], layout.count)
         for d, column in enumerate(columns):
-            right[:, d] += np.bincount(at, wj * column, layout.count)
+            right[:, d] += np.bincount(rows, wj * column, layout.count)
     _add_ridge(layout, bands)
     return solve_banded(bands, right)
 
@@ -96,14 +96,14 @@ def _add_ridge(layout: Layout, bands: Array) -> None:
     place = np.stack([t[k : k + 3].mean(axis=0) for k in range(4)], axis=1)
     starts = np.append(True, layout.curve[1:] != layout.curve[:-1])
     for k in (0, 1):
-        some = starts if k == 0 else np.ones(len(starts), bool)
-        a, b = place[some, k + 1] - place[some, k], place[some, k + 2] - place[some, k + 1]
+        used = starts if k == 0 else np.ones(len(starts), bool)
+        a, b = place[used, k + 1] - place[used, k], place[used, k + 2] - place[used, k + 1]
         size = np.minimum(a, b)
         row = np.stack([size / a, -size / a - size / b, size / b], axis=1)
-        at = layout.control[some] + k
+        rows = layout.control[used] + k
         for i in range(3):
             for j in range(i, 3):
-                bands[j - i] += _RIDGE * np.bincount(at + i, row[:, i] * row[:, j], layout.count)
+                bands[j - i] += _RIDGE * np.bincount(rows + i, row[:, i] * row[:, j], layout.count)
 
 
 def _basis(t: Array, u: Array) -> Array:
@@ -145,33 +145,33 @@ def solve_banded(bands: Array, right: Array) -> Array:
                 U[:, i, j - b] = full[k, rows + i]
     rhs = np.zeros((M * b, right.shape[1]))
     rhs[:n] = right
-    return _block_tridiagonal(D, U[:-1], rhs.reshape(M, b, -1)).reshape(M * b, -1)[:n]
+    return _solve_block_tridiagonal(D, U[:-1], rhs.reshape(M, b, -1)).reshape(M * b, -1)[:n]
 
 
-def _block_tridiagonal(D: Array, U: Array, b: Array) -> Array:
+def _solve_block_tridiagonal(D: Array, U: Array, b: Array) -> Array:
     """Symmetric block tridiagonal systems by cyclic reduction: every other block is eliminated, all at once.
 
     D: (M, k, k); U: (M - 1, k, k) blocks beside the diagonal; b: (M, k, d) -> (M, k, d).
     """
     k, m = D.shape[1], len(D) // 2  # size of blocks, blocks that go
     if len(D) <= _DENSE:
-        whole, i = np.zeros((len(D), k, len(D), k)), np.arange(len(D))
-        whole[i, :, i], whole[i[:-1], :, i[1:]], whole[i[1:], :, i[:-1]] = D, U, U.swapaxes(1, 2)
-        return np.asarray(np.linalg.solve(whole.reshape(len(D) * k, -1), b.reshape(len(D) * k, -1)).reshape(b.shape))
+        matrix, i = np.zeros((len(D), k, len(D), k)), np.arange(len(D))
+        matrix[i, :, i], matrix[i[:-1], :, i[1:]], matrix[i[1:], :, i[:-1]] = D, U, U.swapaxes(1, 2)
+        return np.asarray(np.linalg.solve(matrix.reshape(len(D) * k, -1), b.reshape(len(D) * k, -1)).reshape(b.shape))
     left, right = U[0::2], np.zeros((m, k, k))
     going = U[1::2]
     right[: len(going)] = going
     solved = np.linalg.solve(D[1::2], np.concatenate([left.swapaxes(1, 2), right, b[1::2]], axis=2))
     a, c, d = solved[..., :k], solved[..., k : 2 * k], solved[..., 2 * k :]
-    D_kept, b_kept, more = D[0::2].copy(), b[0::2].copy(), len(going)
+    D_kept, b_kept, count = D[0::2].copy(), b[0::2].copy(), len(going)
     D_kept[:m] -= left @ a
     b_kept[:m] -= left @ d
     back = going.swapaxes(1, 2)
-    D_kept[1 : 1 + more] -= back @ c[:more]
-    b_kept[1 : 1 + more] -= back @ d[:more]
-    kept = _block_tridiagonal(D_kept, -(left @ c)[:more], b_kept)
-    out = np.empty_like(b)
-    out[0::2] = kept
-    out[1::2] = d - a @ kept[:m]
-    out[1::2][:more] -= c[:more] @ kept[1 : 1 + more]
-    return out
+    D_kept[1 : 1 + count] -= back @ c[:count]
+    b_kept[1 : 1 + count] -= back @ d[:count]
+    even_blocks = _solve_block_tridiagonal(D_kept, -(left @ c)[:count], b_kept)
+    solution = np.empty_like(b)
+    solution[0::2] = even_blocks
+    solution[1::2] = d - a @ even_blocks[:m]
+    solution[1::2][:count] -= c[:count] @ even_blocks[1 : 1 + count]
+    return solution

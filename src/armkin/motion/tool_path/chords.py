@@ -44,20 +44,20 @@ class Chords:
     @cached_property
     def sagitta(self) -> Array:
         """How far the circle through a chord's ends and either neighbour leaves the chord: (N - 1,)."""
-        L, out = self.length, np.zeros(len(self.length))
+        L, rise_of_chord = self.length, np.zeros(len(self.length))
         across = np.linalg.norm(self.y[2:] - self.y[:-2], axis=1)
-        turned = turns(self.y)
+        turned = turn_angles(self.y)
         with np.errstate(divide="ignore", invalid="ignore"):
             bend = 2 * np.sin(turned) / across  # 1 / radius
         for chord, neighbour in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
             half = np.minimum(0.5 * L[chord] * bend, 1.0)
             rise = np.where(bend > 1e-15, (1 - np.sqrt(1 - half**2)) / np.maximum(bend, 1e-300), 0.0)
             tells = (turned <= CORNER) & (L[neighbour] >= SHORT * L[chord])
-            out[chord] = np.maximum(out[chord], np.where(tells, rise, 0.0))
-        return out
+            rise_of_chord[chord] = np.maximum(rise_of_chord[chord], np.where(tells, rise, 0.0))
+        return rise_of_chord
 
 
-def turns(y: Array) -> Array:
+def turn_angles(y: Array) -> Array:
     """How far the direction turns at every point but the ends: (N, d) -> (N - 2,) [rad]."""
     step = np.diff(y, axis=0)
     unit = step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300)
@@ -65,7 +65,7 @@ def turns(y: Array) -> Array:
     return np.asarray(2 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)))
 
 
-def distinct(y: Array) -> Int:
+def distinct_points(y: Array) -> Int:
     """Numbers of the points (N, d) that are not the same as the one before; the last one stays."""
     apart = np.linalg.norm(np.diff(y, axis=0), axis=1) > _SAME
     return np.flatnonzero(np.append(True, apart))

@@ -13,9 +13,18 @@ import numpy as np
 from armkin.formula.arrays import Array, Int
 from armkin.model.target_numbers import targets_in
 from armkin.motion.tool_path import path_numbers
-from armkin.motion.tool_path.chords import distinct, turns
+from armkin.motion.tool_path.chords import distinct_points, turn_angles
 from armkin.motion.tool_path.fit_points import REVERSAL, FittedCurves, fit_curves
-from armkin.motion.tool_path.path_pieces import Dense, Piece, Spot, line, turn_between, unit_speed, vector, weights
+from armkin.motion.tool_path.path_pieces import (
+    Dense,
+    Piece,
+    Spot,
+    line,
+    rotation_vectors,
+    turn_between,
+    unit_speed_piece,
+    weights,
+)
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -40,7 +49,7 @@ class Polyline:
         """More targets, with the speeds of the lines to them. Raises UsageError for one that is none of the task."""
         for number, value in enumerate(values, len(self.rows) + 1):
             if len(value) != self.task.position:
-                self._last = number, path_numbers.target(self.task, self.first, value)
+                self._last = number, path_numbers.target_spot(self.task, self.first, value)
         self.rows += values
         pace = _NAN if speed is None else speed, _NAN if tool_speed is None else tool_speed
         self.speeds += [pace] * len(values)
@@ -57,30 +66,30 @@ class Polyline:
         """Smooth curves through all, one between each two places where the way turns back."""
         spots = _Spots.from_rows(self.task, self.first, self.rows)
         speeds = np.array(self.speeds)
-        y = spots.relative(0, len(spots.p) - 1)
+        y = spots.relative_values(0, len(spots.p) - 1)
         if y is None:  # the tool turns so far that it is laid line by line
             return self._lines(spots, speeds)
         y = y * weights(self.task)
-        kept = distinct(y)
-        if len(kept) == 1:  # no way at all, which is refused of the whole route
+        passed = distinct_points(y)
+        if len(passed) == 1:  # no way at all, which is refused of the whole route
             return self._lines(spots, speeds)
-        back = 1 + np.flatnonzero(turns(y[kept]) > REVERSAL) if len(kept) > 2 else np.zeros(0, int)
-        ends = np.concatenate([[0], back, [len(kept) - 1]])
+        back = 1 + np.flatnonzero(turn_angles(y[passed]) > REVERSAL) if len(passed) > 2 else np.zeros(0, int)
+        ends = np.concatenate([[0], back, [len(passed) - 1]])
         turning = bool(y[:, len(spots.p[0]) + spots.sums.shape[1] :].any())
         made: list[Piece] = []
-        for part in _blocks(ends, 1 if turning else _AT_ONCE):
-            numbers, first = kept[part[0] : part[-1] + 1], int(kept[part[0]])
-            values = spots.relative(first, int(numbers[-1])) if turning else y[first : numbers[-1] + 1]
+        for part in _point_blocks(ends, 1 if turning else _AT_ONCE):
+            numbers, first = passed[part[0] : part[-1] + 1], int(passed[part[0]])
+            values = spots.relative_values(first, int(numbers[-1])) if turning else y[first : numbers[-1] + 1]
             assert values is not None
             values = (values * weights(self.task) if turning else values)[numbers - first]
-            made += _block(self.task, spots, numbers, part - part[0], values, speeds[numbers[1:] - 1], tolerance)
+            made += _fit_block(self.task, spots, numbers, part - part[0], values, speeds[numbers[1:] - 1], tolerance)
         return made
 
     def _lines(self, spots: _Spots, speeds: Array) -> list[Piece]:
         made = []
         for k, (speed, tool) in enumerate(speeds.tolist()):
-            one = line(self.task, spots.spot(k), spots.spot(k + 1))
-            made.append(replace(one, speed=_or_none(speed), tool_speed=_or_none(tool)))
+            piece = line(self.task, spots.spot(k), spots.spot(k + 1))
+            made.append(replace(piece, speed=_none_if_nan(speed), tool_speed=_none_if_nan(tool)))
         return made
 
 
@@ -100,16 +109,16 @@ class _Spots:
         full = np.flatnonzero([False, *(len(row) > task.position for row in rows)])
         p = np.array([first.p, *((row[: task.position] for row in rows) if len(full) else rows)], dtype=float)
         since = np.searchsorted(full, np.arange(N), side="right")  # 0: as at first
-        given = targets_in(labels, [list(rows[k - 1]) for k in full]) if len(full) else None
+        targets = targets_in(labels, [list(rows[k - 1]) for k in full]) if len(full) else None
         k = len(task.sums)
-        sums = np.zeros((len(full), k)) if given is None or not k else given[:, task.position : task.position + k]
+        sums = np.zeros((len(full), k)) if targets is None or not k else targets[:, task.position : task.position + k]
         turned = None
         if first.turned is not None:
             parts = [first.turned[None]]
-            if given is not None and task.orientation == "full":
-                parts.append(given[:, :3, :3])
-            elif given is not None:
-                axis = given[:, task.position + k : task.position + k + 3]
+            if targets is not None and task.orientation == "full":
+                parts.append(targets[:, :3, :3])
+            elif targets is not None:
+                axis = targets[:, task.position + k : task.position + k + 3]
                 parts.append(axis / np.linalg.norm(axis, axis=1, keepdims=True))
             turned = np.concatenate(parts)[since]
         return _Spots(task, p, np.concatenate([first.sums[None], sums])[since], turned)
@@ -118,17 +127,17 @@ class _Spots:
         """One of them."""
         return Spot(self.p[k], self.sums[k], None if self.turned is None else self.turned[k])
 
-    def relative(self, a: int, b: int) -> Array | None:
+    def relative_values(self, a: int, b: int) -> Array | None:
         """Spots a to b as y of a piece that starts at a, (b - a + 1, d); None: it turns too far for that."""
         w = np.zeros((b - a + 1, 3))
         if self.turned is not None and (self.turned[a : b + 1] != self.turned[a]).any():
             if self.task.orientation == "full":
-                w = vector(self.turned[a : b + 1] @ self.turned[a].T)
+                w = rotation_vectors(self.turned[a : b + 1] @ self.turned[a].T)
                 for k in np.flatnonzero(np.linalg.norm(w, axis=1) > 0.5 * np.pi).tolist():
                     size = np.linalg.norm(w[k])
-                    other = w[k] * (1 - 2 * np.pi / size)  # the same rotation, the other way round
-                    if k and np.linalg.norm(other - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
-                        w[k] = other
+                    longer = w[k] * (1 - 2 * np.pi / size)  # the same rotation, the other way round
+                    if k and np.linalg.norm(longer - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
+                        w[k] = longer
             else:
                 w = np.array([turn_between(self.task, self.spot(a), self.spot(k)) for k in range(a, b + 1)])
             if np.linalg.norm(w, axis=1).max() > _FARTHEST_TURN:
@@ -136,13 +145,13 @@ class _Spots:
         return np.concatenate([self.p[a : b + 1], self.sums[a : b + 1], w], axis=1)
 
 
-def _blocks(ends: Int, points: int) -> list[Int]:
+def _point_blocks(ends: Int, points: int) -> list[Int]:
     """Ends of stretches (k,) in groups of about so many points, the last end of each the first of the next one."""
     first = np.flatnonzero(np.diff((ends[:-1] - ends[0]) // points, prepend=-1))
     return [ends[a : b + 1] for a, b in pairwise([*first.tolist(), len(ends) - 1])]
 
 
-def _block(
+def _fit_block(
     task: Task, spots: _Spots, numbers: Int, ends: Int, y: Array, speeds: Array, tolerance: float
 ) -> list[Piece]:
     """Smooth curves through some of the spots, one from each of the ends to the next.
@@ -150,53 +159,53 @@ def _block(
     y: (N, d) the spots, in millimetres; speeds: (N - 1, 2) of the lines between them.
     """
     if len(numbers) == 2:
-        return [_line(task, spots, numbers, speeds)]
+        return [_line_between(task, spots, numbers, speeds)]
     moving = (y != y[0]).any(axis=0)  # the others stay
     scale, stop = weights(task)[moving], np.isin(np.arange(len(y)), ends)
     curve: FittedCurves = fit_curves(y[:, moving], FIT * tolerance, stop)
     still = np.where(moving, 0.0, y[0] / weights(task))
 
-    def at(v: Array) -> tuple[Array, Array]:
+    def curve_at(v: Array) -> tuple[Array, Array]:
         values, slopes = np.repeat(still[:, None], len(v), axis=1), np.zeros((len(still), len(v)))
-        values[moving], slopes[moving] = (each.T / scale[:, None] for each in curve.values(v))
+        values[moving], slopes[moving] = (component.T / scale[:, None] for component in curve.values(v))
         return values.T, slopes.T
 
-    whole, length = unit_speed(task, spots.spot(numbers[0]), at, curve.begin)
-    given, bends, spans = length(curve.parameters), length(curve.bends), length(curve.begin)
+    piece, length = unit_speed_piece(task, spots.spot(numbers[0]), curve_at, curve.begin)
+    passed, bends, spans = length(curve.parameters), length(curve.bends), length(curve.begin)
     same = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
-    new = np.append(True, ~same.all(axis=1))
+    changes = np.append(True, ~same.all(axis=1))
     made = []
     for a, b in pairwise(ends.tolist()):
         if b == a + 1:
-            made.append(_line(task, spots, numbers[a : b + 1], speeds[a:b]))
+            made.append(_line_between(task, spots, numbers[a : b + 1], speeds[a:b]))
             continue
-        begins = a + np.flatnonzero(np.append(True, new[a + 1 : b]))
-        low, high = given[a], given[b]
+        begins = a + np.flatnonzero(np.append(True, changes[a + 1 : b]))
+        low, high = passed[a], passed[b]
         (i, j), (k, m) = (np.searchsorted(x, [low - 1e-12, high + 1e-12]).tolist() for x in (bends, spans))
         dense = Dense(
-            given[a : b + 1] - low,
+            passed[a : b + 1] - low,
             spots.p[numbers[a : b + 1]],
             bends[i:j] - low,
             spans[k:m] - low,
-            given[begins] - low,
+            passed[begins] - low,
             speeds[begins, 0],
             speeds[begins, 1],
         )
-        first = replace(whole.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
-        made.append(Piece(task, first, partial(_shifted, whole.curve, low), high - low, dense=dense))
+        first = replace(piece.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
+        made.append(Piece(task, first, partial(_curve_from, piece.curve, low), high - low, dense=dense))
     return made
 
 
-def _shifted(curve: Callable[[Array], Array], begin: float, s: Array) -> Array:
+def _curve_from(curve: Callable[[Array], Array], begin: float, s: Array) -> Array:
     return curve(s + begin)
 
 
-def _line(task: Task, spots: _Spots, numbers: Int, speeds: Array) -> Piece:
+def _line_between(task: Task, spots: _Spots, numbers: Int, speeds: Array) -> Piece:
     """The line between two spots."""
     speed, tool = speeds[0].tolist()
     made = line(task, spots.spot(numbers[0]), spots.spot(numbers[1]))
-    return replace(made, speed=_or_none(speed), tool_speed=_or_none(tool))
+    return replace(made, speed=_none_if_nan(speed), tool_speed=_none_if_nan(tool))
 
 
-def _or_none(value: float) -> float | None:
+def _none_if_nan(value: float) -> float | None:
     return None if np.isnan(value) else value

@@ -50,11 +50,11 @@ def _orientation_numbers(arm: Arm, task: Task, tool: Array, yaw: float) -> tuple
     if task.orientation == "axis":
         values |= dict(zip(("ax", "ay", "az"), tool[:, 2].tolist(), strict=True))
     if "phi" in task.labels:
-        values["phi"] = _phi(arm, task, tool[:, 2])
+        values["phi"] = _pitch_along(arm, task, tool[:, 2])
     return tuple(values[label] + 0.0 for label in task.labels[3:])
 
 
-def _phi(arm: Arm, task: Task, axis: Array) -> float:
+def _pitch_along(arm: Arm, task: Task, axis: Array) -> float:
     """The pitch [deg] whose tool axis points along `axis`, the same wherever the arm's plane is turned to."""
     up = arm.base[:3, 2]
     if np.linalg.norm(np.cross(up, axis)) > _IN_PLANE:
@@ -65,7 +65,7 @@ def _phi(arm: Arm, task: Task, axis: Array) -> float:
     q = arm.home[None]
     k = task.labels.index("phi")
     sum_ = task.sums[k - task.position]
-    now = float(targets_of(task, fk(arm, q), q)[0, k])
+    phi = float(targets_of(task, fk(arm, q), q)[0, k])
     bent = q.copy()
     pitch = int(np.flatnonzero(sum_)[-1])
     bent[0, pitch] += 0.1 / (sum_[pitch] * arm.ratio[pitch])  # phi grows by 0.1
@@ -75,4 +75,4 @@ def _phi(arm: Arm, task: Task, axis: Array) -> float:
         raise UsageError(f"the tool of {arm.name} does not lie in the arm's plane: no pitch points it straight down")
     normal /= np.linalg.norm(normal)
     angle = float(np.arctan2(normal @ np.cross(first, axis), first @ axis))
-    return float((np.rad2deg(now + angle) + 180.0) % 360.0 - 180.0)
+    return float((np.rad2deg(phi + angle) + 180.0) % 360.0 - 180.0)

@@ -15,7 +15,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.motion.tool_path.b_spline import Layout
-from armkin.motion.tool_path.chords import CORNER, Chords, turns
+from armkin.motion.tool_path.chords import CORNER, Chords, turn_angles
 from armkin.motion.tool_path.least_knots import Rows, least_knots
 
 REVERSAL = np.deg2rad(160.0)  # a larger one is a stop
@@ -48,32 +48,34 @@ class FittedCurves:
         return np.ascontiguousarray(self.powers.transpose(1, 2, 0))
 
 
-def corners(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
+def corner_points(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
     """Which points (N, d) are corners: the direction turns by more than 20 degrees, from near and from afar.
 
     stop: (N,) points that nothing is seen beyond, and which are corners in any case, but for the ends.
     """
-    found = np.zeros(len(y), bool)
-    near = turns(y)
+    corner = np.zeros(len(y), bool)
+    near = turn_angles(y)
     sharp = np.flatnonzero(near > CORNER) + 1
     length = np.linalg.norm(np.diff(y, axis=0), axis=1)
-    told = np.minimum(length[sharp - 1], length[sharp]) >= _SCALES[0] * tolerance
+    sure = np.minimum(length[sharp - 1], length[sharp]) >= _SCALES[0] * tolerance
     alike = np.ones(len(sharp), bool)
     u = np.concatenate([[0.0], np.cumsum(length)])
     ends = np.array([0, len(y) - 1]) if stop is None else np.flatnonzero(stop)
-    for off in _SCALES if len(sharp) else ():
+    for distance in _SCALES if len(sharp) else ():
         next_ = np.searchsorted(ends, sharp, side="right")
-        before = np.maximum(u[sharp] - np.maximum(off * tolerance, length[sharp - 1]), u[ends[next_ - 1]])
-        after = np.minimum(u[sharp] + np.maximum(off * tolerance, length[sharp]), u[ends[next_]])
-        sides = [np.stack([np.interp(at, u, y[:, k]) for k in range(y.shape[1])], axis=1) for at in (before, after)]
-        far = turns(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
+        before = np.maximum(u[sharp] - np.maximum(distance * tolerance, length[sharp - 1]), u[ends[next_ - 1]])
+        after = np.minimum(u[sharp] + np.maximum(distance * tolerance, length[sharp]), u[ends[next_]])
+        sides = [
+            np.stack([np.interp(places, u, y[:, k]) for k in range(y.shape[1])], axis=1) for places in (before, after)
+        ]
+        far = turn_angles(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
         alike = (alike & (np.abs(far - near[sharp - 1]) < _ALIKE))[far > CORNER]
-        sharp, told = sharp[far > CORNER], told[far > CORNER]
+        sharp, sure = sharp[far > CORNER], sure[far > CORNER]
     # beside chords too short to tell a direction one that is not as sharp from near as from afar is a tight bend and
     # noise, if a curve passes it
-    found[sharp[told | alike]] = True
-    found[ends[1:-1]] = True
-    return found
+    corner[sharp[sure | alike]] = True
+    corner[ends[1:-1]] = True
+    return corner
 
 
 def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCurves:
@@ -82,34 +84,34 @@ def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCu
     stop: (N,) where the way rests, the ends among them: there it stays a corner.
     """
     y = np.asfortranarray(y)  # numpy works on long runs of numbers
-    chords = Chords(y, corners(y, tolerance, stop))
+    chords = Chords(y, corner_points(y, tolerance, stop))
     stop = np.zeros(len(y), bool) if stop is None else stop
     used, parts = np.ones(len(y) - 1, bool), []
     for round_ in range(_TRIES + 1):
-        begin, end, powers, missed = _curves(chords, used, tolerance)
+        begin, end, powers, missed = _fit_cubics(chords, used, tolerance)
         # cubics that waver: the chords themselves, rounded; in the end all of such a curve's
         again = _chords_of_curves(chords, missed)
-        kept = ~again[np.searchsorted(chords.u, (begin + end) / 2) - 1] | (round_ == _TRIES)
-        parts.append((begin[kept], end[kept], powers[kept]))
+        final = ~again[np.searchsorted(chords.u, (begin + end) / 2) - 1] | (round_ == _TRIES)
+        parts.append((begin[final], end[final], powers[final]))
         if not again.any() or round_ == _TRIES:
             break
         inside = np.concatenate([[False], again[1:] & again[:-1] & ~chords.corner[1:-1], [False]])
         used, chords = again, Chords(y, chords.corner | (missed if round_ + 1 < _TRIES else inside))
-    begin, end, powers = (np.concatenate(some) for some in zip(*parts, strict=True))
+    begin, end, powers = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     order = np.argsort(begin, kind="stable")
     begin, end, powers = begin[order], end[order], powers[order]
     curve = chords.curve[np.searchsorted(chords.u, (begin + end) / 2) - 1]
-    return _rounded(chords, stop, begin, end, powers, curve, tolerance)
+    return _round_corners(chords, stop, begin, end, powers, curve, tolerance)
 
 
 def _chords_of_curves(chords: Chords, chosen_points: Bool) -> Bool:
     """All chords (N - 1,) of the curves that some points (N,), none of them a corner, lie inside of."""
-    found = np.zeros(int(chords.curve[-1]) + 1, bool)
-    found[chords.curve[np.flatnonzero(chosen_points)]] = True
-    return np.asarray(found[chords.curve])
+    chosen_curves = np.zeros(int(chords.curve[-1]) + 1, bool)
+    chosen_curves[chords.curve[np.flatnonzero(chosen_points)]] = True
+    return np.asarray(chosen_curves[chords.curve])
 
 
-def _curves(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Array, Array, Bool]:
+def _fit_cubics(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Array, Array, Bool]:
     """Cubics of all curves whose chords are used: begin, end (M,), powers (M, 4, d); which points they miss (N,)."""
     curve, u, y = chords.curve, chords.u, chords.y
     missed = np.zeros(len(y), bool)
@@ -120,8 +122,8 @@ def _curves(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Array,
     bent = used & ~alone
     if bent.any():
         rows = Rows.from_chords(chords, bent, tolerance)
-        layout, control, off = least_knots(rows)
-        bad = off > 1.0
+        layout, control, misses = least_knots(rows)
+        bad = misses > 1.0
         missed[rows.point[bad & (rows.point >= 0)]] = True
         cubics = layout.powers(control)
         for beside in (rows.chord[bad & (rows.point < 0)], _astray_chords(chords, bent, layout, cubics, tolerance)):
@@ -138,16 +140,16 @@ def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
     """Which of the given points inside of the used curves lie farther from the cubics than allowed: (N,)."""
     inside = np.concatenate([[False], used[1:] & used[:-1] & ~chords.corner[1:-1], [False]])
     number = np.flatnonzero(inside)
-    y, at, least = chords.y[number], chords.u[number], np.full(len(number), np.inf)
+    y, places, least = chords.y[number], chords.u[number], np.full(len(number), np.inf)
     for _ in range(3):  # the nearest place is a little before or behind
-        i = np.clip(np.searchsorted(layout.begin, at, side="right") - 1, 0, len(cubics) - 1)
+        i = np.clip(np.searchsorted(layout.begin, places, side="right") - 1, 0, len(cubics) - 1)
         h = layout.end[i] - layout.begin[i]
-        f = np.clip((at - layout.begin[i]) / h, 0.0, 1.0)[:, None]
+        f = np.clip((places - layout.begin[i]) / h, 0.0, 1.0)[:, None]
         c0, c1, c2, c3 = (cubics[:, k][i] for k in range(4))
-        off, slope = y - (c0 + f * (c1 + f * (c2 + f * c3))), (c1 + f * (2 * c2 + 3 * f * c3)) / h[:, None]
-        least = np.minimum(least, (off**2).sum(axis=1))
-        way = (off * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-300)
-        at = at + np.clip(way, -1.0, 1.0)
+        offsets, slope = y - (c0 + f * (c1 + f * (c2 + f * c3))), (c1 + f * (2 * c2 + 3 * f * c3)) / h[:, None]
+        least = np.minimum(least, (offsets**2).sum(axis=1))
+        way = (offsets * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-300)
+        places = places + np.clip(way, -1.0, 1.0)
     inside[number[least <= tolerance**2]] = False
     return inside
 
@@ -163,50 +165,50 @@ def _astray_chords(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
     p = c0 + h * (c1 + h * (c2 + h * c3))
     k = np.clip(np.searchsorted(chords.u, u, side="right") - 1, 0, len(chords.length) - 1)
     unit = chords.step[k] / chords.length[k][:, None]
-    off = p - chords.y[k]
-    along = np.clip((off * unit).sum(axis=1), 0.0, chords.length[k])
-    away = np.linalg.norm(off - along[:, None] * unit, axis=1)
+    offsets = p - chords.y[k]
+    along = np.clip((offsets * unit).sum(axis=1), 0.0, chords.length[k])
+    away = np.linalg.norm(offsets - along[:, None] * unit, axis=1)
     return np.unique(k[away > tolerance + chords.sagitta[k]])
 
 
-def _rounded(
+def _round_corners(
     chords: Chords, stop: Bool, begin: Array, end: Array, powers: Array, curve: Int, tolerance: float
 ) -> FittedCurves:
     """Curves with their corners, but for stops, rounded by cubics, within the tolerance and half of the sides."""
     corner = np.flatnonzero(chords.corner)
-    at, u = chords.u.copy(), chords.u
+    passed, u = chords.u.copy(), chords.u
     if not len(corner):
-        return FittedCurves(np.append(begin, end[-1]), powers, at, np.zeros(0))
-    whole = FittedCurves(np.append(begin, end[-1]), powers, at, np.zeros(0))
+        return FittedCurves(np.append(begin, end[-1]), powers, passed, np.zeros(0))
+    curves = FittedCurves(np.append(begin, end[-1]), powers, passed, np.zeros(0))
     most = np.where(stop[corner], 0.0, 0.5 * np.minimum(chords.length[corner - 1], chords.length[corner]))
     tiny = 1e-9 * most
-    before, after = (whole.values(u[corner] + way)[1] for way in (-tiny, tiny))
+    before, after = (curves.values(u[corner] + way)[1] for way in (-tiny, tiny))
     bend = np.linalg.norm(before - after, axis=1)
     r = np.minimum(most, 4 * tolerance / np.maximum(bend, 1e-12))
     for _ in range(20):
-        (a, da), (b, db) = whole.values(u[corner] - r), whole.values(u[corner] + r)
+        (a, da), (b, db) = curves.values(u[corner] - r), curves.values(u[corner] + r)
         size = 2 * r[:, None]
         middle = (a + b) / 2 + size * (da - db) / 8
-        off = np.linalg.norm(middle - chords.y[corner], axis=1)
-        if (off <= tolerance).all():
+        distances = np.linalg.norm(middle - chords.y[corner], axis=1)
+        if (distances <= tolerance).all():
             break
-        r = np.where(off > tolerance, 0.9 * r * tolerance / np.maximum(off, 1e-12), r)
+        r = np.where(distances > tolerance, 0.9 * r * tolerance / np.maximum(distances, 1e-12), r)
     # a curve's number is the number of corners before it: it keeps what lies between low and high
     low, high = np.append(u[0], u[corner] + r), np.append(u[corner] - r, u[-1])
     x, y = np.maximum(begin, low[curve]), np.minimum(end, high[curve])
     keep = y - x > 1e-12
     x, y, begin, end, powers = x[keep], y[keep], begin[keep], end[keep], powers[keep]
-    cut = _part(powers, (x - begin) / (end - begin), (y - begin) / (end - begin))
+    cut = _cubic_parts(powers, (x - begin) / (end - begin), (y - begin) / (end - begin))
     blends = np.stack([a, size * da, 3 * (b - a) - size * (2 * da + db), 2 * (a - b) + size * (da + db)], axis=1)
     round_ = ~stop[corner]
     corner, r = corner[round_], r[round_]
     starts = np.append(x, u[corner] - r)
     order = np.argsort(starts, kind="stable")
     bends = np.sort(np.concatenate([u[corner] - r, u[corner] + r]))
-    return FittedCurves(np.append(starts[order], u[-1]), np.concatenate([cut, blends[round_]])[order], at, bends)
+    return FittedCurves(np.append(starts[order], u[-1]), np.concatenate([cut, blends[round_]])[order], passed, bends)
 
 
-def _part(c: Array, a: Array, b: Array) -> Array:
+def _cubic_parts(c: Array, a: Array, b: Array) -> Array:
     """Cubics (M, 4, d) over fractions a to b (M,) of themselves."""
     a, h = a[:, None], (b - a)[:, None]
     c0, c1, c2, c3 = (c[:, k] for k in range(4))

@@ -46,9 +46,9 @@ class Rows:
         f.append(1.0)
         weight.append(1.0)
         numbers = np.concatenate(chord)
-        share = np.repeat(f, [len(each) for each in chord])
-        heavy = np.repeat(weight, [len(each) for each in chord])
-        more, places = _graded(chords, used)
+        share = np.repeat(f, [len(numbers_of) for numbers_of in chord])
+        heavy = np.repeat(weight, [len(numbers_of) for numbers_of in chord])
+        more, places = _graded_places(chords, used)
         numbers, share = np.append(numbers, more), np.append(share, places)
         heavy = np.append(heavy, np.ones(len(more)))
         u = chords.u[numbers] + share * chords.length[numbers]
@@ -56,17 +56,17 @@ class Rows:
         apart = np.append(True, np.diff(u[order]) > 1e-9) | np.append(True, np.diff(chords.curve[numbers][order]) > 0)
         order = order[apart]
         u, numbers, share, heavy = u[order], numbers[order], share[order], heavy[order]
-        given = (share == 0) | (share == 1)
+        is_point = (share == 0) | (share == 1)
         _, curve = np.unique(chords.curve[numbers], return_inverse=True)
         edge = np.append(True, curve[1:] != curve[:-1])
         return Rows(
             u,
             np.asfortranarray(chords.y[numbers] + share[:, None] * chords.step[numbers]),  # long runs of numbers
             curve,
-            _SPARE * np.where(given, tolerance, _CHORD * tolerance + chords.sagitta[numbers]),
+            _SPARE * np.where(is_point, tolerance, _CHORD * tolerance + chords.sagitta[numbers]),
             heavy,
-            np.asfortranarray(np.where(given[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])),
-            np.where(given, numbers + (share == 1), -1),
+            np.asfortranarray(np.where(is_point[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])),
+            np.where(is_point, numbers + (share == 1), -1),
             numbers,
             share * chords.length[numbers],
             (1 - share) * chords.length[numbers],
@@ -96,23 +96,23 @@ class Rows:
         return np.asarray(miss - far[:, None] * along)
 
 
-def _graded(chords: Chords, used: Bool) -> tuple[Int, Array]:
+def _graded_places(chords: Chords, used: Bool) -> tuple[Int, Array]:
     """Places on chords that are long beside their neighbours, closer together towards these: chords, fractions."""
     L = chords.length
     same = np.append(False, (chords.curve[1:] == chords.curve[:-1])) & used
-    other = np.append(same[1:], False)
+    same_next = np.append(same[1:], False)
     left = np.where(same, np.append(np.inf, L[:-1]), np.inf)
-    right = np.where(other, np.append(L[1:], np.inf), np.inf)
+    right = np.where(same_next, np.append(L[1:], np.inf), np.inf)
     alone = np.flatnonzero(np.minimum(left, right) < SHORT * L)
     even = np.arange(1, _EVEN) / _EVEN
     numbers, places = [np.repeat(alone, len(even))], [np.tile(even, len(alone))]
     for neighbour, side in ((left, 0), (right, 1)):
-        at = neighbour
-        while (long := np.flatnonzero((neighbour < SHORT * L) & (at < 0.45 * L))).size:
+        distance = neighbour
+        while (long := np.flatnonzero((neighbour < SHORT * L) & (distance < 0.45 * L))).size:
             numbers.append(long)
-            f = at[long] / L[long]
+            f = distance[long] / L[long]
             places.append(f if side == 0 else 1 - f)
-            at = np.where(at < 0.45 * L, 2 * at + neighbour, at)
+            distance = np.where(distance < 0.45 * L, 2 * distance + neighbour, distance)
     return np.concatenate(numbers), np.concatenate(places)
 
 
@@ -120,22 +120,22 @@ def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
     """Splines of few knots through rows: layout, control points, and how far they leave the rows (R,)."""
     first = np.flatnonzero(np.append(True, rows.curve[1:] != rows.curve[:-1]))
     inside = np.arange(len(rows.u)) - first[rows.curve]
-    many = np.floor(np.minimum(inside / (2 * _POINTS), (rows.u - rows.u[first][rows.curve]) / _LONGEST))
-    knot = rows.ends | np.append(False, np.diff(many) > 0)
+    block = np.floor(np.minimum(inside / (2 * _POINTS), (rows.u - rows.u[first][rows.curve]) / _LONGEST))
+    knot = rows.ends | np.append(False, np.diff(block) > 0)
     weight, age = rows.weight.copy(), np.zeros(len(knot), int)  # age: rounds since an interval was divided, at its knot
     at_work, index = rows, np.arange(len(knot))
     for _ in range(_ROUNDS - 1):
         layout = Layout.from_points(at_work.u, at_work.curve, knot[index])
         control = least_squares(layout, at_work.y, weight[index], at_work.ends)
         miss = at_work.miss(layout.values(control))
-        off = np.linalg.norm(miss, axis=1) / at_work.tolerance
-        bad, astray = off > 1.0, _astray(at_work, layout, miss, weight[index])
+        misses = np.linalg.norm(miss, axis=1) / at_work.tolerance
+        bad, astray = misses > 1.0, _astray_intervals(at_work, layout, miss, weight[index])
         wrong = np.zeros(at_work.curve[-1] + 1, bool)
         wrong[at_work.curve[bad]] = wrong[layout.curve[astray]] = True
         if not wrong.any():
             break
         part = knot[index], weight[index], age[index]
-        _refine(at_work, layout, off, bad, astray, *part)
+        _refine_intervals(at_work, layout, misses, bad, astray, *part)
         knot[index], weight[index], age[index] = part
         if not wrong.all():  # what is well stays as it is
             index = index[wrong[at_work.curve]]
@@ -145,15 +145,15 @@ def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
     return layout, control, np.linalg.norm(rows.miss(layout.values(control)), axis=1) / rows.tolerance
 
 
-def _refine(
+def _refine_intervals(
     rows: Rows, layout: Layout, misses: Array, bad: Bool, astray: Bool, knot: Bool, weight: Array, age: Int
 ) -> None:
     """Divide intervals that miss their rows, or give some of the rows more weight: in place."""
     worst = np.zeros(len(layout.begin))
     np.maximum.at(worst, layout.interval[bad], misses[bad])
     begins = np.searchsorted(layout.interval, np.arange(len(worst) + 1))
-    at = np.flatnonzero(knot)
-    mine = at[np.searchsorted(at, begins[:-1])]
+    knots = np.flatnonzero(knot)
+    mine = knots[np.searchsorted(knots, begins[:-1])]
     divide = astray | (worst > _HOPELESS) | ((worst > 1.0) & (age[mine] >= _PATIENCE))
     age[mine[worst > 1.0]] += 1
     middle = (begins[:-1] + begins[1:]) // 2
@@ -166,19 +166,19 @@ def _refine(
     weight[heavier] = np.minimum(np.maximum(weight[heavier], 0.05) * (1.4 * misses[heavier]) ** 2, _HEAVIEST)
 
 
-def _astray(rows: Rows, layout: Layout, miss: Array, weight: Array) -> Bool:
+def _astray_intervals(rows: Rows, layout: Layout, miss: Array, weight: Array) -> Bool:
     """Which intervals miss their points in a way that is no noise: neighbours lie on the same side (M,)."""
-    given = np.flatnonzero(rows.point >= 0)
-    a, b = given[:-1], given[1:]
-    where = layout.interval[a]
-    inside = where == layout.interval[b]
-    a, b, where = a[inside], b[inside], where[inside]
+    points = np.flatnonzero(rows.point >= 0)
+    a, b = points[:-1], points[1:]
+    interval = layout.interval[a]
+    inside = interval == layout.interval[b]
+    a, b, interval = a[inside], b[inside], interval[inside]
     M = len(layout.begin)
-    one, next_ = (miss.T.take(some, axis=1) for some in (a, b))
-    like = np.bincount(where, (one * next_).sum(axis=0), M)
-    size = np.bincount(where, (one**2).sum(axis=0), M)
-    many = np.bincount(where, minlength=M)
+    miss_a, miss_b = (miss.T.take(side, axis=1) for side in (a, b))
+    like = np.bincount(interval, (miss_a * miss_b).sum(axis=0), M)
+    size = np.bincount(interval, (miss_a**2).sum(axis=0), M)
+    counts = np.bincount(interval, minlength=M)
     weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # these miss the others for a few
     return np.asarray(
-        ~weighed & (many >= _TELLING) & (like > 0.5 * size) & (size > many * (_CLOSE * rows.tolerance[0]) ** 2)
+        ~weighed & (counts >= _TELLING) & (like > 0.5 * size) & (size > counts * (_CLOSE * rows.tolerance[0]) ** 2)
     )

@@ -15,7 +15,7 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
 from armkin.model.rotation import rpy
 from armkin.model.target_numbers import label_scale, targets_in
-from armkin.motion.tool_path.path_pieces import Spot, spot
+from armkin.motion.tool_path.path_pieces import Spot, split_target
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 OF_JOINTS = ("joint", "wait", "grip")  # moves that need no targets
 
 
-def moves(arm: Arm, path: Any, task: str | None = None) -> PathFile:
+def as_path_file(arm: Arm, path: Any, task: str | None = None) -> PathFile:
     """Whatever `armkin.path` takes as the model of a path file."""
     from armkin import path_file
 
@@ -47,14 +47,14 @@ def moves(arm: Arm, path: Any, task: str | None = None) -> PathFile:
     return path_file.validated({"moves": listed, "task": definition.name})
 
 
-def of_tool(file: PathFile) -> bool:
+def moves_tool(file: PathFile) -> bool:
     """Whether a path has targets of the tool, and not joint values alone."""
     start = file.start
     point = start is not None and not isinstance(start, str) and start.joints is None
     return point or any(move.kind not in OF_JOINTS for move in file.moves)
 
 
-def joints(arm: Arm, standing: Array, value: Any) -> Array:
+def joint_values(arm: Arm, standing: Array, value: Any) -> Array:
     """Joint values (n,) [rad | mm]: a list, a pose's name, or {name: value} with the others as they are now."""
     if isinstance(value, str):
         if value not in arm.poses:
@@ -64,14 +64,14 @@ def joints(arm: Arm, standing: Array, value: Any) -> Array:
         wrong = [name for name in value if name not in arm.joint_names]
         if wrong:
             raise UsageError(f"there is no joint {wrong[0]}; {arm.name} has {', '.join(arm.joint_names)}")
-        old = units.joints_out(arm, standing).tolist()
-        value = [value.get(name, before) for name, before in zip(arm.joint_names, old, strict=True)]
+        standing_values = units.joints_out(arm, standing).tolist()
+        value = [value.get(name, before) for name, before in zip(arm.joint_names, standing_values, strict=True)]
     if len(value) != arm.n:
         raise UsageError(f"{arm.name} has {arm.n} joints ({', '.join(arm.joint_names)}); got {len(value)} values")
     return np.asarray(units.joints_in(arm, value))
 
 
-def target(task: Task, last_spot: Spot, value: Sequence[float]) -> Spot:
+def target_spot(task: Task, last_spot: Spot, value: Sequence[float]) -> Spot:
     """A target; with the position alone the sums and the orientation stay as they are now."""
     labels = task.labels
     if len(value) == task.position < len(labels):
@@ -82,7 +82,7 @@ def target(task: Task, last_spot: Spot, value: Sequence[float]) -> Spot:
     if task.orientation == "axis" and not np.linalg.norm(value[-3:]) > 1e-9:
         raise UsageError("a target's axis ax ay az has no length")
     [made] = targets_in(labels, [value])
-    return spot(task, made)
+    return split_target(task, made)
 
 
 def check_numbers(arm: Arm, file: PathFile) -> None:
@@ -93,7 +93,7 @@ def check_numbers(arm: Arm, file: PathFile) -> None:
         try:
             value = getattr(move, kind)
             if kind == "joint":
-                joints(arm, arm.home, value)
+                joint_values(arm, arm.home, value)
             elif kind == "grip":
                 check_grip(arm, value)
             elif kind != "wait":
@@ -104,16 +104,16 @@ def check_numbers(arm: Arm, file: PathFile) -> None:
 
 
 def _check_targets(task: Task, kind: str, value: Any) -> None:
-    here = spot(task, np.zeros(len(task.labels)))
+    start = split_target(task, np.zeros(len(task.labels)))
     targets = {"point": [value], "line": [value], "polyline": value, "spline": value}
     places = {"arc": ("via",), "circle": ("centre", "normal"), "offset": ("xyz",)}
-    for one in targets.get(kind, [value.to] if kind == "arc" else []):
-        target(task, here, one)
+    for numbers in targets.get(kind, [value.to] if kind == "arc" else []):
+        target_spot(task, start, numbers)
     for name in places.get(kind, ()):
-        place(task, getattr(value, name))
+        coordinates(task, getattr(value, name))
 
 
-def place(task: Task, value: Sequence[float]) -> Array:
+def coordinates(task: Task, value: Sequence[float]) -> Array:
     """A position or a direction, with as many coordinates as the task has."""
     if len(value) < task.position:
         raise UsageError(f"x y z are needed; got {len(value)} numbers")

@@ -31,7 +31,7 @@ _TABLES = 20_000  # of all spans
 _EVEN, _EXACT = 1e-9, 1e-6  # of a slope: less change is none; [mm] of a length
 
 
-def turn(w: Array) -> Array:
+def rotation_matrices(w: Array) -> Array:
     """Rotation matrices of rotation vectors: (..., 3) [rad] -> (..., 3, 3) (Rodrigues)."""
     angle = np.linalg.norm(w, axis=-1)[..., None, None]
     x, y, z = np.moveaxis(w, -1, 0)
@@ -40,7 +40,7 @@ def turn(w: Array) -> Array:
     return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * W + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (W @ W))
 
 
-def vector(R: Array) -> Array:
+def rotation_vectors(R: Array) -> Array:
     """Rotation vectors of rotation matrices, of at most half a turn: (..., 3, 3) -> (..., 3) [rad]."""
     q = quaternion(R)
     size = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
@@ -57,15 +57,15 @@ class Spot:
     turned: Array | None
 
 
-def spot(task: Task, target: ArrayLike) -> Spot:
+def split_target(task: Task, target: ArrayLike) -> Spot:
     """A target (m,) or (4, 4) of a task, taken apart."""
     values = np.asarray(target, dtype=float)
     if task.orientation == "full":
         return Spot(values[:3, 3], np.zeros(0), values[:3, :3])
-    p, rest = values[: task.position], values[task.position :]
+    p, angles = values[: task.position], values[task.position :]
     k = len(task.sums)
-    axis = rest[k : k + 3] / np.linalg.norm(rest[k : k + 3]) if task.orientation == "axis" else None
-    return Spot(p, rest[:k], axis)
+    axis = angles[k : k + 3] / np.linalg.norm(angles[k : k + 3]) if task.orientation == "axis" else None
+    return Spot(p, angles[:k], axis)
 
 
 def turn_between(task: Task, a: Spot, b: Spot) -> Array:
@@ -73,7 +73,7 @@ def turn_between(task: Task, a: Spot, b: Spot) -> Array:
     if a.turned is None or b.turned is None:
         return np.zeros(3)
     if task.orientation == "full":
-        return vector(b.turned @ a.turned.T)
+        return rotation_vectors(b.turned @ a.turned.T)
     normal = np.cross(a.turned, b.turned)
     sine = float(np.linalg.norm(normal))
     if sine < 1e-12 and a.turned @ b.turned < 0:
@@ -95,11 +95,11 @@ class Dense:
 
     def part(self, a: float, b: float) -> Dense:
         """Of the part from length a to b."""
-        given, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
+        passed, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
         return replace(
             self,
-            given=self.given[given] - a,
-            points=self.points[given],
+            given=self.given[passed] - a,
+            points=self.points[passed],
             bends=self.bends[bends] - a,
             spans=self.spans[(self.spans > a) & (self.spans < b)] - a,
             begins=self.begins - a,
@@ -126,7 +126,7 @@ class Piece:
         if self.first.turned is None:
             return y[:, : n + k]
         w = y[:, n + k :]
-        R = turn(w) if w.any() else np.broadcast_to(np.eye(3), (len(y), 3, 3))
+        R = rotation_matrices(w) if w.any() else np.broadcast_to(np.eye(3), (len(y), 3, 3))
         if self.task.orientation == "axis":
             return np.concatenate([y[:, : n + k], R @ self.first.turned], axis=1)
         T = np.zeros((len(y), 4, 4))
@@ -136,60 +136,60 @@ class Piece:
     @cached_property
     def last(self) -> Spot:
         """Where it ends."""
-        return spot(self.task, self.targets(np.array([self.length]))[0])
+        return split_target(self.task, self.targets(np.array([self.length]))[0])
 
     def direction(self, s: float) -> Array:
         """d(position, sums, angle)/ds at s, angles in units of PER_RADIAN: a unit vector (dim,)."""
         h = min(1e-5 * self.length, 1e-3)
         a, b = max(s - h, 0.0), min(s + h, self.length)
-        here, there = (spot(self.task, t) for t in self.targets(np.array([a, b])))
-        w = turn_between(self.task, here, there)
-        change = np.concatenate([there.p - here.p, PER_RADIAN * (there.sums - here.sums), PER_RADIAN * w])
+        before, after = (split_target(self.task, t) for t in self.targets(np.array([a, b])))
+        w = turn_between(self.task, before, after)
+        change = np.concatenate([after.p - before.p, PER_RADIAN * (after.sums - before.sums), PER_RADIAN * w])
         return np.asarray(change / (b - a))
 
     def part(self, a: float, b: float) -> Piece:
         """The part from length a to b."""
-        at = spot(self.task, self.targets(np.array([a]))[0])
+        begin = split_target(self.task, self.targets(np.array([a]))[0])
         n = self.task.position + len(self.task.sums)
-        turned = turn(self.curve(np.array([a]))[:, n:])[0]
+        turned = rotation_matrices(self.curve(np.array([a]))[:, n:])[0]
 
-        def along(s: Array) -> Array:
+        def curve(s: Array) -> Array:
             y = self.curve(s + a)
             if self.first.turned is None:
                 return y
-            w = vector(turn(y[:, n:]) @ turned.T)
+            w = rotation_vectors(rotation_matrices(y[:, n:]) @ turned.T)
             return np.concatenate([y[:, :n], w], axis=1)
 
         dense = None if self.dense is None else self.dense.part(a, b)
-        return Piece(self.task, at, along, b - a, self.speed, self.tool_speed, self.rate, dense)
+        return Piece(self.task, begin, curve, b - a, self.speed, self.tool_speed, self.rate, dense)
 
 
 def line(task: Task, a: Spot, b: Spot) -> Piece:
     """A straight line; orientation by slerp, sums linearly."""
     size = float(np.linalg.norm(b.p - a.p))
-    made = _uniform(task, a, b, lambda f: a.p + f[:, None] * (b.p - a.p), size)
+    made = _uniform_piece(task, a, b, lambda f: a.p + f[:, None] * (b.p - a.p), size)
     return replace(made, rate=size / made.length) if made.length > 0 else made
 
 
 def circle(task: Task, a: Spot, centre: Array, normal: Array, angle: float, rise: float, end: Spot | None) -> Piece:
     """An arc or a helix from `a` about `centre`, by `angle` [rad], rising by `rise` [mm] along the normal in all."""
     n = normal / np.linalg.norm(normal)
-    out = a.p - centre
-    out = out - n * (n @ out) if len(a.p) == 3 else out
-    radius = float(np.linalg.norm(out))
+    radial = a.p - centre
+    radial = radial - n * (n @ radial) if len(a.p) == 3 else radial
+    radius = float(np.linalg.norm(radial))
     if radius < 1e-6:
         raise UsageError("the circle's centre lies on the point where the circle starts: it has no radius")
-    across = np.cross(n, out) if len(a.p) == 3 else np.array([-out[1], out[0]]) * n[-1]
-    base = a.p - out
+    across = np.cross(n, radial) if len(a.p) == 3 else np.array([-radial[1], radial[0]]) * n[-1]
+    base = a.p - radial
 
-    def at(f: Array) -> Array:
+    def position(f: Array) -> Array:
         t = (f * angle)[:, None]
-        flat = base + np.cos(t) * out + np.sin(t) * across
+        flat = base + np.cos(t) * radial + np.sin(t) * across
         return np.asarray(flat + f[:, None] * rise * n if len(a.p) == 3 else flat)
 
     length = math.hypot(radius * angle, rise)
-    b = end or Spot(at(np.ones(1))[0], a.sums, a.turned)
-    return _uniform(task, a, b, at, length)
+    b = end or Spot(position(np.ones(1))[0], a.sums, a.turned)
+    return _uniform_piece(task, a, b, position, length)
 
 
 def arc(task: Task, a: Spot, via: Array, b: Spot) -> Piece:
@@ -211,26 +211,26 @@ def arc(task: Task, a: Spot, via: Array, b: Spot) -> Piece:
 def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
     """A smooth curve through points: natural cubic in the root of the chord lengths (centripetal)."""
     spots = [a, *points]
-    y = np.array([relative(task, a, s) for s in spots])
+    y = np.array([relative_values(task, a, s) for s in spots])
     chord = np.linalg.norm(np.diff(y * weights(task), axis=0), axis=1)
     if chord.min() < SMALL:
         raise UsageError("a spline passes the same point twice in a row: leave one out")
     u = np.concatenate([[0.0], np.cumsum(np.sqrt(chord))])
-    coefficients = _natural(u, y)
+    coefficients = _natural_spline(u, y)
 
-    def at(v: Array) -> tuple[Array, Array]:
+    def curve(v: Array) -> tuple[Array, Array]:
         i = np.clip(np.searchsorted(u, v, side="right") - 1, 0, len(u) - 2)
         w = (v - u[i])[:, None]
         c0, c1, c2, c3 = (c[i] for c in coefficients)
         return c0 + w * (c1 + w * (c2 + w * c3)), c1 + w * (2 * c2 + 3 * w * c3)
 
-    v = divide_spans(u, _intervals(len(u) - 1))
-    tangent = at(v)[1] * weights(task)
+    v = divide_spans(u, _table_intervals(len(u) - 1))
+    tangent = curve(v)[1] * weights(task)
     back = np.flatnonzero((tangent[2:] * tangent[:-2]).sum(axis=1) < 0)
     if len(back):
-        place = ", ".join(f"{x:.6g}" for x in at(v[back[:1] + 1])[0][0, : task.position])
+        place = ", ".join(f"{x:.6g}" for x in curve(v[back[:1] + 1])[0][0, : task.position])
         raise UsageError(f"a spline turns back by half a turn near {place}: use lines, which stop there")
-    return unit_speed(task, a, at, u)[0]
+    return unit_speed_piece(task, a, curve, u)[0]
 
 
 def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[Piece, Piece, Piece, float]:
@@ -241,11 +241,11 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
     """
     corner, half = b.first.p, max(a.length - side / 2, 0.0)
     radius = min(radius, *(_distance_from(piece, corner, s) for piece, s in ((a, half), (b, b.length / 2))))
-    cut_a = _leaves(a, corner, radius, a.length, half)
-    cut_b = _leaves(b, corner, radius, 0.0, b.length / 2)
+    cut_a = _length_at_radius(a, corner, radius, a.length, half)
+    cut_b = _length_at_radius(b, corner, radius, 0.0, b.length / 2)
     before, after = a.part(0.0, cut_a), b.part(cut_b, b.length)
     start, end = before.last, after.first
-    y0, y1 = relative(task, start, start), relative(task, start, end)
+    y0, y1 = relative_values(task, start, start), relative_values(task, start, end)
     scale = weights(task)
     d0, d1 = a.direction(cut_a) / scale, b.direction(cut_b) / scale
     k = task.position + len(task.sums)
@@ -253,14 +253,14 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
     size = (a.length - cut_a) + cut_b
     cubic = (y0, size * d0, 3 * (y1 - y0) - size * (2 * d0 + d1), 2 * (y0 - y1) + size * (d0 + d1))
 
-    def at(v: Array) -> tuple[Array, Array]:
+    def curve(v: Array) -> tuple[Array, Array]:
         w = v[:, None]
         c0, c1, c2, c3 = cubic
         return c0 + w * (c1 + w * (c2 + w * c3)), c1 + w * (2 * c2 + 3 * w * c3)
 
     speeds = [x.speed for x in (a, b) if x.speed is not None]
     tools = [x.tool_speed for x in (a, b) if x.tool_speed is not None]
-    made, _ = unit_speed(task, start, at, np.array([0.0, 1.0]))
+    made, _ = unit_speed_piece(task, start, curve, np.array([0.0, 1.0]))
     slow = replace(made, speed=min(speeds, default=None), tool_speed=min(tools, default=None))
     return before, slow, after, radius
 
@@ -270,7 +270,7 @@ def _distance_from(piece: Piece, corner: Array, s: float) -> float:
     return float(np.linalg.norm(piece.curve(np.array([s]))[0, : piece.task.position] - corner))
 
 
-def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: float) -> float:
+def _length_at_radius(piece: Piece, corner: Array, radius: float, inner: float, outer: float) -> float:
     """Length at which a piece is `radius` away from its corner, between the corner's length and the farthest."""
     if piece.rate:
         return inner + math.copysign(radius / piece.rate, outer - inner)
@@ -282,22 +282,22 @@ def _leaves(piece: Piece, corner: Array, radius: float, inner: float, outer: flo
     return outer
 
 
-def _uniform(task: Task, a: Spot, b: Spot, position: Callable[[Array], Array], length: float) -> Piece:
+def _uniform_piece(task: Task, a: Spot, b: Spot, position: Callable[[Array], Array], length: float) -> Piece:
     """A piece whose position, sums and turning all are passed at constant speed; position: fraction -> position."""
     w = turn_between(task, a, b)
     change = b.sums - a.sums
     angle = math.hypot(float(np.linalg.norm(change)), float(np.linalg.norm(w)))
-    whole = math.hypot(length, PER_RADIAN * angle)
+    piece_length = math.hypot(length, PER_RADIAN * angle)
 
-    def along(s: Array) -> Array:
-        f = s / whole if whole > 0 else np.zeros_like(s)
+    def curve(s: Array) -> Array:
+        f = s / piece_length if piece_length > 0 else np.zeros_like(s)
         parts = [position(f), a.sums + f[:, None] * change, f[:, None] * w]
         return np.concatenate(parts, axis=1)
 
-    return Piece(task, a, along, whole)
+    return Piece(task, a, curve, piece_length)
 
 
-def unit_speed(
+def unit_speed_piece(
     task: Task, first: Spot, curve: Callable[[Array], tuple[Array, Array]], u: Array
 ) -> tuple[Piece, Callable[[Array], Array]]:
     """A piece from a curve over any parameter, given with its derivative, smooth between the values u.
@@ -305,7 +305,7 @@ def unit_speed(
     Returns also the function from parameters to lengths.
     """
     scale = weights(task)
-    grid = np.append(divide_spans(u, _table(curve, u, scale)), u[-1])
+    grid = np.append(divide_spans(u, _table_sizes(curve, u, scale)), u[-1])
     step = np.diff(grid)
     nodes = grid[:-1, None] + step[:, None] * _GAUSS
     speed = np.linalg.norm(curve(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
@@ -320,18 +320,18 @@ def unit_speed(
     powers = np.stack([y0.T, d0.T, (3 * chord - 2 * d0 - d1).T, (d0 + d1 - 2 * chord).T])  # (4, d, intervals)
     inner = s[1:-1]
 
-    def along(x: Array) -> Array:
+    def curve_by_length(x: Array) -> Array:
         i = inner.searchsorted(x, side="right")
         f = (x - s.take(i)) / h.take(i)
         c0, c1, c2, c3 = powers.take(i, axis=2)
-        out = np.repeat(still[:, None], len(x), axis=1)
-        out[moving] = c0 + f * (c1 + f * (c2 + f * c3))
-        return out.T
+        y_at = np.repeat(still[:, None], len(x), axis=1)
+        y_at[moving] = c0 + f * (c1 + f * (c2 + f * c3))
+        return y_at.T
 
-    return Piece(task, first, along, float(s[-1])), lambda v: np.interp(v, grid, s)
+    return Piece(task, first, curve_by_length, float(s[-1])), lambda v: np.interp(v, grid, s)
 
 
-def _table(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array) -> NDArray[np.intp]:
+def _table_sizes(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array) -> NDArray[np.intp]:
     """How many intervals of a table of lengths each span between the values u needs: one that is passed evenly, one."""
     f = (np.arange(4) + 0.5) / 4
     v = u[:-1, None] + np.diff(u)[:, None] * f
@@ -340,10 +340,10 @@ def _table(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array
     length = np.linalg.norm(slopes, axis=2).mean(axis=1) * np.diff(u)
     needed = np.ceil((length / _EXACT) ** 0.25)  # Hermite's error falls with the fourth power
     even = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN * most
-    return np.where(even, 1, np.clip(needed, _LEAST_TABLE, _intervals(len(u) - 1))).astype(np.intp)
+    return np.where(even, 1, np.clip(needed, _LEAST_TABLE, _table_intervals(len(u) - 1))).astype(np.intp)
 
 
-def _intervals(spans: int) -> int:
+def _table_intervals(spans: int) -> int:
     """Of the table of lengths, for each of so many spans."""
     return int(np.clip(_TABLES // max(spans, 1), _LEAST_TABLE, _TABLE))
 
@@ -355,7 +355,7 @@ def divide_spans(u: Array, parts: NDArray[np.intp] | int) -> Array:
     return np.asarray(np.repeat(u[:-1], count) + np.repeat(np.diff(u), count) * share)
 
 
-def relative(task: Task, a: Spot, b: Spot) -> Array:
+def relative_values(task: Task, a: Spot, b: Spot) -> Array:
     """A spot as y of a piece that starts at `a`."""
     return np.concatenate([b.p, b.sums, turn_between(task, a, b)])
 
@@ -372,7 +372,7 @@ def _rotation_rate(w: Array, omega: Array) -> Array:
     return np.asarray(omega - np.cross(w, omega) / 2 + factor * np.cross(w, np.cross(w, omega)))
 
 
-def _natural(u: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+def _natural_spline(u: Array, y: Array) -> tuple[Array, Array, Array, Array]:
     """Coefficients of the natural cubic spline through (u, y), a row for each span."""
     h = np.diff(u)
     slope = np.diff(y, axis=0) / h[:, None]

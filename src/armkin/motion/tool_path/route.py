@@ -59,21 +59,21 @@ class Route:
 
     def targets(self, s: Array) -> Array:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,), increasing or not."""
-        out: Array | None = None
-        for k, here in group_numbers(self.piece_number(s)):
-            values = self.pieces[k].targets(s[here] - self.ends[k])
-            if out is None:
-                out = np.empty((len(s), *values.shape[1:]))
-            out[here] = values
-        assert out is not None
-        for one in self.detours:
-            out[..., :3, 3] += one.offset(s)
-        return out
+        targets: Array | None = None
+        for k, rows in group_numbers(self.piece_number(s)):
+            values = self.pieces[k].targets(s[rows] - self.ends[k])
+            if targets is None:
+                targets = np.empty((len(s), *values.shape[1:]))
+            targets[rows] = values
+        assert targets is not None
+        for detour in self.detours:
+            targets[..., :3, 3] += detour.offset(s)
+        return targets
 
     @cached_property
     def largest_detour(self) -> float:
         """How far its detours lead away from its pieces, at most [mm]."""
-        return max((float(np.linalg.norm(one.displacement)) for one in self.detours), default=0.0)
+        return max((float(np.linalg.norm(detour.displacement)) for detour in self.detours), default=0.0)
 
     @cached_property
     def breaks(self) -> Array:
@@ -81,11 +81,11 @@ class Route:
         inside = [self.ends[k] + p.dense.bends for k, p in enumerate(self.pieces) if p.dense is not None]
         if not inside:
             return self.ends
-        found = np.sort(np.concatenate([self.ends, *inside]))
-        apart = np.append(True, np.diff(found) > _SAME)  # blends that take half of a side each meet in its middle
-        found = found[apart]
-        found[-1] = self.length
-        return np.asarray(found)
+        breaks = np.sort(np.concatenate([self.ends, *inside]))
+        apart = np.append(True, np.diff(breaks) > _SAME)  # blends that take half of a side each meet in its middle
+        breaks = breaks[apart]
+        breaks[-1] = self.length
+        return np.asarray(breaks)
 
     @cached_property
     def spans(self) -> Array:
@@ -99,27 +99,27 @@ class Route:
         dense = [(self.ends[k], p.dense) for k, p in enumerate(self.pieces) if p.dense is not None]
         if not dense:
             return np.zeros(0), np.zeros((0, self.task.position))
-        return np.concatenate([at + d.given for at, d in dense]), np.concatenate([d.points for _, d in dense])
+        return np.concatenate([begin + d.given for begin, d in dense]), np.concatenate([d.points for _, d in dense])
 
     @cached_property
     def _paces(self) -> tuple[Array, Array, Array]:
         """Where each speed begins, fraction of the joints' speed and tool speed; nan: it has none of its own."""
         rows = []
         for begin, piece in zip(self.ends, self.pieces, strict=False):
-            own = (piece.speed, piece.tool_speed)
+            paces = (piece.speed, piece.tool_speed)
             if piece.dense is None or len(piece.dense.begins) == 0:
-                rows.append(np.array([[begin, *(np.nan if x is None else x for x in own)]]))
+                rows.append(np.array([[begin, *(np.nan if x is None else x for x in paces)]]))
             else:
                 d = piece.dense
                 rows.append(np.stack([np.maximum(begin + d.begins, begin), d.speed, d.tool_speed], axis=1))
         table = np.concatenate(rows)
         return table[:, 0], table[:, 1], table[:, 2]
 
-    def limit(self, s: Array, speed: float, tool: float | None) -> tuple[Array, Array]:
+    def speed_limits(self, s: Array, speed: float, tool: float | None) -> tuple[Array, Array]:
         """Fraction of the joints' speed and tool speed [mm/s] (inf: none) in the intervals between s: (N - 1,) each."""
-        begins, *own = self._paces
-        which = np.searchsorted(begins, (s[:-1] + s[1:]) / 2, side="right") - 1
-        parts, tools = (each[which] for each in own)
+        begins, *paces_of_begin = self._paces
+        numbers = np.searchsorted(begins, (s[:-1] + s[1:]) / 2, side="right") - 1
+        parts, tools = (paces[numbers] for paces in paces_of_begin)
         most = np.inf if tool is None else tool
         return np.where(np.isnan(parts), speed, parts), np.where(np.isnan(tools), most, tools)
 
@@ -172,25 +172,25 @@ def join_pieces(
             side = piece.length
             continue
         before, wish = made[-1], blends[k - 1]
-        angle = _angle(before, piece)
+        angle = _corner_angle(before, piece)
         if angle < _SMOOTH:
             made.append(piece)
         elif (radius := _blend_radius(before, piece, angle, wish, tolerance)) <= 0:
             stops.add(len(made))
             made.append(piece)
         else:
-            first, middle, last, found = blend(task, before, piece, radius, side)
+            first, middle, last, radius_kept = blend(task, before, piece, radius, side)
             if wish is None:
-                middle = replace(middle, dense=_passing(middle, piece.first.p))
+                middle = replace(middle, dense=_given_corner(middle, piece.first.p))
             else:
-                reduced.note(wish, found)
+                reduced.note(wish, radius_kept)
             made[-1:] = [p for p in (first, middle, last) if p is last or p.length > SMALL]
         side = piece.length
     stops.add(len(made))
     return Route(task, tuple(made), frozenset(stops)), order
 
 
-def _angle(last_piece: Piece, piece: Piece) -> float:
+def _corner_angle(last_piece: Piece, piece: Piece) -> float:
     """The angle of the corner between two pieces [rad], 0 for none."""
     a, b = last_piece.direction(last_piece.length), piece.direction(0.0)
     return float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1, 1)))
@@ -204,7 +204,7 @@ def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wish: float | N
     return radius if radius > 0 and angle <= sharpest and both_move(last_piece, piece) else 0.0
 
 
-def _passing(piece: Piece, corner: Array) -> Dense:
+def _given_corner(piece: Piece, corner: Array) -> Dense:
     """A blend that has a given corner to pass in its middle."""
     none = np.zeros(0)
     return Dense(np.array([piece.length / 2]), corner[None], none, none, none, none, none)
@@ -212,9 +212,9 @@ def _passing(piece: Piece, corner: Array) -> Dense:
 
 def both_move(a: Piece, b: Piece) -> bool:
     """Whether the position moves in both: a pure turn has no sphere to be blended in."""
-    return _moves(a) and _moves(b)
+    return _position_moves(a) and _position_moves(b)
 
 
-def _moves(piece: Piece) -> bool:
+def _position_moves(piece: Piece) -> bool:
     p = [piece.curve(np.array([f * piece.length]))[0, : piece.task.position] for f in (0.0, 0.5, 1.0)]
     return bool(max(np.linalg.norm(p[0] - p[1]), np.linalg.norm(p[1] - p[2])) > 1e-6)

@@ -23,8 +23,8 @@ from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.joint_moves import plan as plan_joints
-from armkin.motion.timing.trajectory import Straight, brake
+from armkin.motion.joint_moves import plan_joint_moves as plan_joints
+from armkin.motion.timing.trajectory import Straight, brake_share
 from armkin.motors import joints as joints_of
 from armkin.motors import motor_names, pulses
 
@@ -92,7 +92,7 @@ class Cut(StartedTrajectory):
         arm = self.trajectory.arm
         parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
         cycles = round(stretch.duration * self.clock)
-        return Move(start, end, parts if stretch.duration else (), cycles, curve=True, brake=brake(stretch))
+        return Move(start, end, parts if stretch.duration else (), cycles, curve=True, brake=brake_share(stretch))
 
 
 def cut(trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> Cut:
@@ -129,7 +129,7 @@ def plan(
     """Moves from counts through joint targets, stopping at each, where the motors' steps put them.
 
     start: (motors,) counts; targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
-    Raises as `armkin.motion.joint_moves.plan` and `cut` do.
+    Raises as `armkin.motion.joint_moves.plan_joint_moves` and `cut` do.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")
