@@ -52,8 +52,8 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
         return tuple(f"branch {i + 1}" for i in range(count))
     swap = _swapped(arm, task, geometry, sizes)
     names = []
-    for index in itertools.product(*(range(s) for s in sizes)):
-        words = [WORDS[k][i ^ int(swap[k][index])] for k, i in zip(geometry.labels, index, strict=True) if k]
+    for signs in itertools.product(*(range(s) for s in sizes)):
+        words = (WORDS[k][i ^ int(swap[k][signs])] for k, i in zip(geometry.labels, signs, strict=True) if k)
         names.append(", ".join(words))
     return (*names, *(f"branch {i + 1}" for i in range(named, count)))
 
@@ -62,17 +62,15 @@ def _swapped(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -> dict
     """Of each word of the class on which branches (b0, b1, b2) the second of its two names is the first sign's."""
     postures, q, valid = _sample_postures(arm, task, geometry)
     shape = (len(q), *sizes)
-    own = _own_branch(arm, postures, q, valid)
+    away = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
+    found_again = away.min(axis=1) < tol.NAMED  # a branch that is the posture itself
     swap = {label: np.zeros(shape[1:], bool) for label in geometry.labels if label}
-    signs = np.stack(
-        np.unravel_index(np.maximum(own, 0), shape[1:]), axis=1
-    )  # (postures, 3), of those that are found again
-    found = own >= 0
-    if "shoulder" in swap and found.any():
+    signs = np.stack(np.unravel_index(away.argmin(axis=1), shape[1:]), axis=1)  # (postures, 3) of that branch
+    if "shoulder" in swap and found_again.any():
         # the first posture found again is the one most like home
-        swap["shoulder"][...] = signs[np.argmax(found), 0] == 1
-    if "wrist" in swap and found.any():
-        positive = found & (_bent_wrist(arm, postures) > 0)
+        swap["shoulder"][...] = signs[np.argmax(found_again), 0] == 1
+    if "wrist" in swap and found_again.any():
+        positive = found_again & (_bent_wrist(arm, postures) > 0)
         if positive.any():
             swap["wrist"][...] = signs[np.argmax(positive), 2] == 1
     if "elbow" in swap:
@@ -147,13 +145,6 @@ def _sample_postures(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, A
     return postures, q, (missing < tol.SOLUTION) & ~edge
 
 
-def _own_branch(arm: Arm, postures: Array, q: Array, valid: Bool) -> Array:
-    """Index of the branch that is the posture itself: (M,), -1 where it is not found again."""
-    distance = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
-    index = distance.argmin(axis=1)
-    return np.where(distance.min(axis=1) < tol.NAMED, index, -1)
-
-
 def _bent_wrist(arm: Arm, postures: Array) -> Array:
     """Sine of the wrist's middle joint from straight: how joint 6 leans to joint 4's side, about joint 5's axis."""
     c, s = np.cos(postures[:, 4]), np.sin(postures[:, 4])
@@ -168,7 +159,8 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     shape = q.shape[:2]
     flat = np.nan_to_num(q.reshape(-1, arm.n))
     points = _points(arm, flat)
-    if not _bends_upright(arm):
+    _, directions = axes(Chain(arm.link, arm.prismatic))
+    if abs(directions[min(arm.n, 3) - 1, 2]) >= 0.9:  # the elbow's axis is along the base's z
         # in the base's plane: to the left of the way from the first joint to the tool
         way = points[:, -1] - points[:, 0]
         elbow = points[:, 1] - points[:, 0]
@@ -180,12 +172,6 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     tilt = np.abs(way[:, 2]) / np.maximum(length, tol.NO_LENGTH)
     # far out, no offset of the shoulder can turn the way round
     return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), tol.NO_LENGTH)).reshape(shape)
-
-
-def _bends_upright(arm: Arm) -> bool:
-    """Whether the elbow's axis is not along the base's z."""
-    _, directions = axes(Chain(arm.link, arm.prismatic))
-    return bool(abs(directions[: min(arm.n, 3)][-1, 2]) < 0.9)
 
 
 def _points(arm: Arm, q: Array) -> Array:

@@ -140,9 +140,7 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
     if not q.size:
         return out, inside
     for i in range(arm.n):
-        slides, limits = bool(arm.prismatic[i]), (float(arm.lower[i]), float(arm.upper[i]))
-        value = q[..., i] if slides else wrapped(q[..., i])
-        out[..., i], ok = nearest_copy(value, near[..., i], *limits, slides)
+        out[..., i], ok = nearest_of_joint(arm, i, q[..., i], near[..., i])
         inside &= ok
     return out, inside
 
@@ -182,11 +180,8 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     choices = []
     for i in range(arm.n):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
-        if arm.prismatic[i]:
-            inside = lower - SLACK <= row[i] <= upper + SLACK
-            choices.append([float(row[i])] if inside else [])
-        elif not (np.isfinite(lower) and np.isfinite(upper)):
-            value, ok = nearest_copy(wrapped(row[i : i + 1]), close[i], lower, upper)
+        if arm.prismatic[i] or not (np.isfinite(lower) and np.isfinite(upper)):
+            value, ok = nearest_of_joint(arm, i, row[i : i + 1], close[i])
             choices.append([float(value[0])] if np.all(ok) else [])
         else:
             first = int(np.ceil((lower - SLACK - row[i]) / TURN))

@@ -60,13 +60,15 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     for backward, first in product((False, True), (1, 3)):
         loop = _Loop.of(reverse(own) if backward else own, first, tolerance, arm.reach)
         if loop is not None and not loop.ends.close:
-            geometry = _class_walked_back(loop) if backward else _class_of(loop)
+            geometry = _class_of(loop, range(5, -1, -1) if backward else range(6))
+            if backward:  # from the tool to the base
+                geometry = replace(geometry, pairs=walked_back(loop.solve))
             if is_sound(arm, task, geometry):
                 return geometry
     return None
 
 
-def _class_of(loop: _Loop, names: Sequence[int] = range(6)) -> Geometry:
+def _class_of(loop: _Loop, names: Sequence[int]) -> Geometry:
     """The class of a loop, of a chain whose joints have these names (0..5)."""
     axes = sorted(names[i] + 1 for i in range(loop.first, loop.first + 3))
     what, name = "meet in a point", "three axes that meet"
@@ -78,11 +80,6 @@ def _class_of(loop: _Loop, names: Sequence[int] = range(6)) -> Geometry:
     # where one of these is free, its values at which the rest reaches may be few, and other motions cross there
     ends = tuple(names[j] for j in loop.joints)
     return Geometry(name, why, True, loop.solve, ordered=not loop.ends.regular, ends=ends)
-
-
-def _class_walked_back(loop: _Loop) -> Geometry:
-    """The class of a loop of the chain walked from the tool to the base."""
-    return replace(_class_of(loop, range(5, -1, -1)), pairs=walked_back(loop.solve))
 
 
 class _Ends:

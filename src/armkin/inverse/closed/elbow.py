@@ -123,8 +123,7 @@ class TwoLink:
         reached2 = ((upper2 + known) ** 2 + aside) / upper2 if upper2 > 0.0 else None
         length2 = None if reached2 is None else np.sqrt(reached2 * across2)
         second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2, length2)
-        doubt = doubt2 | doubt3
-        return second, third, doubt
+        return second, third, doubt2 | doubt3
 
     def reach(self, third: Pair, fore: list[Entry] | None = None) -> list[Entry]:
         """``l + Rz(q3) m``, before joint 2 turns it."""
@@ -144,16 +143,14 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     if n != arm.n or arm.prismatic[1:].any():
         return None
     parallels = 2 if task.name in ("xyz", "xyz_roll") else 3
-    link = arm.link.copy()
-    for i in range(2, parallels + 1):
-        if not is_parallel(link[i], tolerance):
-            return None
-    if arm.prismatic[0] and abs(link[1][2, 2]) < tol.PARALLEL:
+    if not all(is_parallel(L, tolerance) for L in arm.link[2 : parallels + 1]):
+        return None
+    if arm.prismatic[0] and abs(arm.link[1][2, 2]) < tol.PARALLEL:
         return None  # the slide lies in the arm's plane
     why = "joints 2 and 3 are parallel" if parallels == 2 else "joints 2, 3 and 4 are parallel"
     labels = ("" if arm.prismatic[0] else "shoulder", "elbow", "")
+    elbow = Elbow(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3])
     if n == 3:
-        elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
 
         def xyz(goal: list[Entry], prefer: Prefer) -> Candidates:
             pairs, doubt = elbow.solve(goal, [0.0, 0.0, 0.0], prefer)
@@ -162,7 +159,6 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
 
         return Geometry("elbow", why, True, xyz, labels=labels)
 
-    elbow = Elbow(Chain(link, arm.prismatic), link[3][:3, 3])
     if task.name == "xyz_roll":
         return Geometry("elbow with roll", f"{why}, joint 4 is the roll", True, _roll(arm, task, elbow), labels=labels)
     return Geometry("elbow with pitch", why, True, _pitch(arm, task, elbow), labels=labels)
@@ -184,11 +180,9 @@ def _pitch(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
             q5 = (goal[4] - task.offsets[1]) / task.sums[1][4]
             fifth = Pair(*arrays.cos_sin(q5))
             P = pose.times(pose.rotate(past, *fifth), pose.constant(link[5]))
-            tip = P[9:12]
         else:
-            fifth = None
-            tip = past[9:12]
-        x, y, z = pose.turn(turned, tip)
+            fifth, P = None, past
+        x, y, z = pose.turn(turned, P[9:12])
         offset = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
         pairs, doubt = elbow.solve(goal[:3], offset, prefer)
         # joint 4 takes what is left of the sum

@@ -133,15 +133,6 @@ def _three_joints(chain: Chain, task: Task, kept: list[int]) -> Solve:
     return _known_middle(chain, task, weights)
 
 
-def _direction(goal: list[Entry], task: Task, chain: Chain) -> pose.Pose:
-    """The tool's orientation about z: entries of a pose at the origin."""
-    c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
-    R0 = _at_zero(chain)
-    R0[:3, 3] = 0.0
-    spin: pose.Pose = [c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-    return pose.times(spin, pose.constant(R0))
-
-
 def _at_zero(chain: Chain) -> Array:
     """The tool's pose when all joints are zero."""
     return np.asarray(np.linalg.multi_dot(list(chain.link)))
@@ -158,11 +149,13 @@ def _last_of_sum(goal: list[Entry], task: Task, weights: Array, pairs: list[Pair
 
 def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
     """Joint 3 turns: step back from the tool to its axis, place that point with joints 1 and 2."""
-    back = pose.constant(inverse(chain.link[3]))
+    back, R0 = pose.constant(inverse(chain.link[3])), _at_zero(chain)
+    R0[:3, 3] = 0.0
     two = _two_joints(Chain(chain.link[:3], chain.prismatic[:2]))
 
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
-        R = _direction(goal, task, chain)
+        c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
+        R = pose.times([c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], pose.constant(R0))  # about z
         x, y, _ = pose.turn(R, back[9:12])
         pairs, doubt = two([goal[0] + x, goal[1] + y], prefer[:2])
         return [*pairs, _last_of_sum(goal, task, weights, [*pairs, None], 2)], doubt

@@ -52,9 +52,8 @@ def wrist_centre(chain: Chain, tolerance: float) -> tuple[Array, Array] | None:
     met = None if chain.prismatic[3:].any() else meeting_point(chain.link[4], chain.link[5], tolerance)
     if met is None:
         return None
-    at4, at6 = met
     L3 = chain.link[3]
-    return L3[:3, :3] @ at4 + L3[:3, 3], at6
+    return L3[:3, :3] @ met[0] + L3[:3, 3], met[1]
 
 
 class SphericalWrist:

@@ -69,8 +69,8 @@ class Position:
         else:
             x, y, z = tip
             self.Y = np.column_stack([R2[:, 2] * z + t2, R2[:, :2] @ [x, y], R2[:, :2] @ [-y, x]])
-        self.across = _form(self.Y[:2])  # |y across joint 2|^2 as a quadratic form in b
-        self.square = _form(self.Y)  # |y|^2
+        self.across = self.Y[:2].T @ self.Y[:2]  # |y across joint 2|^2 as a quadratic form in b
+        self.square = self.Y.T @ self.Y  # |y|^2
         self.rows, self.rest, self.forms = self._equations(L1)
         self.A = self.rows[:, :2] if not self.prismatic[1] else self.rows[:, 2:]
         self.tolerance, self.near = tolerance, near
@@ -201,10 +201,8 @@ class Position:
         main = self._affine(self.main, known)
         right = _at_joint(main, third)
         ax, ay = (self.main @ self.A).tolist()
-        a, b = (
-            arrays.add(arrays.mul(ax, y[0]), arrays.mul(ay, y[1])),
-            arrays.sub(arrays.mul(ay, y[0]), arrays.mul(ax, y[1])),
-        )
+        a = arrays.add(arrays.mul(ax, y[0]), arrays.mul(ay, y[1]))
+        b = arrays.sub(arrays.mul(ay, y[0]), arrays.mul(ax, y[1]))
         second, doubt2 = linear(a, b, right, 1, size, prefer[1])
         # without a real third joint, the nearest one may well bring the tip onto axis 2: nothing is free there
         return third, normalised(second), doubt | doubt2.where(_solves(alone, third, size))
@@ -279,11 +277,6 @@ def _solves(six: list[Entry], third: Pair, length: Entry) -> Truth:
         total, size = arrays.add(total, term), arrays.add(size, abs(term))
     solves: Truth = arrays.absolute(total) <= arrays.add(tol.SEED * size, tol.NEARBY * length)
     return solves
-
-
-def _form(rows: Array) -> Array:
-    """The quadratic form G (3, 3) with ``b^T G b = |rows b|^2``."""
-    return np.asarray(rows.T @ rows)
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, Int
+from armkin.formula.arrays import Array, Bool, Int, numbers_within
 from armkin.inverse.elimination.polish import pose_error, tip
 from armkin.inverse.numeric import tolerances as tol
 
@@ -104,7 +104,7 @@ def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
     near_singular[answers.pose[answers.weakness > tol.ILL]] = True
     if number.max(initial=0) > MOST:
         rank = np.empty(answers.pose.size, dtype=np.int64)
-        rank[np.lexsort((answers.weakness, answers.pose))] = _places_in_pose(answers.pose)
+        rank[np.lexsort((answers.weakness, answers.pose))] = numbers_within(number)
         answers = rows_of(answers, rank < MOST)
     return _table(answers, count, MOST), near_singular
 
@@ -116,12 +116,7 @@ def best(answers: Answers, count: int, most: int) -> Array:
 
 def _table(answers: Answers, count: int, most: int) -> Array:
     """At most so many answers of each pose, poses ascending, in their order: (N, B, 6), NaN past the last one."""
-    column = _places_in_pose(answers.pose)
+    column = numbers_within(np.bincount(answers.pose, minlength=count))
     q, some = np.full((count, min(int(column.max(initial=-1)) + 1, most), 6), np.nan), column < most
     q[answers.pose[some], column[some]] = answers.q[some]
     return q
-
-
-def _places_in_pose(pose: Int) -> Int:
-    """The numbers 0, 1, .. of answers among those of the same pose, poses (M,) ascending."""
-    return np.arange(len(pose)) - np.searchsorted(pose, pose)
