@@ -12,7 +12,7 @@ from test_every_branch import shipped
 import armkin
 from armkin import Arm
 from armkin.inverse.elimination import choose_variable, method, pencil, roots
-from armkin.inverse.elimination.joint_order import roles
+from armkin.inverse.elimination.closed_loop import roles
 from armkin.model.build_arm import build
 from armkin.model.rotation import inverse, rotation_about
 from armkin.robot_file import parse

@@ -6,7 +6,7 @@ from redundant_arms import covers, held_answers, postures
 
 import armkin
 from armkin import Status
-from armkin.inverse.redundant import answers_on_planes
+from armkin.inverse.redundant import curve_starts
 
 
 def test_families_of_a_nearly_stretched_arm_are_listed() -> None:
@@ -87,7 +87,7 @@ def test_answers_do_not_depend_on_the_joint_whose_values_are_asked(monkeypatch: 
     target = postures(arm, None, 2, 78)[1]
     near = armkin.ik(arm, target)
     assert "near spherical wrist" in near.why
-    monkeypatch.setattr(answers_on_planes, "nearly_closed", lambda arm, free: free)
+    monkeypatch.setattr(curve_starts, "nearly_closed", lambda arm, free: free)
     other = armkin.ik(arm, target)
     assert near.interval is not None
     assert other.interval is not None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.inverse.singular.free_postures import followed
+from armkin.inverse.singular.legal_postures import followed
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.keep_out.clearance import clear
 

@@ -32,7 +32,7 @@ from armkin.inverse.run import chunks
 from armkin.inverse.run import single as one_target
 from armkin.inverse.run.edges import examined
 from armkin.inverse.run.workers import check, shared
-from armkin.inverse.singular import free_postures, legal_postures, near_itself
+from armkin.inverse.singular import legal_postures, near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.choose_task import task_for
@@ -140,7 +140,7 @@ def answered(  # noqa: C901 - what is looked at after the closed form, in its or
         if most.max(initial=0.0) > near_itself.ROUNDED:
             out = near_itself.stand(goals, out, most)
         if arm.keep_out:
-            out = free_postures.with_free_postures(goals, out)
+            out = legal_postures.with_free_postures(goals, out)
     if arm.prismatic.any():
         out.complete[distance(arm, definition, target) > tol.FAR] = False
     if not geometry.ordered:

@@ -111,7 +111,10 @@ def write(arm: Arm, out: Batch, rows: Int, q: Array, valid: Bool, label: Int, ne
     behind; the same batch, or where they need more columns a wider one."""
     if q.shape[1] > out.q.shape[1]:
         out = stacked([out, empty(0, q.shape[1], arm.n)])
-    width, label = q.shape[1], named(label, valid)
+    width, label = q.shape[1], np.where(valid, label, -1)
+    ordered = np.sort(label, axis=1)
+    if ((label < 0) & valid).any() or ((np.diff(ordered) == 0) & (ordered[:, 1:] >= 0)).any():
+        label = named(label, valid)
     copies, inside = nearest_row(arm, np.nan_to_num(q), near[:, None, :])
     out.q[rows], out.valid[rows], out.within[rows], out.branch[rows] = np.nan, False, False, -1
     out.q[rows, :width] = np.where(valid[:, :, None], copies, np.nan)
@@ -124,9 +127,7 @@ def write(arm: Arm, out: Batch, rows: Int, q: Array, valid: Bool, label: Int, ne
 def named(label: Int, valid: Bool) -> Int:
     """Labels (K, W) with the smallest free number for branches that have none, or one of another."""
     out = np.where(valid, label, -1)
-    ordered = np.sort(out, axis=1)
-    twice = (np.diff(ordered) == 0) & (ordered[:, 1:] >= 0)
-    for row in np.flatnonzero(((label < 0) & valid).any(axis=1) | twice.any(axis=1)):
+    for row in np.flatnonzero(((label < 0) & valid).any(axis=1) | (np.diff(np.sort(out, axis=1)) == 0).any(axis=1)):
         taken: set[int] = set()
         for b in np.flatnonzero(valid[row]):
             if out[row, b] < 0 or out[row, b] in taken:

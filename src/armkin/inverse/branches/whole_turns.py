@@ -140,7 +140,9 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
     if not q.size:
         return out, inside
     for i in range(arm.n):
-        out[..., i], ok = nearest_of_joint(arm, i, q[..., i], near[..., i])
+        slides, limits = bool(arm.prismatic[i]), (float(arm.lower[i]), float(arm.upper[i]))
+        value = q[..., i] if slides else wrapped(q[..., i])
+        out[..., i], ok = nearest_copy(value, near[..., i], *limits, slides)
         inside &= ok
     return out, inside
 

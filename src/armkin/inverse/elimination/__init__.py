@@ -3,8 +3,7 @@
 method.py          the method, why it is complete, `solve`
 choose_variable.py `prepare`: which eigenvalue problems an arm's poses are solved by, one after the other
 passes.py          one of these over poses: their answers, and which it leaves open
-closed_loop.py     the chain closed and scaled
-joint_order.py     where the loop is cut, which way it is walked: which joint plays which part
+closed_loop.py     the chain closed and scaled; where the loop is cut, which way it is walked
 line_features.py   the numbers of a line on which rigid motions are matrices
 end_joints.py      removes the two end joints, and gives them back
 pencil.py          the eigenvalue problem of the middle joints

@@ -17,8 +17,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination import closed_loop, roots
-from armkin.inverse.elimination.closed_loop import Loop
-from armkin.inverse.elimination.joint_order import Role, roles
+from armkin.inverse.elimination.closed_loop import Loop, Role, roles
 from armkin.inverse.elimination.passes import TILT, attempt
 from armkin.inverse.elimination.pencil import Pencil, build
 from armkin.inverse.elimination.polish import jacobian, refine, tip

@@ -14,7 +14,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import line_features
-from armkin.inverse.elimination.joint_order import Role
+from armkin.inverse.elimination.closed_loop import Role
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
 from armkin.model.rotation import inverse, joint_motion

@@ -1,6 +1,6 @@
 """From a closed chain to an eigenvalue problem: the equations of the middle joints, and what no pose changes.
 
-The parts of joints and links are those of `joint_order`.  From the loop
+The parts of joints and links are those of `closed_loop`.  From the loop
 
     (1)  Lb J1 L1 J2 L2 J3 L3 Je = Jb^-1 La^-1 Ja^-1 Le^-1.
 
@@ -43,8 +43,8 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import end_joints, line_features
+from armkin.inverse.elimination.closed_loop import Role, links_by_part
 from armkin.inverse.elimination.end_joints import Ends
-from armkin.inverse.elimination.joint_order import Role, links_by_part
 from armkin.inverse.numeric import tolerances as tol
 
 # Products of (1, cos q, sin q) with cos(q/2) and sin(q/2), in (cos 3f, sin 3f, cos f, sin f), f = q/2.

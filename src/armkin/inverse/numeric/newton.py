@@ -1,4 +1,4 @@
-"""Newton corrections of joint values onto a task, for any arm and task."""
+"""Newton corrections of joint values onto a task, for any arm and task, and a search by these from many starts."""
 
 from __future__ import annotations
 
@@ -14,6 +14,10 @@ from armkin.inverse.tasks.residuals import residual, task_jacobian
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
+
+STARTS = 64  # of a search
+STEPS, PATIENCE = 25, 8  # of each
+ROUND = np.pi / 4  # [rad] roots of high order nearly always stand where axes are parallel or at such angles
 
 
 def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
@@ -83,6 +87,27 @@ def correct(
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
         q[active] += step * unit
     return best, best_size
+
+
+def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
+    """What Newton's method leads to from the same random postures for each target that may lack branches.
+
+    target: (N, m) or (N, 4, 4); lost: (N,), some. Returns (N, STARTS, n) postures that miss their target by less than
+    `SEED`, nan elsewhere: a search, no proof. Of roots that Newton's method only approaches, the nearest round posture,
+    if that is better.
+    """
+    rng = np.random.default_rng(13)
+    start = rng.uniform(-1.0, 1.0, (STARTS, arm.n)) * np.where(arm.prismatic, arm.reach, np.pi)
+    row, which = np.nonzero(np.repeat(lost[:, None], STARTS, axis=1))
+    out = np.full((len(target), STARTS, arm.n), np.nan)
+    q, size = correct(arm, task, start[which], target[row], steps=STEPS, patience=PATIENCE)
+    slow = np.flatnonzero((size > tol.CONVERGING) & (size < tol.SEED))
+    if len(slow):
+        even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
+        better = missing(arm, task, even, target[row[slow]]) < size[slow]
+        q[slow[better]] = even[better]
+    out[row, which] = np.where((size < tol.SEED)[:, None], q, np.nan)
+    return out
 
 
 def _least_step(J: Array, r: Array, least: Array) -> Array:

@@ -23,10 +23,9 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.numeric.many_starts import many_starts
-from armkin.inverse.redundant.answers_on_planes import PLANES
 from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
+from armkin.inverse.redundant.curve_starts import PLANES
 from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
 from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion, vertex
 from armkin.inverse.redundant.other_joints import Follower, Ik
@@ -178,7 +177,7 @@ class _Rows:
         for k in np.flatnonzero(lost & (self.stands | sought)).tolist():
             q, goal = self.near[k][None], target[[k]]
             if not self.stands[k]:
-                q = many_starts(self.arm, task, goal, np.ones(1, bool))[0]
+                q = newton.many_starts(self.arm, task, goal, np.ones(1, bool))[0]
                 q = q[~np.isnan(q[:, 0])]
                 q = q[newton.missing(self.arm, task, q, np.repeat(goal, len(q), axis=0)) <= tol.SOLUTION]
             if len(q):

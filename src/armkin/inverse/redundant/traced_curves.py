@@ -15,9 +15,8 @@ from armkin.formula.array_tuples import rows_of, stacked
 from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.redundant.answers_on_planes import Nodes, answered, once
 from armkin.inverse.redundant.curve_points import Points, Ways, onto
-from armkin.inverse.redundant.missed_curves import missed
+from armkin.inverse.redundant.curve_starts import Nodes, answered, missed, once
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 

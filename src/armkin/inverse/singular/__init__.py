@@ -10,7 +10,6 @@ meetings.py            postures in which self-motions meet, replaced by one of e
 curves.py              one-dimensional solution sets, followed
 surfaces.py            self-motions of two dimensions that two joints about one line sweep, by the curves of the others
 circuits.py            the connected pieces of a self-motion of three joints or more
-legal_postures.py      edges of which only other postures than those listed are within limits
-free_postures.py       self-motions beside keep-outs: by their nearest free posture
+legal_postures.py      edges of which only other postures than those listed are within limits, or hit no keep-out
 near_itself.py         `near` where it solves its target itself
 """

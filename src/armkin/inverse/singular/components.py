@@ -20,7 +20,6 @@ from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.singular import chains, circuits, high_order_roots, meetings, self_motions
 from armkin.inverse.singular.local_structure import beyond_folds, local_structure
 
@@ -59,7 +58,7 @@ def examine(
     if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
         open_ |= found.surface[rows]
     if open_.any():
-        starts = many_starts(goals.arm, goals.task, goals.target[rows], open_)
+        starts = newton.many_starts(goals.arm, goals.task, goals.target[rows], open_)
         others, labels = np.concatenate([others, starts], axis=1), np.append(labels, np.zeros(starts.shape[1], int))
     there = again[rows] | ~np.isnan(others[:, :, 0]).all(axis=1)
     rows, others = rows[there], others[there]

@@ -16,7 +16,6 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.numeric.many_starts import many_starts
 from armkin.inverse.singular.components import examine
 from armkin.model.arm import Arm
 from armkin.model.lock_joints import lock
@@ -72,7 +71,7 @@ def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> tuple[Array, Int,
     turned[:, i] += way * (turned[:, j] - near[j])
     others = np.delete(np.arange(arm.n), j)
     rest = lock(arm, {arm.joint_names[j]: float(near[j])})
-    starts = many_starts(rest, task, target, np.ones(1, bool))[0]
+    starts = newton.many_starts(rest, task, target, np.ones(1, bool))[0]
     starts = starts[~np.isnan(starts[:, 0])]
     marks = np.concatenate([label, np.full(len(starts), OWN)])
     seeds = Seeds.of(np.concatenate([turned[:, others], starts])[None], marks[None])

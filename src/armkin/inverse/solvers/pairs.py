@@ -2,13 +2,18 @@
 
 The roots of a class stand in pairs, along an axis of its branches. On an arm close to the class a pair continues
 another, wherever both are: real and apart, one, or complex. Seeds that lead to one root each need nothing more; the
-others, whose partners lie close to them, are found as pairs (`numeric.root_pairs`), which a fold does not disturb. Thus
-every root of the class is accounted for, or the target remains open.
+others, whose partners lie close to them, are found as pairs, which a fold does not disturb. Thus every root of the
+class is accounted for, or the target remains open.
+
+Two roots are ``m + sqrt(w) u`` and ``m - sqrt(w) u``: real for ``w > 0``, complex for ``w < 0``, one at ``w = 0``. Half
+the sum of their residuals and half the difference over ``sqrt(w)`` are smooth in m, u and w, and their Jacobian is
+regular where that of one root alone is singular: at a fold.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +21,7 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.closed.candidates import Recorded
 from armkin.inverse.closed.geometry import Rows
 from armkin.inverse.closed.newton_steps import ABSENT
-from armkin.inverse.numeric import newton, root_pairs
+from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -28,6 +33,8 @@ TOUCHING = (
     tol.APART_ROOTS**2
 )  # square of half of what lies between complex roots, up to which they may be one real root
 MOVED = 0.3  # [rad, reaches] a pair may stand from the class's
+STEPS = 8  # of Newton's method for a pair,
+LARGEST = 0.3  # [rad, reaches] and of each
 
 
 def around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
@@ -78,7 +85,7 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
     two, row = partner[k, one], left[k]
     apart = newton.difference(arm, seed[row, one], seed[row, two]) * radian_or_reach(arm)
     middle = seed[row, one] - 0.5 * apart
-    pair = root_pairs.meet(arm, task, middle, target[row])
+    pair = _meet(arm, task, middle, target[row])
     found = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < MOVED)
     open_[row[~found]] = True
     sense = np.where(_keep_sense(arm, task, source, (row, one, two), off, target, pair.way), 1.0, -1.0)[:, None]
@@ -121,3 +128,53 @@ def _keep_sense(
         apart[size > widest] = between[size > widest]
         widest = np.maximum(widest, size)
     return np.asarray((apart * way).sum(axis=1) >= 0.0)
+
+
+class _RootPair(NamedTuple):
+    """middle (M, n) [rad | mm]; way (M, n): half of what lies between the roots, or would if they were real; square
+    (M,): w, negative of complex ones [rad^2, reaches^2]; found (M,)."""
+
+    middle: Array
+    way: Array
+    square: Array
+    found: Bool
+
+
+def _meet(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
+    """The pairs of roots about postures q (M, n), whose weakest direction is the pairs', on targets.
+
+    Of tasks with as many residuals as joints. Complex pairs are found to the second order of what lies between them.
+    """
+    unit, (M, n) = radian_or_reach(arm), q.shape
+    middle, square = q.copy(), np.zeros(M)
+    _, J = newton.scaled(arm, task, middle, target)
+    along = np.linalg.svd(np.where(np.isfinite(J), J, 0.0))[2][:, -1]
+    way, size = along.copy(), np.full(M, np.inf)
+    active = np.arange(M)
+    for _ in range(STEPS):
+        goal, m, u, w = target[active], middle[active], way[active], square[active]
+        half = np.sqrt(np.maximum(np.abs(w), tol.PAIR_WAY**2))[:, None]
+        ahead, behind, there = (newton.scaled(arm, task, m + side * half * u * unit, goal) for side in (1.0, -1.0, 0.0))
+        bent = (ahead[0] + behind[0] - 2.0 * there[0]) / half**2
+        even, odd = there[0] + 0.5 * w[:, None] * bent, (ahead[0] - behind[0]) / (2.0 * half)
+        A, B = 0.5 * (ahead[1] + behind[1]), (ahead[1] - behind[1]) / (2.0 * half[:, :, None])
+        curved = (B @ u[:, :, None])[:, :, 0]
+        third = ((A @ u[:, :, None])[:, :, 0] + odd) / (2.0 * half**2)
+        system = np.zeros((len(active), 2 * n + 1, 2 * n + 1))
+        system[:, :n, :n] = system[:, n:-1, n:-1] = A
+        system[:, :n, n:-1], system[:, n:-1, :n] = w[:, None, None] * B, B
+        system[:, :n, -1], system[:, n:-1, -1] = 0.5 * curved, third
+        system[:, -1, n:-1] = along[active]
+        missing = np.concatenate([even, odd, np.zeros((len(active), 1))], axis=1)
+        with np.errstate(all="ignore"):
+            step = newton.nudged(np.linalg.solve, np.nan_to_num(system), np.nan_to_num(missing)[:, :, None])[:, :, 0]
+        step *= np.minimum(1.0, LARGEST / np.maximum(np.abs(step).max(axis=1), LARGEST))[:, None]
+        middle[active] += step[:, :n] * unit
+        way[active] += step[:, n:-1]
+        square[active] += step[:, -1]
+        size[active] = np.abs(step).max(axis=1)
+        active = active[~(size[active] < tol.PAIR_SETTLED)]
+        if not len(active):
+            break
+    way *= np.sqrt(np.abs(square))[:, None] * unit
+    return _RootPair(middle, way, square, size < tol.PAIR_SETTLED)

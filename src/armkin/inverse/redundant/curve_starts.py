@@ -1,7 +1,13 @@
-"""Answers of some targets at values of one joint, planes: where curves of answers are begun.
+"""Answers of some targets at which curves of answers are begun.
 
-The joint is one whose others miss a closed form by little, as a spherical wrist whose axes do not quite meet: the
-branches of the arm that has it are moved onto the arm; else the redundant one, at whose values the elimination answers.
+On planes, values of one joint: of one whose others miss a closed form by little, as a spherical wrist whose axes do not
+quite meet, the branches of the arm that has it, moved onto the arm; else of the redundant one, at whose values the
+elimination answers.
+
+And off the curves that pass these, with another joint held: where an arm is nearly stretched its elbow turns in a small
+circle, along which the joint of the planes hardly moves. The joint between shoulder and elbow makes whole turns there,
+or swings about where the axes on its sides are parallel or at right angles: one of two of its values has an answer of
+every such curve, if it is no smaller still.
 """
 
 from __future__ import annotations
@@ -11,16 +17,19 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, Int, numbers_within
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.redundant.curve_points import Points, onto
+from armkin.inverse.redundant.curve_points import Points, Ways, onto
 from armkin.inverse.redundant.interval_pieces import turning
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
-from armkin.inverse.solvers.redundant import Redundancy, nearly_closed
+from armkin.inverse.solvers.redundant import Redundancy, arm_without, nearly_closed
 
 PLANES = 60  # values of the joint that are answered
 BETWEEN = 12  # parts of the way between two, where answers may be that neither has
+VALUES = 0.05, 0.05 + np.pi / 2  # [rad] at which that other joint is held, beside where the others would be special
+SECANTS = 4  # steps along a cubic to where it has such a value
+ON_CURVE = 0.02  # [rad, reaches] an answer this close to a curve is on it
 
 
 class Nodes(NamedTuple):
@@ -125,3 +134,41 @@ def once(find: Follower, group: Int, q: Array) -> Bool:
     out = np.ones(len(q), bool)
     out[second[some[newton.wrapped_distance(find.arm, q[first[some]], q[second[some]]) < tol.SAME_SEED]]] = False
     return out
+
+
+def missed(find: Follower, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
+    """Answers (M, n) of targets (M,) that no curve passes: points of curves, whose targets, the points after them."""
+    guide = nearly_closed(find.arm, find.free)
+    joint = 2 if guide.joint == 0 else 4  # the shoulder is on the far side of the three joints of a spherical wrist
+    if guide is find.free or find.arm.prismatic[joint]:
+        return row[:0], points.q[:0]
+    parts = [_missed_at(find, joint, value, points, row, after) for value in VALUES]
+    whose, q = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return whose, q
+
+
+def _missed_at(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
+    """Those with the joint at a value."""
+    rest = arm_without(find.arm, ((find.arm.joint_names[joint], value),))
+    s = find.ik(rest, find.target, find.free.task.name, examine=False)
+    whose, branch = np.nonzero(s.valid)
+    q = np.insert(s.q[whose, branch], joint, value, axis=1)
+    crossing, owner = _crossings(find, joint, value, points, row, after)
+    order, count = np.argsort(owner, kind="stable"), np.bincount(owner, minlength=len(find.target))
+    place = np.arange(int(count.max(initial=0)))
+    some, k = np.nonzero(place < count[whose, None])
+    own = order[(np.cumsum(count) - count)[whose[some]] + k]
+    passed = np.zeros(len(q), bool)
+    passed[some[newton.wrapped_distance(find.arm, q[some], crossing[own]) < ON_CURVE]] = True
+    return whose[~passed], q[~passed]
+
+
+def _crossings(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Array, Int]:
+    """Postures (M, n) in which curves have the joint at a value, and of which targets they are (M,)."""
+    off, change = wrapped(points.q[:, joint] - value), wrapped(points.q[after, joint] - points.q[:, joint])
+    some = np.flatnonzero((off * (off + change) <= 0) & (change != 0))
+    ways = Ways.between(find, rows_of(points, some), rows_of(points, after[some]))
+    share = -off[some] / change[some]
+    for _ in range(SECANTS):
+        share = np.clip(share - wrapped(ways.at(find, share)[:, joint] - value) / change[some], 0.0, 1.0)
+    return ways.at(find, share), row[some]
