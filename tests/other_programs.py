@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.framing import wire
+from armkin.board.firmware.wire.framing import encode_frame
 
 OURS = (  # a second program that speaks our protocol, one that takes the board for another, noise
-    wire(protocol.hello(1, 77)),
-    wire(protocol.hello(1, 78)) + wire(protocol.set_position(2, {0: 5000})) + wire(protocol.jog(3, (100,))),
+    encode_frame(protocol.hello(1, 77)),
+    encode_frame(protocol.hello(1, 78))
+    + encode_frame(protocol.set_position(2, {0: 5000}))
+    + encode_frame(protocol.jog(3, (100,))),
     *(b"G1 X5 F500\n", b"\x00\x01\x02\x00" * 8, bytes(range(256)), b"\x00"),
 )
 GRBL = (

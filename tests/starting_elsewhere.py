@@ -174,9 +174,9 @@ def carried_out(kind: Kind, moves: dict[str, Any], place: Sequence[float]) -> Re
     machine.refresh()
     moves = {**moves, "moves": [m for m in moves["moves"] if kind.grips or "grip" not in m]}
     plan = armkin.path(arm, moves, start=machine.joints())
-    laid = path_run.parts(plan, machine.counts(), machine.lay)
+    laid = path_run.lay_parts(plan, machine.counts(), machine.lay)
     kind.pins()
-    path_run.follow(kind.board, plan, laid, lambda done, total: None)
+    path_run.follow_plan(kind.board, plan, laid, lambda done, total: None)
     return judged(plan, np.array([*kind.pins(), list(machine.counts())], dtype=float))
 
 

@@ -13,7 +13,7 @@ import pytest
 from armkin import user_folders
 from armkin.board.ports import port_lock
 
-HOLDER = "from armkin.board.ports.port_lock import holder; import sys; print(holder(sys.argv[1]))"
+HOLDER = "from armkin.board.ports.port_lock import holder_pid; import sys; print(holder_pid(sys.argv[1]))"
 
 
 def test_a_port_is_locked_for_programs_with_other_temporary_folders(tmp_path: Path) -> None:

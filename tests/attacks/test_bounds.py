@@ -94,7 +94,7 @@ def test_plans_that_were_sent_are_not_kept() -> None:
             sent.append(weakref.ref(made))
             yield made
 
-    for made in planner.noted(plans()):
+    for made in planner.sum_up(plans()):
         del made
     gc.collect()
     assert [one() for one in sent] == [None, None, None]

@@ -104,7 +104,7 @@ def main() -> None:
     options.add_argument("--idle", action="store_true", help="lead as on an idle computer, whatever the load is")
     given = options.parse_args()
     if given.idle:
-        streaming._load = lambda session: 0.0
+        streaming._processor_load = lambda session: 0.0
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     if given.runs:
         got, own = first_steps(given.runs)

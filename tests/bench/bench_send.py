@@ -22,8 +22,8 @@ from emulator import EmulatedBoard
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
-from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
-from armkin.board.firmware.wire.session import probe
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as plan_moves
+from armkin.board.firmware.wire.session import probe_line
 from armkin.board.ports import SerialPort
 from armkin.errors import LinkError
 from armkin.model import build_arm as arms
@@ -42,7 +42,7 @@ def noisy(seed: int) -> str:
         machine = FirmwareMachine(port, arm, configuration)
         machine.prepare(assume=machine.arm.home)
         board.control(f"noise flip 0.01 drop 0.01 seed {seed}")
-        probe(machine.session)
+        probe_line(machine.session)
         plans: list[Any] = []
         at, lowest = list(machine.counts()), [10**6]
         while sum(plan.segments for plan in plans) < SEGMENTS:

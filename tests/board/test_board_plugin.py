@@ -104,7 +104,9 @@ def test_a_path_from_elsewhere_lost_and_damaged_answers(tmp_path: Path) -> None:
     moves = {"start": "home", "moves": [{"joint": [10, 20, -20, 5, 5, 5]}, {"offset": {"xyz": [0, 0, 20]}}]}
     plan = armkin.path(arm, moves, start=board.machine.joints())
     assert plan.approach is not None
-    path_run.follow(board, plan, path_run.parts(plan, board.machine.counts(), board.lay), lambda done, total: None)
+    path_run.follow_plan(
+        board, plan, path_run.lay_parts(plan, board.machine.counts(), board.lay), lambda done, total: None
+    )
     off = np.array([servo.position for servo in port.servos.values()]) - armkin.pulses(arm, plan.motion.end)
     assert np.abs(off).max() <= 12
 

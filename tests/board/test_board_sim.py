@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from armkin.board.firmware.segments.straight_lines import line
+from armkin.board.firmware.segments.straight_lines import straight_line
 from armkin.board.firmware.wire import motion_frame, protocol
 from armkin.board.firmware.wire.protocol import (
     AxisImage,
@@ -42,7 +42,7 @@ def test_golden_conversations(path: Path) -> None:
             continue
         assert board is not None
         if word == ">":
-            board.receive(protocol.wire(bytes.fromhex(rest)))
+            board.receive(protocol.encode_frame(bytes.fromhex(rest)))
         elif word == "wire":
             board.receive(bytes.fromhex(rest))
         elif word == "wait":
@@ -71,9 +71,9 @@ class Host:
         self.board, self.splitter, self.tag, self.nonce = board, protocol.Splitter(), 0, 0
 
     def ask(self, payload: bytes) -> protocol.Reply:
-        self.board.receive(protocol.wire(payload))
+        self.board.receive(protocol.encode_frame(payload))
         (answer,) = self.splitter.feed(self.board.take())
-        reply = protocol.parse(answer)
+        reply = protocol.parse_reply(answer)
         assert reply is not None
         return reply
 
@@ -304,7 +304,7 @@ def test_a_lost_axis_jogs_slowly() -> None:
 
 def test_a_planned_line_runs_to_its_count() -> None:
     host = ready()
-    segments = line([0, 0, 0], [-1067, -10144, 5667], 1.2, 2.0).segments
+    segments = straight_line([0, 0, 0], [-1067, -10144, 5667], 1.2, 2.0).segments
     at, done = [0, 0, 0], 0
     while done < len(segments):
         free = host.status().free
@@ -339,7 +339,7 @@ def test_mutated_frames_move_nothing_that_was_not_sent() -> None:
         for _ in range(rng.randrange(1, 4)):
             frame[rng.randrange(len(frame))] ^= 1 << rng.randrange(8)
         host.hello()
-        host.board.receive(protocol.wire(bytes(frame)))
+        host.board.receive(protocol.encode_frame(bytes(frame)))
         list(host.splitter.feed(host.board.take()))
         host.board.advance(0.02)
         now = list(host.status().counts)

@@ -11,9 +11,9 @@ import armkin
 from armkin.board.backend.sent_positions import braking_time
 from armkin.board.firmware.segments import curve_segments
 from armkin.board.firmware.segments.counts_to_segments import cycles_of
-from armkin.board.firmware.segments.trajectory_to_counts import cut
+from armkin.board.firmware.segments.trajectory_to_counts import cut_trajectory
 from armkin.board.kinds import board_of
-from armkin.board.path_run import follow, parts
+from armkin.board.path_run import follow_plan, lay_parts
 from armkin.board.sim.segment_queue import intervals
 from armkin.formula.arrays import Array
 from armkin.motion.timing.curved_stretch import Curve
@@ -40,8 +40,8 @@ def test_a_path_at_random_arrives_at_exact_counts(seed: int) -> None:
     plan = armkin.path(arm, some_path(seed), jerk=np.deg2rad(3000) if seed % 2 else None)
     machine = board.connect(board.simulated())
     machine.prepare()
-    laid = parts(plan, machine.counts(), machine.lay)
-    follow(board, plan, laid, lambda done, total: None)
+    laid = lay_parts(plan, machine.counts(), machine.lay)
+    follow_plan(board, plan, laid, lambda done, total: None)
     assert machine.counts() == tuple(laid[-1].end.tolist())
     assert sum(one.segments for one in laid) < 100 * plan.duration + 50
 
@@ -53,7 +53,7 @@ def test_no_segment_ends_faster_than_the_board_loads_the_next_one(seed: int) -> 
     corners = [[380, -50, 300], [310, 0, 280], [380, 50, 320], [300, 90, 300]]
     zigzag = {"start": {"point": [300, -90, 300]}, "blend": 8, "moves": [{"line": p} for p in corners]}
     plan = armkin.path(arm, some_path(seed) if seed else zigzag)
-    laid = cut(plan.motion, armkin.pulses(arm, plan.motion.start), min_interval=448)
+    laid = cut_trajectory(plan.motion, armkin.pulses(arm, plan.motion.start), min_interval=448)
     for stretch, move in zip(plan.motion.stretches, laid.moves(), strict=True):
         if isinstance(stretch, Curve):
             assert min(min(intervals(s)) for s in move.segments) >= 1.1 * 448
@@ -78,7 +78,7 @@ def test_a_board_that_is_sent_positions_slows_down_gently_on_curves() -> None:
 def test_segments_follow_the_plan_in_time_and_place() -> None:
     arm = armkin.load("three_dof")
     plan = armkin.path(arm, {"moves": [{"point": [350, 0, 300]}, {"circle": {"centre": [300, 0, 300], "turns": 2}}]})
-    laid = cut(plan.motion, armkin.pulses(arm, plan.motion.start), min_interval=576)
+    laid = cut_trajectory(plan.motion, armkin.pulses(arm, plan.motion.start), min_interval=576)
     *_, move = laid.moves()
     stretch = plan.motion.stretches[-1]
     assert sum(cycles_of(s) for s in move.segments) / laid.clock == pytest.approx(stretch.duration, rel=1e-4)

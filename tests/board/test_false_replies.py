@@ -14,7 +14,7 @@ import pytest
 from armkin.board.firmware import gripping, homing, jogging
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
-from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as plan_moves
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Info, Status
 from armkin.board.firmware.wire.reply_checks import BoardSaysError, ReplacedError
@@ -47,12 +47,12 @@ class LyingPort(SimPort):
         return b"".join(self._changed(payload) for payload in self._splitter.feed(data))
 
     def _changed(self, payload: bytes) -> bytes:
-        reply = protocol.parse(payload)
+        reply = protocol.parse_reply(payload)
         assert reply is not None
         if self.lying:
             reply = replace(reply, **{k: v for k, v in self._lies.items() if hasattr(reply, k)})  # type: ignore[arg-type]
         pack = {Info: protocol.pack_info, Status: protocol.pack_status}.get(type(reply), protocol.pack_ack)
-        return protocol.wire(pack(reply))  # type: ignore[operator]
+        return protocol.encode_frame(pack(reply))  # type: ignore[operator]
 
 
 INFO_LIES: list[dict[str, int]] = [
@@ -117,9 +117,9 @@ COMMANDS: dict[str, Callable[[FirmwareMachine], object]] = {
     "curve": lambda one: one.run(
         [one.lay(round_waypoints(one.arm, one.joints(), CORNERS, 10.0), np.array(one.counts()))]
     ),
-    "grip": lambda one: gripping.grip(one, gripping.gripper_of("arm", one.configuration), 1500),
-    "home": lambda one: homing.home(one),
-    "jog": lambda one: jogging.jog(one, jogging.rates(one, 0, 10.0), 0.3),
+    "grip": lambda one: gripping.move_gripper(one, gripping.gripper_of("arm", one.configuration), 1500),
+    "home": lambda one: homing.home_joints(one),
+    "jog": lambda one: jogging.jog_axes(one, jogging.count_rates(one, 0, 10.0), 0.3),
 }
 
 
@@ -139,10 +139,10 @@ def test_lies_to_a_moving_command_end_it_in_bounded_time(switched: Arm, command:
     believed = []
     for lie in LIES if LONG else LIES[:: 5 if command == "send" else 8]:
         configuration = configure(switched)
-        port = LyingPort(homing.switches(switched, configuration), **lie)
+        port = LyingPort(homing.switch_levels(switched, configuration), **lie)
         one = FirmwareMachine(port, switched, configuration)
         one.prepare(assume=switched.home)
-        gripping.prepare(one, gripping.gripper_of("arm", configuration), 833)
+        gripping.prepare_gripper(one, gripping.gripper_of("arm", configuration), 833)
         port.lying = True
         begin = port.now()
         try:
@@ -158,7 +158,7 @@ def test_a_sender_whose_session_was_replaced_ends(three_dof: Arm) -> None:
     port = SimPort(SimBoard(BOARDS["uno_cnc_shield"]))
     one = FirmwareMachine(port, three_dof, configure(three_dof))
     one.prepare()
-    port.board.receive(protocol.wire(protocol.hello(0, 0x12345678)))  # another program
+    port.board.receive(protocol.encode_frame(protocol.hello(0, 0x12345678)))  # another program
     port.board.take()
     with pytest.raises(ReplacedError, match="another program has taken over"):
         one.run([plan_moves(three_dof, one.counts(), np.deg2rad([30, 60, -60]))])

@@ -80,8 +80,8 @@ def test_packets_are_those_of_the_makers_library() -> None:
     maker.syncWriteTxOnly(line, 42, 2, [1, 10, 0, 2, 20, 0], 6)
     maker.syncReadTx(line, 56, 2, [1, 2, 3], 3)
     assert [bytes(data) for data in sent] == [
-        packet.write(5, 42, b"\x34\x12"),
-        packet.read(5, 56, 8),
+        packet.write_registers(5, 42, b"\x34\x12"),
+        packet.read_registers(5, 56, 8),
         packet.sync_write(42, {1: b"\x0a\x00", 2: b"\x14\x00"}),
         packet.sync_read([1, 2, 3], 56, 2),
     ]

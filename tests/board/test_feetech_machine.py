@@ -89,7 +89,7 @@ def test_a_stop_slows_down_on_the_line() -> None:
 def test_a_blocked_servo_holds_the_arm() -> None:
     port = bus()
     one = machine(port)
-    port.servos[2].write = lambda address, data: None  # type: ignore[method-assign]
+    port.servos[2].write = lambda address, values: None  # type: ignore[method-assign]
     with pytest.raises(LinkError, match=r"servo 2 \(j2\) is \d+ counts behind: blocked or overloaded"):
         one.run([one.plan(one.counts(), np.deg2rad([0, 120, 0]))])
     assert abs(port.servos[2].position - HOME[1]) < 1

@@ -118,12 +118,12 @@ def test_a_cable_that_is_pulled_is_told() -> None:
 def test_settings_are_compared_and_only_what_is_wrong_is_serious() -> None:
     board = Grbl(axes=4)
     session = opened(board)
-    found = dict(pair for line in session.ask("$$") if (pair := replies.setting(line)))
+    found = dict(pair for line in session.ask("$$") if (pair := replies.parse_setting(line)))
     odd = {difference.number: difference.serious for difference in settings.differences(AXES, found)}
     assert odd == {1: False, 3: True, 100: True, 102: True, 110: False, 112: False, 120: False, 122: False}
     for number, (_, value) in settings.expected_settings(AXES).items():
         session.ask(f"${number}={value:g}")
-    found = dict(pair for line in session.ask("$$") if (pair := replies.setting(line)))
+    found = dict(pair for line in session.ask("$$") if (pair := replies.parse_setting(line)))
     assert settings.differences(AXES, found) == []
     assert found[101] == 250  # another axis is left alone
     too_fast = settings.differences(AXES, found | {110: 9000.0})
@@ -137,15 +137,15 @@ NO_NUMBERS = ["nan", "inf", "-inf", "1e400", "1_0", "9" * 400, "\u0663", "", " 1
 
 @pytest.mark.parametrize("text", [*DAMAGED, *(f"<Idle|MPos:0.000,{text},0.000>" for text in NO_NUMBERS)])
 def test_damaged_reports_are_no_reports(text: str) -> None:
-    found = replies.report(text)
+    found = replies.parse_report(text)
     assert found is None or found.position is None
 
 
 @pytest.mark.parametrize("text", NO_NUMBERS)
 def test_what_grbl_never_prints_is_no_number(text: str) -> None:
-    assert replies.setting(f"$100={text}") is None
-    assert replies.offset(f"[G92:0.000,{text},0.000]") is None
-    assert replies.spindle(f"[GC:G0 M3 S{text}]") is None
+    assert replies.parse_setting(f"$100={text}") is None
+    assert replies.parse_offset(f"[G92:0.000,{text},0.000]") is None
+    assert replies.parse_spindle(f"[GC:G0 M3 S{text}]") is None
 
 
 def test_any_bytes_end_in_an_answer_or_an_error() -> None:

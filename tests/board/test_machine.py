@@ -15,7 +15,7 @@ from armkin.board.backend import StoppedError
 from armkin.board.firmware import homing
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
-from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as plan_moves
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.firmware.wire.session import ReplacedError
 from armkin.board.sim.sim_board import SimBoard
@@ -228,7 +228,7 @@ def test_coupled_joints_home_one_after_another(wrist: Arm) -> None:
     board = SimBoard(configuration.board, switch)
     one = FirmwareMachine(NoisyPort(board, 0.0, 1), wrist, configuration)
     names: list[str] = []
-    homing.home(one, announce=names.append)
+    homing.home_joints(one, announce=names.append)
     assert names == ["J1", "J2", "J3"]
     assert one.position() == "known"
     true = joints(wrist, pulses(wrist, start) + np.array([board.net[axis] for axis in axes]))

@@ -106,9 +106,9 @@ def built(name: str, field: dict[str, str]) -> bytes:
 )
 def test_golden_frames(name: str, fields: dict[str, str], payload: bytes, wire: bytes) -> None:
     assert built(name, fields) == payload
-    assert protocol.wire(payload) == wire
+    assert protocol.encode_frame(payload) == wire
     assert list(protocol.Splitter().feed(wire)) == [payload]
-    reply = protocol.parse(payload)
+    reply = protocol.parse_reply(payload)
     if payload[0] >= 0x80:
         assert reply is not None
         assert PACK[type(reply)](reply) == payload
@@ -123,7 +123,7 @@ def test_the_golden_file_has_every_frame() -> None:
 
 def test_credit_is_an_ack_that_reports_no_gap() -> None:
     ack = bytes.fromhex("830600 00011c3901adde".replace(" ", ""))
-    credit = protocol.parse(ack)
+    credit = protocol.parse_reply(ack)
     assert credit == protocol.Credit(6, 0, 0, 1, 28, 313, 0xDEAD)
     assert isinstance(credit, protocol.Credit)
     assert protocol.pack_ack(credit) == ack
@@ -152,7 +152,7 @@ def test_cobs_decode_takes_nothing_that_encode_does_not_make(data: bytes) -> Non
 
 @given(st.lists(st.binary(min_size=2, max_size=246), max_size=5), st.data())
 def test_a_stream_in_pieces_gives_its_payloads(payloads: list[bytes], data: st.DataObject) -> None:
-    stream = b"\0".join([b"", *(protocol.wire(p) for p in payloads)])
+    stream = b"\0".join([b"", *(protocol.encode_frame(p) for p in payloads)])
     splitter = protocol.Splitter()
     found: list[bytes] = []
     while stream:
@@ -174,7 +174,7 @@ def test_random_bytes_are_never_a_frame() -> None:
 def test_a_damaged_stream_yields_only_what_was_sent() -> None:
     rng = random.Random(5)
     sent = [payload for _, _, payload, _ in golden_frames()] * 500
-    stream = b"".join(protocol.wire(p) for p in sent)
+    stream = b"".join(protocol.encode_frame(p) for p in sent)
     damaged = bytearray()
     for byte in stream:
         if rng.random() < 0.01:
@@ -187,7 +187,7 @@ def test_a_damaged_stream_yields_only_what_was_sent() -> None:
 
 
 def test_a_long_frame_is_skipped_to_its_end() -> None:
-    good = protocol.wire(protocol.hold(1))
+    good = protocol.encode_frame(protocol.hold(1))
     splitter = protocol.Splitter(largest=20)
     assert list(splitter.feed(b"\x01" * 30)) == []
     assert list(splitter.feed(b"\x01" * 30 + b"\0" + good)) == [protocol.hold(1)]
@@ -196,7 +196,7 @@ def test_a_long_frame_is_skipped_to_its_end() -> None:
 
 def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(ValueError, match="247 bytes"):
-        protocol.wire(bytes(247))
+        protocol.encode_frame(bytes(247))
     with pytest.raises(ValueError, match="255 bytes"):
         protocol.cobs_encode(bytes(255))
 
@@ -241,7 +241,7 @@ def test_golden_image() -> None:
     "payload", [b"\x80\0", b"\x81" + bytes(33), b"\x82" + bytes(18), b"\x83" + bytes(10), b"\x00\x00"]
 )
 def test_replies_of_the_wrong_shape_are_none(payload: bytes) -> None:
-    assert protocol.parse(payload) is None
+    assert protocol.parse_reply(payload) is None
 
 
 def test_the_version_of_another_protocol_can_be_read() -> None:

@@ -13,7 +13,7 @@ import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
 from armkin.board.firmware.segments.remaining_plan import places_on, remaining_trajectory
-from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
+from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut_trajectory, plan_moves
 from armkin.board.firmware.wire.protocol import HALF, STEP
 from armkin.board.ports import note_path
 from armkin.board.sim.sim_board import SimBoard
@@ -234,7 +234,7 @@ def _moves(way: Cut) -> list[int]:
 def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, ...]) -> None:
     """ACCEL was answered within the last two steps: whole steps are another direction there than the line's."""
     one = armkin.load(ROOT / THREE_DOF)
-    whole = plan(one, [0, 0, 0], np.deg2rad(goal), min_interval=448)
+    whole = plan_moves(one, [0, 0, 0], np.deg2rad(goal), min_interval=448)
     at, stands = np.array(whole.start) * STEP + HALF, list[list[int]]()
     for s in next(whole.moves()).segments:
         stands += ((at + np.arange(1, s.ticks + 1)[:, None] * np.array(s.rates)) // STEP).tolist()
@@ -242,7 +242,7 @@ def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, .
     last = list(dict.fromkeys(map(tuple, stands)))[-14:-1]
     for counts in map(np.array, last):
         place = next(places_on([whole], counts))
-        left = cut(remaining_trajectory(whole, place, joints(one, counts)), counts, min_interval=448)
+        left = cut_trajectory(remaining_trajectory(whole, place, joints(one, counts)), counts, min_interval=448)
         assert _moves(left) == whole.end.tolist(), counts
 
 
@@ -252,7 +252,7 @@ def test_a_way_of_less_than_a_step_is_taken() -> None:
     here = joints(one, [128, -1193, 1333])
     for steps in ([0.55, -0.55, 0], [0, 0, 0.7], [-0.6, 0, 0.6], [1.51, -0.55, 2.6]):
         goal = here + joints(one, steps) - one.home
-        way = cut(Trajectory(one, here, (straight_move(one, here, goal),)), [128, -1193, 1333], min_interval=448)
+        way = cut_trajectory(Trajectory(one, here, (straight_move(one, here, goal),)), [128, -1193, 1333], min_interval=448)
         assert _moves(way) == way.end.tolist() != way.start.tolist()
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from armkin.board.ports import SerialPort, holder, port_lock, serial_port
+from armkin.board.ports import SerialPort, holder_pid, port_lock, serial_port
 from command_line import THREE_DOF, run
 
 
@@ -94,10 +94,10 @@ def test_a_holder_is_known_by_its_birth_too(tmp_path: Path) -> None:
     name = str(tmp_path / "ttyX")
     lock = port_lock.Lock(name)
     try:
-        assert holder(name) == os.getpid()
-        note = Path(port_lock._path(name, "pid"))
+        assert holder_pid(name) == os.getpid()
+        note = Path(port_lock._lock_path(name, "pid"))
         note.write_text(f"{os.getpid()} 12345")  # an earlier process of this number
-        assert holder(name) is None
+        assert holder_pid(name) is None
     finally:
         lock.release()
 
@@ -141,15 +141,15 @@ def test_without_signals_a_file_asks_the_holder_to_stop(monkeypatch: pytest.Monk
     """On Windows a signal of another process would end the sender before it stops the arm."""
     name = str(tmp_path / "COM3")
     monkeypatch.setattr(port_lock, "_signals", False)
-    Path(port_lock._path(name, "stop")).touch()  # of an earlier holder: it stops nobody
+    Path(port_lock._lock_path(name, "stop")).touch()  # of an earlier holder: it stops nobody
     with subprocess.Popen([sys.executable, "-c", HOLDER, name], stdout=subprocess.PIPE, text=True) as sender:
         assert sender.stdout is not None
         assert sender.stdout.readline() == "holds\n"
         time.sleep(4 * port_lock._POLL_S)
         assert sender.poll() is None
-        assert holder(name) == sender.pid
+        assert holder_pid(name) == sender.pid
         port_lock.ask_to_stop(name, sender.pid)
         assert sender.stdout.readline() == "brakes\n"
         assert sender.wait(30) == 0
-    assert holder(name) is None
-    assert not Path(port_lock._path(name, "stop")).exists()
+    assert holder_pid(name) is None
+    assert not Path(port_lock._lock_path(name, "stop")).exists()

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from armkin.board.firmware.segments import counts_to_segments, straight_lines
-from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as plan_moves
 from armkin.board.firmware.wire.protocol import BLOCK, HALF, STEP, Segment
 from armkin.model import build_arm as arms
 
@@ -64,7 +64,7 @@ def test_no_tick_is_faster_than_102_percent_however_short_the_ramp() -> None:
             continue
         tried += 1
         end = [n, int(n * rng.uniform(-1, 1)), int(n * rng.uniform(-1, 1))]
-        move = straight_lines.line([0, 0, 0], end, rate / n, accel / n, min_interval=MIN_INTERVAL)
+        move = straight_lines.straight_line([0, 0, 0], end, rate / n, accel / n, min_interval=MIN_INTERVAL)
         peak = min(rate, np.sqrt(accel * n))
         for s in move.segments:
             fastest = max(map(abs, s.rates)) / STEP * CLOCK / min(s.interval, s.last_interval)

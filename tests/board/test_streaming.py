@@ -115,7 +115,7 @@ def test_two_stalls_lose_none_of_several_moves(again: int) -> None:
 @pytest.mark.parametrize(("load", "sessions"), [(0.0, 1), (1.5, 0)])
 def test_a_stall_where_the_arm_turns_back(monkeypatch: pytest.MonkeyPatch, load: float, sessions: int) -> None:
     """A beginning behind a rest is begun anew, too; a busy computer fills the queue first, for it may stall there."""
-    monkeypatch.setattr(streaming, "_load", lambda session: load)
+    monkeypatch.setattr(streaming, "_processor_load", lambda session: load)
     out = ARM.home + np.deg2rad([5, -5, 5])
     for frame in (11, 12, 13):  # the first two behind the rest, on a quiet computer
         port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, 0.1)
@@ -149,8 +149,8 @@ def test_after_a_second_somebody_may_be_near_the_arm() -> None:
 def test_a_grip_goes_on_behind_a_stall(frame: int) -> None:
     port, grip = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, 0.1), gripping.gripper_of(ARM.name, configure(ARM))
     machine = machine_on(port)
-    gripping.prepare(machine, grip, None)
-    assert gripping.grip(machine, grip, grip.closed) == grip.closed
+    gripping.prepare_gripper(machine, grip, None)
+    assert gripping.move_gripper(machine, grip, grip.closed) == grip.closed
     assert sum(payload_of(data)[1] == 0 for data in port.sent) == 1  # a new session
 
 
@@ -161,9 +161,9 @@ def test_a_grip_is_held_after_a_second_and_behind_its_beginning(
     monkeypatch.setattr(carry_out_plans, "_BEGINNING", beginning)
     grip = gripping.gripper_of(ARM.name, configure(ARM))
     machine = machine_on(Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, seconds))
-    gripping.prepare(machine, grip, None)
+    gripping.prepare_gripper(machine, grip, None)
     with pytest.raises(HeldError, match="keep its queue filled"):
-        gripping.grip(machine, grip, grip.closed)
+        gripping.move_gripper(machine, grip, grip.closed)
     assert machine.status.counts[grip.axis] not in {grip.open, grip.closed}
 
 
@@ -182,22 +182,22 @@ def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.Mon
     frames = [(0.01, 2, 70), (0.01, 3, 90), (0.02, 6, 140), (0.04, 6, 140), (0.08, 6, 140)]
     for slowest in (0.0005, 0.002, 0.016, 0.2):
         session.line.slowest = slowest
-        found.append(streaming.lead(session, frames))
+        found.append(streaming.lead_time(session, frames))
     assert found == sorted(found)
     assert found[-1] - found[-2] > 0.3  # two answers are waited for
     session.line.slowest = 1.0
-    assert streaming.lead(session, frames) == 0.6
-    assert streaming.lead(session, frames, 0.7) == 0.7
+    assert streaming.lead_time(session, frames) == 0.6
+    assert streaming.lead_time(session, frames, 0.7) == 0.7
     session.port.simulated, session.line.slowest = False, 0.0
     cores = os.cpu_count() or 1
     for mean, now, seconds in ((1.5, 0, 0.25), (0.7, 0, 0.1), (0.09, 0, 0.0015), (0.0, 0.5, 0.1), (0.1, 1.5, 0.25)):
         monkeypatch.setattr("os.getloadavg", lambda mean=mean: (mean * cores, 0.0, 0.0))
         monkeypatch.setattr(streaming, "_others_running", lambda now=now: now * cores)
-        assert streaming.lead(session, []) == seconds
+        assert streaming.lead_time(session, []) == seconds
     session.line.resent = 1
-    assert streaming.lead(session, []) == 0.25
-    monkeypatch.setattr(streaming, "_load", lambda session: 0.0)
-    assert streaming.lead(session, []) == 0.05
+    assert streaming.lead_time(session, []) == 0.25
+    monkeypatch.setattr(streaming, "_processor_load", lambda session: 0.0)
+    assert streaming.lead_time(session, []) == 0.05
 
 
 @pytest.mark.parametrize("bad", [0, 1])

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from armkin.board.firmware.segments import counts_to_segments, straight_lines
 from armkin.board.firmware.segments.straight_lines import Pieces
-from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
-from armkin.board.firmware.streaming import later
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as plan_moves
+from armkin.board.firmware.streaming import delay_segment
 from armkin.board.firmware.wire.protocol import BLOCK, HALF, STEP, AxisImage, Image, Segment
 from armkin.board.sim.frame_fields import RefusedError
 from armkin.board.sim.rate_checks import Velocity, times_valid
@@ -40,7 +40,7 @@ def test_a_bend_counts_in_the_last_interval_as_often_as_the_device_adds_it_up(qu
     for ticks in (*range(1, 70), 255, 256, 1024):
         segment = Segment(ticks, 1000, 0, (0,), bend, quick)
         last = intervals(segment)[-1] - segment.interval
-        assert counts_to_segments._bends(ticks, quick) == round(65536 * last)
+        assert counts_to_segments._bend_count(ticks, quick) == round(65536 * last)
 
 
 def unheard(cut: list[Segment]) -> float:
@@ -149,8 +149,8 @@ def refused(end: list[int], rate: float, accel: float, pause: float = 0.0) -> st
     images = [AxisImage(True, False, -n, n, 0, v, a) for v, a in zip(*bounds, strict=True)]
     velocity = Velocity(BOARDS["uno_cnc_shield"]._replace(min_interval=448), Image(tuple(images)))
     try:
-        cut = list(straight_lines.line([0] * len(end), end, rate / n, accel / n, min_interval=448).segments)
-        cut[0] = later(cut[0], pause, 16_000_000) or cut[0]
+        cut = list(straight_lines.straight_line([0] * len(end), end, rate / n, accel / n, min_interval=448).segments)
+        cut[0] = delay_segment(cut[0], pause, 16_000_000) or cut[0]
         for s in cut:
             if not times_valid(s, 448):
                 return f"INTERVAL {s}"

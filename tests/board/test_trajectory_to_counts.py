@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from armkin.board.firmware.segments import counts_to_segments, straight_lines
-from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as plan_moves
 from armkin.board.firmware.wire.protocol import AxisImage, Image, Segment
 from armkin.board.sim.rate_checks import Velocity, times_valid
 from armkin.board_catalogue import BOARDS
@@ -84,7 +84,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     n = max(abs(b - a) for a, b in zip(start, end, strict=True))
     rate = data.draw(st.floats(500, CLOCK / MIN_INTERVAL))  # of the leader, counts/s
     accel = min(400_000, rate / data.draw(RAMPS))
-    move = straight_lines.line(start, end, rate / max(n, 1), accel / max(n, 1))
+    move = straight_lines.straight_line(start, end, rate / max(n, 1), accel / max(n, 1))
 
     # No step lost or added; every segment is one that the device takes.
     for s in move.segments:
@@ -144,7 +144,7 @@ def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, acce
     A place that is e off at an end of a stretch of h seconds makes e / h of its mean speed: much behind a long cruise,
     where a ramp's first piece of 1.5 ms makes up for it.
     """
-    cut = list(straight_lines.line([0], [n], rate / n, accel / n).segments)
+    cut = list(straight_lines.straight_line([0], [n], rate / n, accel / n).segments)
     h = np.array([counts_to_segments.cycles_of(s) / CLOCK for s in cut])
     mean = np.array([s.ticks * s.rates[0] / 2**23 for s in cut]) / h
     e = np.zeros(len(cut) + 1)
@@ -163,7 +163,7 @@ def test_a_short_ramp_pays_for_no_long_cruise(n: int, rate: float, ramp: float) 
     The cutter lets a segment's ends have 102 % of the rate; its intervals lie between those of its ends, but for the
     whole cycles of each tick and of their sum so far: two of at least MIN_INTERVAL.
     """
-    move = straight_lines.line([0], [n], rate / n, min(400_000, rate / ramp) / n)
+    move = straight_lines.straight_line([0], [n], rate / n, min(400_000, rate / ramp) / n)
     gaps = np.diff(np.array(tick_times(move.segments)), prepend=0)
     per_tick = np.repeat([abs(s.rates[0]) / 2**23 for s in move.segments], [s.ticks for s in move.segments])
     assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.02 * MIN_INTERVAL / (MIN_INTERVAL - 2)
@@ -190,7 +190,7 @@ def test_the_board_takes_every_line(n: int, of: tuple[float, float], rate: float
     rates, accels = ([math.ceil(most * abs(x) / n) for x in end] for most in (rate * 1.05, accel))
     axes = [AxisImage(True, False, -n, n, 0, max(1, v), max(1, a)) for v, a in zip(rates, accels, strict=True)]
     velocity = Velocity(BOARDS["uno_cnc_shield"]._replace(min_interval=MIN_INTERVAL), Image(tuple(axes)))
-    for s in straight_lines.line([0, 0, 0], end, rate / n, accel / n).segments:
+    for s in straight_lines.straight_line([0, 0, 0], end, rate / n, accel / n).segments:
         velocity.begin(s)
         for axis, made_of in enumerate(s.rates):
             velocity.check(axis, made_of)
@@ -204,7 +204,7 @@ def test_the_board_takes_every_line(n: int, of: tuple[float, float], rate: float
 def test_a_queue_of_30_segments_always_reaches_to_a_stop(n: int, rate: float, accel: float) -> None:
     """PROTOCOL.md, section 7: DRY when the queued time falls to u + u / 32 + 2 ms."""
     # once: a long line makes them anew each time
-    cut = list(straight_lines.line([0], [n], rate / n, accel / n).segments)
+    cut = list(straight_lines.straight_line([0], [n], rate / n, accel / n).segments)
     length = [counts_to_segments.cycles_of(s) / CLOCK for s in cut]
     for i, s in enumerate(cut[:-30]):
         u = abs(s.rates[0]) / 2**23 * CLOCK / min(s.interval, s.last_interval) / accel
@@ -300,7 +300,7 @@ def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> N
         np.array([0, 5]), np.array([90_001, -700]), law, CLOCK, MIN_INTERVAL, straight_lines.Pieces.FINE
     )
     once = list(whole)
-    assert len(once) == len(whole) == straight_lines.count(law, 90_001) > 40
+    assert len(once) == len(whole) == straight_lines.segment_count(law, 90_001) > 40
     monkeypatch.setattr(straight_lines, "_AT_ONCE", 3)
     assert list(whole) == once
 

@@ -7,7 +7,7 @@ import pytest
 
 import armkin
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.homing import switches
+from armkin.board.firmware.homing import switch_levels
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board_catalogue import BOARDS
 from command_line import ROOT, THREE_DOF, run
@@ -41,7 +41,7 @@ def arm_with_switches(folder: Path, *, four: bool, normally: str = "closed", upp
 def behind_a_port(path: str, monkeypatch: pytest.MonkeyPatch) -> SimBoard:
     """A board whose switches are where the robot file says."""
     arm = armkin.load(path)
-    board = SimBoard(BOARDS["uno_cnc_shield"], switches(arm, configure(arm)))
+    board = SimBoard(BOARDS["uno_cnc_shield"], switch_levels(arm, configure(arm)))
     plug_in(board, monkeypatch)
     return board
 

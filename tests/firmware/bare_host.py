@@ -104,14 +104,14 @@ class BareHost:
         for payload in self._splitter.feed(out):
             if payload[0] == CREDIT:
                 payload = bytes([protocol.Type.ACK]) + payload[1:]
-            if (reply := protocol.parse(payload)) is not None:
+            if (reply := protocol.parse_reply(payload)) is not None:
                 replies.append(reply)
         return replies
 
     def ask(self, payload: bytes, kind: type[R], tries: int = 1) -> R:
         """The answer to one frame; sent again if there is none within 20 ms."""
         for _ in range(tries):
-            data = protocol.wire(payload)
+            data = protocol.encode_frame(payload)
             replies = self.run(10 * len(data) / self.baud + 0.02, data)
             answers = [r for r in replies if isinstance(r, kind)]
             if answers:
@@ -183,7 +183,7 @@ class BareHost:
             pause = poll if asked or not waiting else self.credit_poll
             if self.time - last_poll >= pause:
                 asked = True
-                out += protocol.wire(protocol.status_query(1))
+                out += protocol.encode_frame(protocol.status_query(1))
                 last_poll = self.time
             if sent > done and self.time - last_progress > resend:
                 self.resent += sent - done
@@ -198,7 +198,7 @@ class BareHost:
                 and under_way + len(work[sent].segments) <= free
                 and (sent == done or size(sent) <= room)
             ):
-                out += protocol.wire(work[sent].payload((first + sent) % 256))
+                out += protocol.encode_frame(work[sent].payload((first + sent) % 256))
                 under_way += len(work[sent].segments)
                 if sent == done:
                     last_progress = self.time

@@ -16,8 +16,8 @@ from emulator import EmulatedBoard, Trace
 import armkin
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.segments.counts_to_segments import CLOCK
-from armkin.board.firmware.segments.straight_lines import line
-from armkin.board.firmware.segments.trajectory_to_counts import cut
+from armkin.board.firmware.segments.straight_lines import straight_line
+from armkin.board.firmware.segments.trajectory_to_counts import cut_trajectory
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import HALF, STEP, Segment, State
 from armkin.formula.arrays import Array
@@ -64,7 +64,9 @@ def lay(moves: dict[str, Any], size: int = 4) -> Laid:
     assert isinstance(curve, Curve)
     start = armkin.pulses(arm, curve.start)
     board = configure(arm).board
-    laid = cut(Trajectory(arm, curve.start, (curve,)), start, clock=board.clock, min_interval=board.min_interval)
+    laid = cut_trajectory(
+        Trajectory(arm, curve.start, (curve,)), start, clock=board.clock, min_interval=board.min_interval
+    )
     [move] = laid.moves()
     segments = list(move.segments)
     work = batches((0, 1, 2), start.tolist(), segments, size, brake=move.brake)
@@ -176,7 +178,7 @@ def held(laid: Laid, share: float, *, cable: bool = False) -> Held:
         _until(host, laid.work, moment)
         begin = board.control("cycles")["cycle"]
         if not cable:
-            host.run(0.0, protocol.wire(protocol.hold(0)))
+            host.run(0.0, protocol.encode_frame(protocol.hold(0)))
         host.run(1.6)
         status = host.rest()
         trace = board.trace()
@@ -210,10 +212,10 @@ def _until(host: BareHost, work: Sequence[Batch], moment: float) -> None:
         out = b""
         under_way = sum(len(b.segments) for b in work[done:sent])
         if sent < len(work) and sent == done and under_way + len(work[sent].segments) <= free:
-            out = protocol.wire(work[sent].payload((first + sent) % 256))
+            out = protocol.encode_frame(work[sent].payload((first + sent) % 256))
             sent += 1
         elif host.time > asked + 0.01:
-            out, asked = protocol.wire(protocol.status_query(1)), host.time
+            out, asked = protocol.encode_frame(protocol.status_query(1)), host.time
         for reply in host.run(0.5e-3, out):
             if isinstance(reply, protocol.Info):
                 continue
@@ -227,7 +229,7 @@ def _until(host: BareHost, work: Sequence[Batch], moment: float) -> None:
 
 def _straight(start: list[int], end: list[int]) -> list[Batch]:
     """A straight joint move between counts."""
-    move = line(start, end, 1.0, 2.0)
+    move = straight_line(start, end, 1.0, 2.0)
     return batches((0, 1, 2), start, list(move.segments), 4)
 
 

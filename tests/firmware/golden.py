@@ -34,7 +34,7 @@ class Talk:
             word, _, rest = line.partition("#")[0].strip().partition(" ")
             where = f"{self.name}:{number}"
             if word == ">":
-                run(0.1, protocol.wire(bytes.fromhex(rest)), until=b"\0")
+                run(0.1, protocol.encode_frame(bytes.fromhex(rest)), until=b"\0")
             elif word == "wire":
                 run(0.03, bytes.fromhex(rest))
             elif word == "<":

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import armkin
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.segments.trajectory_to_counts import plan
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Segment, whole_steps
 from armkin.motion.timing.profile import Profile
@@ -179,7 +179,7 @@ def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold
         host.status()
         begin = emulated.control("cycles")["cycle"]
         if cause == "hold":
-            host.run(0, protocol.wire(protocol.hold(0)))
+            host.run(0, protocol.encode_frame(protocol.hold(0)))
             begin += 10 * 8 * 64
         elif cause == "abort":
             emulated.control("pin A0 0")
@@ -331,7 +331,7 @@ def smoothness(speed: float) -> list[Smooth]:
     """The published move of three axes, at a share of the joints' speeds: from the edges on the pins."""
     arm = armkin.load("three_dof")
     configuration = configure(arm)
-    cut = plan(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]), speed=speed, min_interval=448)
+    cut = plan_moves(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]), speed=speed, min_interval=448)
     move = next(cut.moves())
     work = [protocol.Segment(80, 20_000, 0, (0, 0, 0)), *move.segments]  # a pause in front, while the queue fills
     with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as emulated:

@@ -146,5 +146,5 @@ def first_step_ms(by: Literal["uart", "usb"]) -> float:
         payload = Batch(SIX, (0,) * 6, work, at_rest=True).payload(0)
         host.order(payload)
         step = int(board.trace().rises("X.STEP")[0])
-        line = 10 * len(protocol.wire(payload)) / 250_000 if by == "uart" else 0.0
+        line = 10 * len(protocol.encode_frame(payload)) / 250_000 if by == "uart" else 0.0
         return (step - before) / board.clock_hz * 1e3 - line * 1e3

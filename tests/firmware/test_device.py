@@ -157,13 +157,13 @@ def test_every_question_of_many_at_once_is_answered_or_told_lost(board: Emulated
     host = BareHost(board)
     if opened:
         host.hello(7)
-    replies = host.run(0.2, protocol.wire(protocol.status_query(1)) * 30)
+    replies = host.run(0.2, protocol.encode_frame(protocol.status_query(1)) * 30)
     answers = [r for r in replies if isinstance(r, protocol.Status)]
     told = [r for r in replies if isinstance(r, protocol.Ack)]
     assert len(answers) == 30 or told
     assert all((t.error, t.detail) == ((0, Error.SPILL) if opened else (Error.NO_SESSION, 0)) for t in told)
     # as many as the credit in bytes lets a host ask at once are answered
-    replies = host.run(0.2, b"\0" + protocol.wire(protocol.status_query(2)) * 18)
+    replies = host.run(0.2, b"\0" + protocol.encode_frame(protocol.status_query(2)) * 18)
     assert [r.tag for r in replies if isinstance(r, protocol.Status)].count(2) == 18
 
 

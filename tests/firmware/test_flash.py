@@ -63,14 +63,14 @@ def _installed(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def without_avrdude(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armkin.flash.avrdude.program", lambda: None)
+    monkeypatch.setattr("armkin.flash.avrdude.find_avrdude", lambda: None)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("uploader", ["armkin", "avrdude"])
 def test_an_empty_board_runs_armkin(kind: str, uploader: str, empty: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     if uploader == "armkin":
-        monkeypatch.setattr("armkin.flash.avrdude.program", lambda: None)
+        monkeypatch.setattr("armkin.flash.avrdude.find_avrdude", lambda: None)
     with empty(kind) as board:
         done = run("flash", "--board", kind, "--port", board.port, "--json")
         assert done.code == 0, done.err

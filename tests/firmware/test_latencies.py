@@ -21,7 +21,7 @@ ARM = armkin.load("three_dof")
 @pytest.mark.parametrize("one_way_ms", [0.0, 0.5, 1.0, 4.0, 16.0])
 @pytest.mark.parametrize("load", [0.0, 3.0], ids=["quiet", "busy"])
 def test_short_moves_lose_no_byte(monkeypatch: pytest.MonkeyPatch, load: float, one_way_ms: float) -> None:
-    monkeypatch.setattr(streaming, "_load", lambda session: load)
+    monkeypatch.setattr(streaming, "_processor_load", lambda session: load)
     spilled = 0
     with EmulatedBoard(speed="step", reset_on_open=False) as board:
         port = SteppedPort(board, one_way_ms / 1e3)
@@ -50,7 +50,7 @@ def test_short_moves_lose_no_byte(monkeypatch: pytest.MonkeyPatch, load: float, 
 
 def test_the_first_step_comes_within_10_ms_of_the_first_byte(monkeypatch: pytest.MonkeyPatch) -> None:
     """The law has it 8.4 ms after rest; until then no motor tells how it got there, and the board lets it be sooner."""
-    monkeypatch.setattr(streaming, "_load", lambda session: 0.0)
+    monkeypatch.setattr(streaming, "_processor_load", lambda session: 0.0)
     with EmulatedBoard(speed="step", reset_on_open=False, trace=True) as board:
         port = SteppedPort(board, 0.0005)
         port.wait(0.02)

@@ -28,9 +28,9 @@ WAY = [[100, 60, -90], [-100, 10, -20]]  # deg; 5.7 s
 def seconds(who: str, *line: str) -> float:
     """How long the way takes, what is done to the line included; the counts are checked, and the pins."""
     with EmulatedBoard(speed="step", reset_on_open=False) as board, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(streaming, "_load", lambda _: LOADS[who])
+        patch.setattr(streaming, "_processor_load", lambda _: LOADS[who])
         patch.setattr(
-            session, "_nonce", count(0x12340001).__next__
+            session, "_new_nonce", count(0x12340001).__next__
         )  # at random, the line would damage other bytes each time
         port = SteppedPort(board, 0.0005)
         port.wait(0.02)

@@ -12,7 +12,7 @@ from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
-from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as plan_moves
 from armkin.board.firmware.wire.protocol import Flag
 from armkin.board.ports import SerialPort
 from armkin.model import build_arm as arms

@@ -19,7 +19,7 @@ from pins import at_rest, net, on_the_line
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
-from armkin.board.firmware.segments.trajectory_to_counts import plan as plan_moves
+from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as plan_moves
 from armkin.board.ports import SerialPort
 from armkin.errors import HeldError
 from armkin.model import build_arm as arms

@@ -55,7 +55,7 @@ def test_what_board_it_is_has_to_be_plain(words: tuple[str, ...], message: str) 
 
 def test_records_of_intel_hex_lie_where_they_say() -> None:
     two = ":04001000DEADBEEFB4\n:020000021000EC\n:020002001234B6\n:00000001FF\n"
-    flash = intel_hex.read(two)
+    flash = intel_hex.parse_intel_hex(two)
     assert flash[0x10:0x14].hex() == "deadbeef"
     assert flash[0x10002:].hex() == "1234"
     assert set(flash[:0x10]) == {255}
@@ -64,7 +64,7 @@ def test_records_of_intel_hex_lie_where_they_say() -> None:
 @pytest.mark.parametrize("text", ["", ":", "0400", ":04001000DEADBEEFB5\n:00000001FF", ":04001000DEADBEEFB4", "hello"])
 def test_what_is_no_intel_hex_is_refused(text: str) -> None:
     with pytest.raises(ValueError):
-        intel_hex.read(text)
+        intel_hex.parse_intel_hex(text)
 
 
 @pytest.fixture
@@ -106,9 +106,9 @@ def test_bytes_are_counted_from_when_the_boot_loader_is_found(monkeypatch: pytes
         def leave(self) -> None: ...
 
     counted: list[tuple[int, int]] = []
-    monkeypatch.setattr(upload_firmware, "_loader", lambda chip, kind, port: (Loader(), io.BytesIO(), 115_200))
+    monkeypatch.setattr(upload_firmware, "_connect_loader", lambda chip, kind, port: (Loader(), io.BytesIO(), 115_200))
     monkeypatch.setattr(upload_firmware, "_answered_version", lambda kind, port: "3.0")
-    monkeypatch.setattr(avrdude, "program", lambda: None)
+    monkeypatch.setattr(avrdude, "find_avrdude", lambda: None)
     data = b":04001000DEADBEEFB4\n:00000001FF\n"
     upload(Image("uno_servos", Path("uno_servos.hex"), data), "port", lambda done, total: counted.append((done, total)))
     assert counted == [(done, 40) for done in range(0, 41, 4)]
@@ -121,9 +121,9 @@ def test_another_folder_is_no_boot_drive(tmp_path: Path) -> None:
 
 
 def test_a_boot_drive_that_does_not_come_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armkin.flash.boot_drive.mounted", lambda: iter(()))
+    monkeypatch.setattr("armkin.flash.boot_drive.mounted_drives", lambda: iter(()))
     with pytest.raises(LinkError, match="no drive RPI-RP2 appeared"):
-        boot_drive.appearing(seconds=0.2)
+        boot_drive.wait_for_drive(seconds=0.2)
 
 
 def test_an_installed_image_is_what_its_checksum_says(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_a_boot_loader_that_was_called_twice_and_is_silent_is_called_anew(
 
     monkeypatch.setattr(stk500v1, "_ANSWER", 0.01)
     port = Late(b"")
-    heard = upload_firmware._heard(Stk500v1, cast(SerialPort, port))
+    heard = upload_firmware._identify_chip(Stk500v1, cast(SerialPort, port))
     assert (heard is not None, port.resets) == (found, min(silent + 1, 3))
     assert heard is None or heard[1].hex() == "1e950f"
 
@@ -188,9 +188,9 @@ def test_avrdude_tells_how_far_it_is(tmp_path: Path) -> None:
         f'#!/bin/sh\nfor bar in Reading Writing Reading; do echo "$bar | {bar} |" >&2; sleep 0.05; done\n'
     )
     program.chmod(0o755)
-    avrdude.write(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex", told.append)
+    avrdude.write_image(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex", told.append)
     assert told == sorted(told)
     assert (told[0], told[-1]) == (0.0, 1.0)
     program.write_text(f'#!/bin/sh\necho "Reading | {bar} |\navrdude: error: no such port" >&2; exit 1\n')
     with pytest.raises(LinkError, match=r"^avrdude: error: no such port$"):
-        avrdude.write(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex")
+        avrdude.write_image(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex")

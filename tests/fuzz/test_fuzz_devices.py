@@ -121,7 +121,7 @@ def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest
     # The same in every run: no notes of other runs, no random session numbers, no leads for a busy computer.
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(session, "secrets", Numbers(rng))
-    monkeypatch.setattr(streaming, "_load", lambda session: 0.0)
+    monkeypatch.setattr(streaming, "_processor_load", lambda session: 0.0)
     codes = list[int]()
     moved = 0
     while len(codes) < rounds or (not moved and len(codes) < 10 * rounds):

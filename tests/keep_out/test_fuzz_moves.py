@@ -80,7 +80,7 @@ def _robot(kind: str) -> str:
 
 
 def _pressed(arm: armkin.Arm) -> Callable[[int, Sequence[int]], bool]:
-    """Levels of the switches of the arm on X, Y and Z: as `homing.switches`, for one motor a joint, and quick."""
+    """Levels of the switches of the arm on X, Y and Z: as `homing.switch_levels`, for one motor a joint, and quick."""
     turns = [(float(arm.home[k]), 1 / float(arm.motor_gain[k, k]), np.deg2rad(SWITCHES[k])) for k in range(3)]
 
     def level(number: int, net: Sequence[int]) -> bool:

@@ -63,7 +63,7 @@ def test_a_jog_ends_so_early_that_it_stands_at_the_hit(table: str, monkeypatch: 
     machine: Any = SimpleNamespace(
         arm=arm, position=lambda: "known", joints=lambda: arm.home, configuration=SimpleNamespace(axes=axes)
     )
-    rates = jogging.rates(machine, 0, 30.0)  # deg/s
+    rates = jogging.count_rates(machine, 0, 30.0)  # deg/s
     rate = float((np.linalg.pinv(arm.motor_gain) @ np.array([rates[axis] for axis in axes]))[0])
     seconds = jogging.free_seconds(machine, 0, rates) + jogging.HANDLE
     assert seconds * rate + rate**2 / (2 * float(arm.max_accel[0])) == pytest.approx(way[0])
@@ -84,7 +84,7 @@ def test_a_jog_of_coupled_motors_is_looked_at_as_whole_counts_make_it(
     machine: Any = SimpleNamespace(
         arm=arm, position=lambda: "known", joints=lambda: arm.home, configuration=configuration
     )
-    rates = jogging.rates(machine, 4, 0.4)  # deg/s of J5
+    rates = jogging.count_rates(machine, 4, 0.4)  # deg/s of J5
     assert jogging.free_seconds(machine, 4, rates) == np.inf
     assert goals[0] @ arm.motor_gain.T == pytest.approx([60 * rates[k] for k in range(7)], abs=1e-6)
 

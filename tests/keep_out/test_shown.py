@@ -10,7 +10,7 @@ import pytest
 
 import armkin
 from armkin.keep_out.body_pairs import guard, postures
-from armkin.teach.pose_answers import Question, look
+from armkin.teach.pose_answers import Question, answer_question
 from command_line import run
 
 BENCHES = sorted(path.stem for path in Path("examples/scenes").glob("*.yaml"))
@@ -52,7 +52,7 @@ def test_the_workspace_tells_the_free_share() -> None:
 
 def test_the_page_is_told_of_hits() -> None:
     arm = armkin.load("three_dof", scene="examples/scenes/three_dof.yaml")
-    told = look(arm, Question(q=np.deg2rad([0.0, 0.0, -45.0])))
+    told = answer_question(arm, Question(q=np.deg2rad([0.0, 0.0, -45.0])))
     assert told["outside"][0].startswith("it hits table by 47.5 mm (q3)")
     assert any(branch["hits"] for branch in told["branches"])
-    assert look(arm, Question(q=arm.home))["outside"] == []
+    assert answer_question(arm, Question(q=arm.home))["outside"] == []

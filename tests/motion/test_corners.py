@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.board.firmware.segments.trajectory_to_counts import cut
+from armkin.board.firmware.segments.trajectory_to_counts import cut_trajectory
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan_joint_moves
@@ -67,10 +67,14 @@ def test_what_makes_no_sense_is_refused(three_dof: Arm) -> None:
 
 def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = wander(three_dof, 60, 20.0)
-    whole = cut(round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
+    whole = cut_trajectory(
+        round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
+    )
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 50)
     monkeypatch.setattr("armkin.board.firmware.segments.curve_segments._SAMPLES", 700)
-    parts = cut(round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0]))
+    parts = cut_trajectory(
+        round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
+    )
     assert parts.duration == pytest.approx(whole.duration, rel=1e-12)
     [[one], [other]] = ([*map(list, (move.segments for move in laid.moves()))] for laid in (whole, parts))
     assert len(one) == len(other) > 500

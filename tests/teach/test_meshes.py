@@ -17,9 +17,9 @@ from armkin.model.build_arm import build
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import text
 from armkin.robot_file.urdf_document import document
-from armkin.teach.mesh_files import triangles
-from armkin.teach.one_file import html
-from armkin.teach.urdf_meshes import MOST, meshes
+from armkin.teach.mesh_files import read_triangles
+from armkin.teach.one_file import arm_html
+from armkin.teach.urdf_meshes import MOST, meshes_json
 from command_line import run
 
 CORNERS = np.array([[[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0]], [[0, 0, 0], [0, 0.2, 0], [0, 0, 0.3]]])
@@ -92,7 +92,7 @@ def corners(drawn: dict[str, Any], body: int) -> np.ndarray:
 def test_a_mesh_stands_where_the_urdf_has_it(tmp_path: Path, base: list[float] | None) -> None:
     file = written(tmp_path)
     arm = loaded(file, base)
-    drawn = meshes(arm, str(file))
+    drawn = meshes_json(arm, str(file))
     poses = {"base": np.eye(4)}
     _, robot = document(file.read_bytes(), "arm")
     for name, joint in (("l1", "q1"), ("l2", "q2"), ("l3", "q3")):  # at joint values 0
@@ -112,10 +112,10 @@ def test_a_mesh_stands_where_the_urdf_has_it(tmp_path: Path, base: list[float] |
 def test_three_kinds_of_files_hold_the_same_triangles(tmp_path: Path) -> None:
     written(tmp_path)
     folder = tmp_path / "arm" / "meshes"
-    assert np.abs(triangles(folder / "link.stl") - CORNERS).max() < 1e-7
-    assert np.abs(triangles(folder / "plain.STL") - CORNERS).max() < 1e-7
+    assert np.abs(read_triangles(folder / "link.stl") - CORNERS).max() < 1e-7
+    assert np.abs(read_triangles(folder / "plain.STL") - CORNERS).max() < 1e-7
     turned = CORNERS @ np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]) + [0.01, 0, 0]  # by its node
-    assert np.abs(triangles(folder / "link.dae") - turned).max() < 1e-7
+    assert np.abs(read_triangles(folder / "link.dae") - turned).max() < 1e-7
 
 
 def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
@@ -124,9 +124,9 @@ def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
     many = rng.uniform(-0.2, 0.2, (20_000, 1, 3)) + rng.uniform(-0.005, 0.005, (20_000, 3, 3))
     (tmp_path / "arm" / "meshes" / "link.stl").write_bytes(binary(many))
     arm = loaded(file)
-    drawn = meshes(arm, str(file))
+    drawn = meshes_json(arm, str(file))
     assert 0.2 * MOST < sum(len(corners(drawn, k)) for k in range(4)) <= MOST
-    assert len(html(arm, meshes=drawn)) < 1.5e6
+    assert len(arm_html(arm, meshes=drawn)) < 1.5e6
 
 
 @pytest.mark.parametrize(
@@ -152,13 +152,13 @@ def test_what_is_no_mesh_is_refused(tmp_path: Path, mesh: str, raw: bytes | None
     if raw is not None:
         (tmp_path / "arm" / "urdf" / mesh).resolve().write_bytes(raw)
     with pytest.raises(UsageError, match=said):
-        meshes(arm, str(file))
+        meshes_json(arm, str(file))
 
 
 def test_the_urdf_of_another_arm_is_refused(tmp_path: Path) -> None:
     file = written(tmp_path)
     with pytest.raises(UsageError, match="at joint values 0 the axis of its joint q2 is not that of q2"):
-        meshes(armkin.load("three_dof"), str(file))
+        meshes_json(armkin.load("three_dof"), str(file))
     out = run("export", "three_dof", "--js", "--meshes", file)
     assert out.code == 2
     assert "--meshes goes with --html alone" in out.err

@@ -20,7 +20,7 @@ import armkin
 from armkin import path_file
 from armkin.errors import UsageError
 from armkin.motion.path import path
-from armkin.teach.one_file import html
+from armkin.teach.one_file import arm_html
 
 POSTURE = "#q=20,-70,80,10,20,30"
 
@@ -43,7 +43,7 @@ def drawn(drawing_browser: Browser, tmp_path: Path) -> Iterator[Page]:
 def written(folder: Path, name: str, plan: Any = None) -> str:
     """The address of an arm's file."""
     file = folder / "arm.html"
-    file.write_text(html(armkin.load(name), plan=plan), encoding="utf-8")
+    file.write_text(arm_html(armkin.load(name), plan=plan), encoding="utf-8")
     return file.as_uri()
 
 
@@ -59,7 +59,7 @@ def at_posture(page: Page) -> Page:
 def test_a_file_can_be_mailed(name: str) -> None:
     arm = armkin.load(name)
     began = time.process_time()
-    text = html(arm)
+    text = arm_html(arm)
     assert time.process_time() - began < 2.0
     assert len(text.encode()) <= 1.5e6
     assert len(gzip.compress(text.encode())) <= 450e3
@@ -186,7 +186,7 @@ def test_hostile_words_are_shown_and_run_nothing(browser: Browser, tmp_path: Pat
         for field, value in (("name", some[6]), ("path", f"/tmp/{some[7]}.yaml"), ("joint_names", some[:6])):
             object.__setattr__(arm, field, value)  # what no robot file may say
         file = tmp_path / "arm.html"
-        file.write_text(html(arm), encoding="utf-8")
+        file.write_text(arm_html(arm), encoding="utf-8")
         with opened(browser, file.as_uri()) as page:
             assert page.locator("#robot").inner_text() == some[6]
             for fragment in (
@@ -260,4 +260,4 @@ def test_the_redundant_joint_turns_within_its_interval_while_the_tip_stays(brows
 
 def test_an_arm_without_a_module_has_no_page() -> None:
     with pytest.raises(UsageError):
-        html(armkin.load("pan_tilt"))
+        arm_html(armkin.load("pan_tilt"))

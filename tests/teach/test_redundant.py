@@ -11,7 +11,7 @@ import numpy as np
 
 import armkin
 from armkin.model import units
-from armkin.teach.arm_description import scene
+from armkin.teach.arm_description import scene_json
 from armkin.teach.server import STATIC
 
 _ASK = """
@@ -30,7 +30,7 @@ def test_the_interval_is_that_of_the_family(tmp_path: Path) -> None:
     assert node, "node runs the module; scripts/test installs it"
     shutil.copy(STATIC / "js" / "redundant.js", tmp_path / "redundant.mjs")
     (tmp_path / "ask.mjs").write_text(_ASK)
-    asked = [scene(arm), units.joints_out(arm, np.concatenate([q, outside[None]])).tolist()]
+    asked = [scene_json(arm), units.joints_out(arm, np.concatenate([q, outside[None]])).tolist()]
     (tmp_path / "asked.json").write_text(json.dumps(asked))
     said = subprocess.run([node, "ask.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300)
     *found, none = json.loads(said.stdout)

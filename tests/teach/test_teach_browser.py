@@ -18,7 +18,7 @@ from served import served
 
 import armkin
 from armkin.model import units
-from armkin.teach.arm_description import scene
+from armkin.teach.arm_description import scene_json
 from armkin.teach.server import Server
 from command_line import ROOT, run
 
@@ -300,7 +300,7 @@ def test_branches_outside_limits_are_paler_and_mix_nowhere(browser: Browser, ser
     context = browser.new_context(bypass_csp=True)
     page = context.new_page()
     page.goto(server.address)
-    red, blue = page.evaluate(_PALE, scene(armkin.load("three_dof")))
+    red, blue = page.evaluate(_PALE, scene_json(armkin.load("three_dof")))
     assert red[0] > 1.3 * red[1]
     assert blue[2] > 1.3 * blue[0]
     assert min(red[:3] + blue[:3]) > 0.4  # of light, as the paper has 0.9; their own least is 0.02
@@ -320,12 +320,12 @@ def test_the_page_draws_the_arm_where_it_is(browser: Browser, server: Server) ->
         q = rng.uniform(-2, 2, arm.n) * np.where(arm.prismatic, 100.0, 1.0)
         tool = page.evaluate(
             "async ([arm, q]) => (await import('/js/chain.js')).frames(arm, q).tool",
-            [scene(arm), units.joints_out(arm, q).tolist()],
+            [scene_json(arm), units.joints_out(arm, q).tolist()],
         )
         assert np.reshape(tool, (4, 4)) == pytest.approx(armkin.fk(arm, q), abs=1e-8), arm.name
         if arm.prismatic[0] or abs(arm.link[0][2, 2]) < 0.99:
             continue
-        corners = page.evaluate(_FIRST_DRUM, [scene(arm), units.joints_out(arm, q).tolist()])
+        corners = page.evaluate(_FIRST_DRUM, [scene_json(arm), units.joints_out(arm, q).tolist()])
         assert min(corners) > min(arm.base[2, 3], 0) - 1e-6 * arm.reach, arm.name  # it stands on the floor
     context.close()
 

@@ -11,8 +11,8 @@ import pytest
 
 import armkin
 from armkin.model import units
-from armkin.teach.arm_description import first_lock, scene
-from armkin.teach.pose_answers import Question, look
+from armkin.teach.arm_description import first_lock, scene_json
+from armkin.teach.pose_answers import Question, answer_question
 from armkin.teach.quick_ik import QuickIk
 from command_line import ROOT, run
 
@@ -25,15 +25,15 @@ def arm(name: str) -> armkin.Arm:
 
 def asked(name: str, q: Sequence[float], **more: Any) -> dict[str, Any]:
     one = arm(name)
-    return look(one, Question(units.joints_in(one, q), **more))
+    return answer_question(one, Question(units.joints_in(one, q), **more))
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_robot_has_a_scene_and_a_first_picture(robot: str) -> None:
     one = arm(robot)
     held = first_lock(one)
-    drawn = scene(one)
-    answer = look(one, Question(one.home, held=() if held is None else (held,)))
+    drawn = scene_json(one)
+    answer = answer_question(one, Question(one.home, held=() if held is None else (held,)))
     json.dumps([drawn, answer], allow_nan=False)
     assert len(drawn["bodies"]) == one.n + 1
     assert answer["q"] == pytest.approx(units.home_out(one), abs=1e-9)
@@ -105,7 +105,7 @@ def test_seven_joints_need_one_that_is_held() -> None:
     held = asked("panda", home, held=("J3",))
     assert len(held["branches"]) == 8
     assert all(branch["joints"][2] == pytest.approx(home[2]) for branch in held["branches"])
-    assert scene(arm("panda"))["lock"] == "J7"  # the redundant one, as info names it
+    assert scene_json(arm("panda"))["lock"] == "J7"  # the redundant one, as info names it
     assert len(asked("panda", home, held=("J7",))["branches"]) == 8
 
 
@@ -126,24 +126,24 @@ def test_an_elimination_is_answered_by_machine_code_as_soon_as_that_is_built(rob
     one = arm(robot)
     pose = units.home_out(one) + np.linspace(9, 3, one.n)
     question = Question(units.joints_in(one, pose), held=held)
-    slow, quick = look(one, question), QuickIk()
-    look(one, question, quick)
+    slow, quick = answer_question(one, question), QuickIk()
+    answer_question(one, question, quick)
     assert quick.ready.wait(120)
     assert quick.built
-    here = look(one, Question(question.q, slow["target"], held), quick)
+    here = answer_question(one, Question(question.q, slow["target"], held), quick)
     assert [b["name"] for b in here["branches"]] == [b["name"] for b in slow["branches"]]
     for mine, other in zip(here["branches"], slow["branches"], strict=True):
         assert mine["joints"] == pytest.approx(other["joints"], abs=1e-6)
     # another arm, as with another joint held, is none that was built
-    other = look(one, Question(question.q, held=(one.joint_names[3],)), quick)
-    assert other == look(one, Question(question.q, held=(one.joint_names[3],)))
+    other = answer_question(one, Question(question.q, held=(one.joint_names[3],)), quick)
+    assert other == answer_question(one, Question(question.q, held=(one.joint_names[3],)))
 
 
 def test_without_a_compiler_an_elimination_is_answered_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
     one, quick = arm("xarm6"), QuickIk()
     monkeypatch.setenv("CC", "/nowhere/cc")
     question = Question(units.joints_in(one, [10.0, 20, -30, 40, 50, 60]))
-    assert look(one, question, quick) == look(one, question)
+    assert answer_question(one, question, quick) == answer_question(one, question)
     assert quick.ready.wait(120)
     assert not quick.built
-    assert look(one, question, quick) == look(one, question)
+    assert answer_question(one, question, quick) == answer_question(one, question)

@@ -13,7 +13,7 @@ from served import Page, served
 import armkin
 from armkin import path_file
 from armkin.errors import ArmkinError
-from armkin.teach.plan_samples import playback
+from armkin.teach.plan_samples import playback_json
 from armkin.teach.recorded_program import Program
 from command_line import ROOT, run
 
@@ -63,7 +63,7 @@ def test_the_file_gives_the_plan_of_the_page(program: Program, arm: armkin.Arm, 
     assert np.array_equal(page.q(t), alone.q(t))
     said = run("path", "robots/three_dof.yaml", file, "--json").json
     assert said["duration_s"] == page.duration
-    shown = playback(arm, page)
+    shown = playback_json(arm, page)
     assert shown["duration_s"] == alone.duration
     assert np.max(shown["shares"]) <= 1 + 1e-9
     assert np.allclose(np.deg2rad(shown["joints"]), alone.q(shown["time"]), atol=1e-3)
@@ -203,7 +203,7 @@ def test_what_is_played_is_where_the_tip_is_however_long_it_takes(arm: armkin.Ar
     one.load(one.text() + ring, "long.yaml")
     plan = one.plan(None)
     assert plan.duration > 600
-    shown = playback(arm, plan)
+    shown = playback_json(arm, plan)
     t = np.sort(np.random.default_rng(3).uniform(0, plan.duration, 4000))
     time, joints = np.array(shown["time"]), np.array(shown["joints"])
     seen = np.stack([np.interp(t, time, joints[:, i]) for i in range(arm.n)], axis=-1)

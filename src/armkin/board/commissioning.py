@@ -67,7 +67,7 @@ def directions(board: Board, person: Operator) -> set[int]:
         board.machine.refresh()
         place = float(board.machine.joints()[j])
         while True:
-            _nudge(board, person, j, place)
+            _nudge_joint(board, person, j, place)
             answer = person.ask(f"{name}: did + move it so? y yes, n the other way, a again, s skip", "ynas")
             if answer != "a":
                 break
@@ -104,7 +104,7 @@ def zeros(board: Board, person: Operator, *, forget: bool = False) -> dict[int, 
             )
         return {}
     person.say(f"Zeros: bring each joint to its home pose ({home}), by eye or to its mark, then press Enter.")
-    pad(board, person)
+    jog_by_keys(board, person)
     machine.prepare(assume=arm.home)
     return {}
 
@@ -113,7 +113,7 @@ def limits(board: Board, person: Operator) -> dict[int, tuple[float, float]]:
     """Narrower limits for joints that cannot go as far as the robot file says."""
     person.say("Limits: go where a joint may not go farther, then [ makes that its lower limit, ] its upper one.")
     person.say("The file's limits stop it, too. Enter when there is nothing more to correct.")
-    return pad(board, person, narrower=True)
+    return jog_by_keys(board, person, narrower=True)
 
 
 def first_move(board: Board, person: Operator) -> bool:
@@ -121,8 +121,8 @@ def first_move(board: Board, person: Operator) -> bool:
     arm, machine = board.arm, board.machine
     machine.prepare()
     up, down = arm.upper - arm.home, arm.home - arm.lower
-    out = np.minimum(units.joints_in(arm, [_FIRST] * arm.n), 0.5 * np.maximum(up, down))
-    goals = np.array([arm.home + np.where(up >= down, out, -out), arm.home])
+    excursion = np.minimum(units.joints_in(arm, [_FIRST] * arm.n), 0.5 * np.maximum(up, down))
+    goals = np.array([arm.home + np.where(up >= down, excursion, -excursion), arm.home])
     try:
         made = board.plan(machine.counts(), goals, SHARE)
     except NoSolutionError as error:
@@ -135,13 +135,13 @@ def first_move(board: Board, person: Operator) -> bool:
     return person.ask("Check: does it stand in its home pose again, to the mark? y yes, n no", "yn") == "y"
 
 
-def pad(board: Board, person: Operator, *, narrower: bool = False) -> dict[int, tuple[float, float]]:
+def jog_by_keys(board: Board, person: Operator, *, narrower: bool = False) -> dict[int, tuple[float, float]]:
     """Joints by keys: a number chooses one, + and - move it while they are held, Enter ends.
 
     narrower: [ and ] make where a joint stands its lower or upper limit; these are returned.
     """
     arm, chosen = board.arm, 0
-    found: dict[int, tuple[float, float]] = {}
+    limits_set: dict[int, tuple[float, float]] = {}
     names = ", ".join(f"{_KEYS[j]} {name}" for j, name in enumerate(arm.joint_names))
     person.say(f"Joints: {names}; hold + or - to move the chosen one.")
     person.say(f"{arm.joint_names[chosen]} is chosen.")
@@ -150,23 +150,25 @@ def pad(board: Board, person: Operator, *, narrower: bool = False) -> dict[int, 
             chosen = _KEYS.index(key)
             person.say(f"{arm.joint_names[chosen]} is chosen.")
         elif key in "+-" and (more := person.held(key)) is not None:
-            _jog(board, person, chosen, 1 if key == "+" else -1, _LONGEST, more)
+            _jog_joint(board, person, chosen, 1 if key == "+" else -1, _LONGEST, more)
             person.say(_position_in_words(board))
         elif narrower and key in "[]":
-            _narrow(board, person, found, chosen, upper=key == "]")
-    return found
+            _narrow_limit(board, person, limits_set, chosen, upper=key == "]")
+    return limits_set
 
 
 _KEYS = "123456789abc"  # of up to twelve joints
 
 
-def _narrow(board: Board, person: Operator, limits: dict[int, tuple[float, float]], j: int, *, upper: bool) -> None:
+def _narrow_limit(
+    board: Board, person: Operator, limits: dict[int, tuple[float, float]], j: int, *, upper: bool
+) -> None:
     """Make where joint j stands its limit, rounded inwards to a tenth."""
     arm, name = board.arm, board.arm.joint_names[j]
     rows = np.stack([arm.lower, arm.upper, arm.home, board.machine.joints()])
-    low, high, home, here = (round(value, 9) for value in units.joints_out(arm, rows)[:, j].tolist())
+    low, high, home, standing = (round(value, 9) for value in units.joints_out(arm, rows)[:, j].tolist())
     low, high = limits.get(j, (low, high))
-    value = round(float(np.floor(here * 10 + 1e-6) if upper else np.ceil(here * 10 - 1e-6)) / 10, 1) + 0.0
+    value = round(float(np.floor(standing * 10 + 1e-6) if upper else np.ceil(standing * 10 - 1e-6)) / 10, 1) + 0.0
     pair = (low, value) if upper else (value, high)
     if not np.isfinite(pair).all():
         person.say(f"{name} has no limits in the file: write both there, limits: [LOWER, UPPER], then begin again.")
@@ -198,7 +200,7 @@ def _until_enter(person: Operator, text: str) -> None:
         pass
 
 
-def _nudge(board: Board, person: Operator, j: int, place: float) -> None:
+def _nudge_joint(board: Board, person: Operator, j: int, place: float) -> None:
     """Move joint j by keys within STEP of its place [rad | mm], to which each way back leads first; Enter ends."""
     arm, machine = board.arm, board.machine
     step = float(units.joints_in(arm, [STEP] * arm.n)[j])
@@ -209,12 +211,12 @@ def _nudge(board: Board, person: Operator, j: int, place: float) -> None:
         away = sign * (float(machine.joints()[j]) - place)
         seconds = (step - away if away > -0.1 * step else -away) / (SHARE * float(arm.max_speed[j]))
         if seconds > 0.01:
-            _jog(board, person, j, sign, seconds, more)
+            _jog_joint(board, person, j, sign, seconds, more)
         else:
             person.say(f"{arm.joint_names[j]} has moved by {STEP:g}: {'-+'[sign < 0]} takes it back, Enter goes on.")
 
 
-def _jog(board: Board, person: Operator, j: int, sign: int, seconds: float, goes_on: Callable[[], bool]) -> None:
+def _jog_joint(board: Board, person: Operator, j: int, sign: int, seconds: float, goes_on: Callable[[], bool]) -> None:
     """Jog a joint at a tenth of its speed; what stops it is told."""
     rate = sign * SHARE * float(board.arm.max_speed[j])
     try:
@@ -241,15 +243,15 @@ def _expected_motion(arm: Arm, q: Array, j: int) -> str:
     J = jacobian(arm, q)[:, j] * float(units.joints_in(arm, [STEP] * arm.n)[j])
     shift = J[:3]
     if float(np.linalg.norm(shift)) >= _VISIBLE:
-        return f"the tool goes {float(np.linalg.norm(shift)):.1f} mm, mostly towards {_towards(shift)}"
+        return f"the tool goes {float(np.linalg.norm(shift)):.1f} mm, mostly towards {_main_direction(shift)}"
     axis = fk(arm, q)[:3, :3].T @ J[3:]
-    about = _towards(J[3:])
-    seen = " (the tool's own z)" if abs(axis[2]) > 0.99 * float(np.linalg.norm(axis)) else ""
+    about = _main_direction(J[3:])
+    remark = " (the tool's own z)" if abs(axis[2]) > 0.99 * float(np.linalg.norm(axis)) else ""
     turn = "counter-clockwise" if about[0] == "+" else "clockwise"
-    return f"the tool turns {turn} about {about[1]}{seen}, seen with {about[1]} pointing at you"
+    return f"the tool turns {turn} about {about[1]}{remark}, seen with {about[1]} pointing at you"
 
 
-def _towards(vector: Array) -> str:
+def _main_direction(vector: Array) -> str:
     k = int(np.argmax(np.abs(vector)))
     return f"{'+' if vector[k] > 0 else '-'}{'xyz'[k]}"
 

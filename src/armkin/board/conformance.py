@@ -61,12 +61,12 @@ class Line:
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
-        self._whole()
+        self._check_cable()
         self._port.write(data)
 
     def read(self, timeout: float) -> bytes:
         """What has come, or comes within `timeout` seconds."""
-        self._whole()
+        self._check_cable()
         return self.spoil(self._port.read(timeout))
 
     def now(self) -> float:
@@ -76,7 +76,7 @@ class Line:
     def close(self) -> None:
         """The emulator stays."""
 
-    def _whole(self) -> None:
+    def _check_cable(self) -> None:
         if self.cut:
             raise LinkError(f"port {self.name} is gone")
 
@@ -85,29 +85,29 @@ Start = Callable[[], Emulated]
 
 
 @contextmanager
-def _started(start: Start) -> Iterator[Emulated]:
-    one = start()
+def _start_emulator(start: Start) -> Iterator[Emulated]:
+    emulated = start()
     try:
-        yield one
+        yield emulated
     finally:
-        for path in (note_path(one.line.name), record_path(one.line.name)):
+        for path in (note_path(emulated.line.name), record_path(emulated.line.name)):
             with suppress(OSError):
                 os.unlink(path)
 
 
-def _pins(emulated: Emulated) -> list[int]:
+def _pin_counts(emulated: Emulated) -> list[int]:
     return [round(value) for value in emulated.pins()]
 
 
-def _connected(emulated: Emulated, stop: Callable[[], bool] = lambda: False) -> Backend:
+def _connect_and_settle(emulated: Emulated, stop: Callable[[], bool] = lambda: False) -> Backend:
     """The arm, whose place is known: from the board, or on the word of somebody who looks."""
     machine = emulated.board.connect(emulated.line, stop)
     lost = machine.position() == "lost"
-    machine.prepare(assume=joints(machine.arm, _pins(emulated)) if lost else None)
+    machine.prepare(assume=joints(machine.arm, _pin_counts(emulated)) if lost else None)
     return machine
 
 
-def _near(emulated: Emulated, counts: Sequence[int]) -> bool:
+def _is_near(emulated: Emulated, counts: Sequence[int]) -> bool:
     return bool(np.abs(np.array(counts) - emulated.pins()).max() <= emulated.tolerance)
 
 
@@ -119,39 +119,41 @@ def _check_truth(emulated: Emulated) -> str:
         machine = emulated.board.connect(emulated.line)
     except LinkError as error:
         return str(error)
-    known = machine.position() != "lost"
-    assert not known or _near(emulated, machine.counts()), (
-        f"a false position: {machine.counts()}, pins at {_pins(emulated)}"
+    is_known = machine.position() != "lost"
+    assert not is_known or _is_near(emulated, machine.counts()), (
+        f"a false position: {machine.counts()}, pins at {_pin_counts(emulated)}"
     )
-    return "known" if known else "lost"
+    return "known" if is_known else "lost"
 
 
 def _wait_for_rest(emulated: Emulated) -> None:
     """Wait until nothing moves any more."""
     end, before = emulated.line.now() + PATIENCE, list[int]()
-    while before != (now := _pins(emulated)) and emulated.line.now() < end:
-        before = now
+    while before != (counts := _pin_counts(emulated)) and emulated.line.now() < end:
+        before = counts
         until = emulated.line.now() + 1.0
         while emulated.line.now() < until:
             emulated.port.read(0.05)
 
 
-def _carried_out(emulated: Emulated, machine: Backend, goal: Array, speed: float = 1.0) -> bool:
+def _carry_out_motion(emulated: Emulated, machine: Backend, goal: Array, speed: float = 1.0) -> bool:
     """Run a motion; False if it was refused or broke off in words. What is said to be done must be done."""
     began = emulated.line.now()
     plan = machine.plan(machine.counts(), goal, speed=speed)
     try:
         machine.run([plan])
     except (ArmkinError, StoppedError):
-        done = False
+        succeeded = False
     else:
-        done = True
-        assert _near(emulated, plan.end.tolist()), f"said to be done: {plan.end.tolist()}, pins at {_pins(emulated)}"
+        succeeded = True
+        assert _is_near(emulated, plan.end.tolist()), (
+            f"said to be done: {plan.end.tolist()}, pins at {_pin_counts(emulated)}"
+        )
     assert emulated.line.now() - began < plan.duration + PATIENCE, "a hang"
-    return done
+    return succeeded
 
 
-def _goals(emulated: Emulated, seed: int, size: float = 0.15) -> Iterator[Array]:
+def _random_goals(emulated: Emulated, seed: int, size: float = 0.15) -> Iterator[Array]:
     rng, arm = np.random.default_rng(seed), emulated.board.arm
     span = np.where(np.isfinite(arm.upper - arm.lower), arm.upper - arm.lower, 1.0)
     while True:
@@ -160,11 +162,11 @@ def _goals(emulated: Emulated, seed: int, size: float = 0.15) -> Iterator[Array]
 
 def moves_are_read_back_exactly(start: Start, times: int = 200) -> None:
     """Where the board says that it stands is where its motors stand, after each of many moves."""
-    with _started(start) as one:
-        machine = _connected(one)
-        for goal in itertools.islice(_goals(one, 3), times):
-            assert _carried_out(one, machine, goal)
-            assert _near(one, machine.counts())
+    with _start_emulator(start) as emulated:
+        machine = _connect_and_settle(emulated)
+        for goal in itertools.islice(_random_goals(emulated, 3), times):
+            assert _carry_out_motion(emulated, machine, goal)
+            assert _is_near(emulated, machine.counts())
 
 
 def answers_that_are_lost_doubled_or_damaged_make_nothing_false(start: Start, times: int = 36) -> None:
@@ -180,18 +182,18 @@ def answers_that_are_lost_doubled_or_damaged_make_nothing_false(start: Start, ti
             changed = data[:k] + bytes([data[k] ^ 1 << rng.randrange(8)]) + data[k + 1 :]
             return {"lost": b"", "doubled": data + data, "damaged": changed}[kind]
 
-        with _started(start) as one:
-            _connected(one)
-            for goal in itertools.islice(_goals(one, 5), len(range(number, times, len(ways)))):
+        with _start_emulator(start) as emulated:
+            _connect_and_settle(emulated)
+            for goal in itertools.islice(_random_goals(emulated, 5), len(range(number, times, len(ways)))):
                 with suppress(ArmkinError):
-                    one.line.spoil = spoil
-                    machine = one.board.connect(one.line)
+                    emulated.line.spoil = spoil
+                    machine = emulated.board.connect(emulated.line)
                     if machine.position() != "lost":
                         machine.prepare()
-                        _carried_out(one, machine, goal)
-                if _check_truth(one) != "known":
+                        _carry_out_motion(emulated, machine, goal)
+                if _check_truth(emulated) != "known":
                     with suppress(ArmkinError):
-                        _connected(one)
+                        _connect_and_settle(emulated)
 
 
 def _while_moving(emulated: Emulated, asks: int, act: Callable[[], object] | None) -> bool:
@@ -205,90 +207,90 @@ def _while_moving(emulated: Emulated, asks: int, act: Callable[[], object] | Non
             act()
         return reached and act is None
 
-    machine = _connected(emulated, stop)
+    machine = _connect_and_settle(emulated, stop)
     moving.append(True)
-    return _carried_out(emulated, machine, _distant_goal(emulated), 0.5)
+    return _carry_out_motion(emulated, machine, _distant_goal(emulated), 0.5)
 
 
 def _distant_goal(emulated: Emulated) -> Array:
     """A goal some way from where the arm stands."""
-    here = joints(emulated.board.arm, _pins(emulated))
-    return max(itertools.islice(_goals(emulated, 7, 0.4), 20), key=lambda q: float(np.abs(q - here).max()))
+    standing = joints(emulated.board.arm, _pin_counts(emulated))
+    return max(itertools.islice(_random_goals(emulated, 7, 0.4), 20), key=lambda q: float(np.abs(q - standing).max()))
 
 
 def a_reset_in_a_motion_is_told(start: Start, times: int = 5) -> None:
     """The motion is not said to be done, and what is said of the position is true."""
     for k in range(times):
-        with _started(start) as one:
-            if one.reset is not None:
-                _while_moving(one, 1 + 6 * k, one.reset)
-                _check_truth(one)
+        with _start_emulator(start) as emulated:
+            if emulated.reset is not None:
+                _while_moving(emulated, 1 + 6 * k, emulated.reset)
+                _check_truth(emulated)
 
 
 def another_program_makes_nothing_false(start: Start, times: int | None = None) -> None:
     """It speaks before, between and in motions."""
     ways = itertools.product((8, None, 1, 25), range(len(start().foreign)))
     for asks, number in itertools.islice(ways, times):
-        with _started(start) as one:
-            act = one.foreign[number]
+        with _start_emulator(start) as emulated:
+            act = emulated.foreign[number]
             if asks is None:
                 act()
-                _check_truth(one)
+                _check_truth(emulated)
                 with suppress(ArmkinError):
-                    _carried_out(one, _connected(one), next(_goals(one, 1)))
+                    _carry_out_motion(emulated, _connect_and_settle(emulated), next(_random_goals(emulated, 1)))
                 act()
             else:
                 with suppress(ArmkinError):
-                    _while_moving(one, asks, act)
-            _check_truth(one)
+                    _while_moving(emulated, asks, act)
+            _check_truth(emulated)
 
 
 def a_cable_that_is_pulled_makes_nothing_false(start: Start, times: int = 20) -> None:
     """At many moments of a motion; the next program says where the arm stands, or that nobody knows."""
 
-    with _started(start) as one:
+    with _start_emulator(start) as emulated:
 
         def pull() -> None:
-            one.line.cut = True
+            emulated.line.cut = True
 
         for k in range(times):
             with suppress(ArmkinError):
-                assert not _while_moving(one, 2 * k, pull) or not one.line.cut
-            _check_truth(one)
+                assert not _while_moving(emulated, 2 * k, pull) or not emulated.line.cut
+            _check_truth(emulated)
 
 
 def a_stalled_axis_is_told(start: Start, times: int = 3) -> None:
     """By kinds that can see one: the motion is not said to be done."""
     for k in range(times):
-        with _started(start) as one:
-            if one.stall is not None:
-                assert not _while_moving(one, 1 + 6 * k, one.stall)
-                _check_truth(one)
+        with _start_emulator(start) as emulated:
+            if emulated.stall is not None:
+                assert not _while_moving(emulated, 1 + 6 * k, emulated.stall)
+                _check_truth(emulated)
 
 
 def a_hold_keeps_the_position_and_the_next_motion_goes_on(start: Start, times: int = 20) -> None:
     """At many places of a motion."""
-    with _started(start) as one:
+    with _start_emulator(start) as emulated:
         for k in range(times):
-            _while_moving(one, 1 + 3 * k, None)
-            assert _check_truth(one) == "known", "a hold has lost the position"
-            assert _carried_out(one, _connected(one), _distant_goal(one))
+            _while_moving(emulated, 1 + 3 * k, None)
+            assert _check_truth(emulated) == "known", "a hold has lost the position"
+            assert _carry_out_motion(emulated, _connect_and_settle(emulated), _distant_goal(emulated))
 
 
 def a_plan_that_begins_elsewhere_moves_nothing(start: Start, times: int = 1) -> None:
     """It is a bug of who made it, and no motion."""
-    with _started(start) as one:
-        machine = _connected(one)
-        before, there = _pins(one), machine.plan(machine.counts(), _distant_goal(one))
-        plan = machine.plan(there.end.tolist(), machine.arm.home)
+    with _start_emulator(start) as emulated:
+        machine = _connect_and_settle(emulated)
+        before, first_plan = _pin_counts(emulated), machine.plan(machine.counts(), _distant_goal(emulated))
+        plan = machine.plan(first_plan.end.tolist(), machine.arm.home)
         try:
             machine.run([plan])
         except StartError:
             pass
         else:
             raise AssertionError("a plan that begins elsewhere was carried out")
-        _wait_for_rest(one)
-        assert np.abs(np.array(before) - one.pins()).max() <= one.tolerance
+        _wait_for_rest(emulated)
+        assert np.abs(np.array(before) - emulated.pins()).max() <= emulated.tolerance
 
 
 CASES: tuple[Callable[..., None], ...] = (

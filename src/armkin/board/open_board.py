@@ -32,12 +32,12 @@ def open_board(
     try:
         LOG.info("%s opens %s as %s", board.arm.name, port, board.called)
         machine = board.connect(link, stop)
-        _log("found", machine)
+        _log_position("found", machine)
         yield machine
-        _log("left", machine)
+        _log_position("left", machine)
     except StoppedError as error:
         board.stopped(error)
-        _log("stopped", board.machine)
+        _log_position("stopped", board.machine)
         raise
     except ArmkinError as error:
         LOG.info("%s: %s", type(error).__name__, error.message)
@@ -46,5 +46,5 @@ def open_board(
         link.close()
 
 
-def _log(event: str, machine: Backend) -> None:
+def _log_position(event: str, machine: Backend) -> None:
     LOG.info("%s: position %s, counts %s", event, machine.position(), list(machine.counts()))

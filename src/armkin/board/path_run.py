@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a trajectory from counts, on some board
 
 
-def parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
+def lay_parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
     """A plan's approach, if it has one, and its motion between the gripper's, from counts.
 
     Raises UsageError if the board is too slow for it.
     """
-    whole = plan.motion
-    edges = [0, *(marker.before for marker in plan.markers), len(whole.stretches)]
-    found, at, q = [], np.asarray(start, dtype=np.int64), whole.start
+    motion = plan.motion
+    edges = [0, *(marker.before for marker in plan.markers), len(motion.stretches)]
+    laid, begin, q = [], np.asarray(start, dtype=np.int64), motion.start
     if plan.approach is not None:
-        found.append(lay(plan.approach, at))
-        at = found[0].end
+        laid.append(lay(plan.approach, begin))
+        begin = laid[0].end
     for a, b in pairwise(edges):
-        trajectory = Trajectory(plan.arm, q, whole.stretches[a:b])
-        one = lay(trajectory, at)
-        found.append(one)
-        at, q = one.end, trajectory.end
-    return found
+        trajectory = Trajectory(plan.arm, q, motion.stretches[a:b])
+        part = lay(trajectory, begin)
+        laid.append(part)
+        begin, q = part.end, trajectory.end
+    return laid
 
 
 def check_gripper(plan: PathPlan, board: Board) -> None:
@@ -53,7 +53,7 @@ def check_pauses(plan: PathPlan, answers: bool) -> None:
         raise UsageError("the path rests until Enter (M0, wait: enter), and there is no terminal to press it")
 
 
-def follow(
+def follow_plan(
     board: Board,
     plan: PathPlan,
     laid: Sequence[Planned],
@@ -65,13 +65,13 @@ def follow(
 
     ask: what ends a rest until Enter.
     """
-    done, total = 0.0, sum(one.duration for one in laid)
+    elapsed, total = 0.0, sum(part.duration for part in laid)
     markers: list[Marker | None] = [None] * (plan.approach is not None) + list(plan.markers)
-    for k, one in enumerate(laid, first):
-        if one.trajectory.stretches:
-            begun = done
-            board.machine.run([one], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
-            done += one.duration
+    for k, part in enumerate(laid, first):
+        if part.trajectory.stretches:
+            begun = elapsed
+            board.machine.run([part], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
+            elapsed += part.duration
         marker = markers[k] if k < len(markers) else None
         if marker is not None and marker.kind == "pause":
             ask()

@@ -48,7 +48,7 @@ class Planner:
         way = round_waypoints(self.arm, joints(self.arm, counts), q, self.blend, speed=self.speed, hold=HOLD)
         return self.board.lay(way, counts)
 
-    def noted(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
+    def sum_up(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
         """Pass plans on and sum them up in `total_sent`; none is kept, as rows may come for hours."""
         for made in plans:
             if made is not None:
@@ -72,7 +72,9 @@ class Total:
         """One more plan."""
         self.first = self.first or made.start.tolist()
         self.last = made.end.tolist()
-        self.waypoints += sum(one.waypoints if isinstance(one, Curve) else 1 for one in made.trajectory.stretches)
+        self.waypoints += sum(
+            stretch.waypoints if isinstance(stretch, Curve) else 1 for stretch in made.trajectory.stretches
+        )
         self.segments += made.segments
         self.duration += made.duration
         self.speed = np.maximum(self.speed, made.trajectory.top_speed)
@@ -113,9 +115,9 @@ class Stream:
         self.problem: ArmkinError | None = None
         self._rows: queue.Queue[tuple[int, Sequence[float]] | Exception | None] = queue.Queue(_AHEAD)
         self._arm = arm
-        threading.Thread(target=self._read, args=(rows,), daemon=True).start()
+        threading.Thread(target=self._read_rows, args=(rows,), daemon=True).start()
 
-    def _read(self, rows: Iterable[tuple[int, Sequence[float]]]) -> None:
+    def _read_rows(self, rows: Iterable[tuple[int, Sequence[float]]]) -> None:
         try:
             for row in rows:
                 self._rows.put(row)
@@ -125,7 +127,7 @@ class Stream:
 
     def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Planned | None]:
         """Plans as rows come; None while there is none. What is wrong with a row ends it: `problem`."""
-        at, empty = list(start), True
+        counts, empty = list(start), True
         while True:
             try:
                 item = self._rows.get_nowait()
@@ -141,12 +143,12 @@ class Stream:
                 raise item
             empty = False
             try:
-                made = planner.plan(at, units.joints_in(self._arm, [item[1]]))
+                made = planner.plan(counts, units.joints_in(self._arm, [item[1]]))
             except (NoSolutionError, UsageError) as error:
                 words = f"row {item[0]}: {error.message}; the rows before it were carried out"
                 self.problem = type(error)(words, advice=error.advice, **{**error.fields, "row": item[0]})
                 return
-            at = made.end.tolist()
+            counts = made.end.tolist()
             yield made
         if empty:
             self.problem = UsageError("there are no rows: nothing was moved")
@@ -167,11 +169,11 @@ class Stream:
 def where_arm_stands(machine: Backend) -> Where:
     """Where the arm stands, as JSON [deg | mm]."""
     arm = machine.arm
-    known = machine.position() != "lost"
-    q = machine.joints() if known else None
+    is_known = machine.position() != "lost"
+    q = machine.joints() if is_known else None
     return {
         "position": machine.position(),
-        "pulses": list(machine.counts()) if known else None,
+        "pulses": list(machine.counts()) if is_known else None,
         "joints": None if q is None else units.joints_out(arm, q).tolist(),
         "joint_units": units.names(arm),
         "position_mm": None if q is None else (fk(arm, q)[:3, 3] + 0.0).tolist(),

@@ -54,8 +54,8 @@ def check_port(port: str, arm: Arm, no_scene: bool, *, simulated: bool = False) 
     if arm.scene:
         scene_note.write_scene(port, arm.scene)
     elif no_scene:
-        scene_note.forget(port)
-    elif last := scene_note.last(port):
+        scene_note.forget_scene(port)
+    elif last := scene_note.last_scene(port):
         raise UsageError(
             f"{port} was last used with the scene {last}, and this motion has none: give --scene {last}, "
             "or --no-scene if it no longer stands there",

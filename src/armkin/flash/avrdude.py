@@ -16,12 +16,12 @@ _BAR = 50  # marks of a bar of its
 _LONGEST = 120.0  # [s]; an Uno takes 7
 
 
-def program() -> str | None:
+def find_avrdude() -> str | None:
     """Its path."""
     return shutil.which("avrdude")
 
 
-def write(
+def write_image(
     program: str, chip: str, port: str, baud: int, image: Path, tick: Callable[[float], None] = lambda share: None
 ) -> None:
     """Write an image and compare it with what the flash then holds; tick: is told the share that is done.
@@ -38,7 +38,7 @@ def write(
     late.start()
     with process:
         try:
-            text = _listen(process, tick)
+            text = _read_output(process, tick)
         except BaseException:
             process.kill()
             raise
@@ -49,17 +49,17 @@ def write(
         raise LinkError(f"avrdude did not end within {_LONGEST:.0f} s")
     if process.returncode:
         lines = [line for line in text.splitlines() if line.strip() and "#" not in line]
-        said = [line for line in lines if "rror" in line and "ioctl" not in line]
-        why = (said or lines[-1:] or ["it failed"])[0]
+        complaints = [line for line in lines if "rror" in line and "ioctl" not in line]
+        why = (complaints or lines[-1:] or ["it failed"])[0]
         raise LinkError(f"avrdude: {why.removeprefix('avrdude').lstrip(': ')}")
 
 
-def _listen(process: subprocess.Popen[bytes], tick: Callable[[float], None]) -> str:
+def _read_output(process: subprocess.Popen[bytes], tick: Callable[[float], None]) -> str:
     """What avrdude says until its end; it draws a bar while it writes, and one while it compares."""
     assert process.stderr is not None
-    said = b""
+    output = b""
     while piece := os.read(process.stderr.fileno(), 4096):
-        said += piece
+        output += piece
         if b"#" in piece:
-            tick(min(1.0, said.partition(b"Writing |")[2].count(b"#") / (2 * _BAR)))
-    return said.decode(errors="replace")
+            tick(min(1.0, output.partition(b"Writing |")[2].count(b"#") / (2 * _BAR)))
+    return output.decode(errors="replace")

@@ -27,7 +27,7 @@ def is_boot_drive(folder: Path) -> bool:
     return False
 
 
-def mounted() -> Iterator[Path]:
+def mounted_drives() -> Iterator[Path]:
     """Boot drives where systems mount them."""
     places = [Path(f"{letter}:/") for letter in string.ascii_uppercase] if sys.platform == "win32" else []
     for pattern in ("Volumes/*", "media/*", "media/*/*", "run/media/*/*"):
@@ -35,15 +35,15 @@ def mounted() -> Iterator[Path]:
     return filter(is_boot_drive, places)
 
 
-def appearing(seconds: float = _APPEARS) -> Path:
+def wait_for_drive(seconds: float = _APPEARS) -> Path:
     """The boot drive, once it is mounted. Raises LinkError if none is within `seconds`, or several are."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        found = list(mounted())
-        if len(found) == 1:
-            return found[0]
-        if found:
-            raise LinkError(f"{len(found)} boot drives ({', '.join(map(str, found))}): name one of them")
+        drives = list(mounted_drives())
+        if len(drives) == 1:
+            return drives[0]
+        if drives:
+            raise LinkError(f"{len(drives)} boot drives ({', '.join(map(str, drives))}): name one of them")
         time.sleep(0.1)
     raise LinkError(
         f"no drive {_CHIP} appeared within {seconds:.0f} s: mount it, then name its folder as the port\n"
@@ -51,7 +51,7 @@ def appearing(seconds: float = _APPEARS) -> Path:
     )
 
 
-def write(folder: Path, name: str, data: bytes) -> None:
+def copy_image(folder: Path, name: str, data: bytes) -> None:
     """Copy a UF2 file there. The Pico starts it, and the drive is gone, as soon as all of it has come."""
     if not is_boot_drive(folder):
         raise LinkError(

@@ -33,15 +33,15 @@ def image(kind: str, folder: Path = FOLDER) -> Image:
     try:
         lines = (folder / SUMS).read_text("ascii").splitlines()
         sums = {name: digest for digest, name in (line.split() for line in lines)}
-        data = path.read_bytes()
+        content = path.read_bytes()
     except (OSError, ValueError):
         raise MissingExtraError(
             f"this armkin holds no firmware for {kind}: it was installed from a clone, not from a release\n"
             "pip install armkin brings it; in a clone scripts/release builds it, or make -C firmware flash compiles it"
         ) from None
-    if sums.get(path.name) != hashlib.sha256(data).hexdigest():
+    if sums.get(path.name) != hashlib.sha256(content).hexdigest():
         raise MissingExtraError(
             f"{path} is not the image that this release was built with: its checksum differs\n"
             "installing armkin again brings it back; nothing was written to the board"
         )
-    return Image(kind, path, data)
+    return Image(kind, path, content)

@@ -42,7 +42,7 @@ class FlashResult(NamedTuple):
     firmware: str | None  # version, as the board says it
 
 
-def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> FlashResult:
+def upload(image: Image, port: str, tick: Tick = lambda written, total: None) -> FlashResult:
     """Write a board's image through a port (a Pico: or the folder of its boot drive), and ask the board what it is.
 
     tick: is told the bytes written and read back so far, 0 when the boot loader has been found, and how many these
@@ -52,37 +52,37 @@ def upload(image: Image, port: str, tick: Tick = lambda done, total: None) -> Fl
     chip = BOARDS[image.kind].chip
     if chip not in _LOADERS:
         return _to_boot_drive(image, port, tick)
-    flash = intel_hex.read(image.data.decode("ascii"))
+    flash = intel_hex.parse_intel_hex(image.data.decode("ascii"))
     total = 2 * len(flash)
-    loader, link, baud = _loader(chip, image.kind, port)
+    loader, link, baud = _connect_loader(chip, image.kind, port)
     tick(0, total)
-    program = avrdude.program()
+    program = avrdude.find_avrdude()
     try:
         if program is None:
-            _write(loader, flash, tick)
+            _write_and_compare(loader, flash, tick)
     finally:
         link.close()
     if program is not None:
         try:
-            avrdude.write(program, chip, port, baud, image.path, lambda share: tick(round(share * total), total))
+            avrdude.write_image(program, chip, port, baud, image.path, lambda share: tick(round(share * total), total))
         except LinkError as error:
-            raise _interrupted(str(error), "some") from None
+            raise _interruption_error(str(error), "some") from None
         tick(total, total)
     return FlashResult(port, len(flash), "avrdude" if program else "armkin", _answered_version(image.kind, port))
 
 
-def _loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
+def _connect_loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
     """The boot loader that answers, its open port and the port's rate."""
-    wanted = _LOADERS[chip]
-    others = [other for other in _LOADERS.values() if other is not wanted]
-    for make, baud in [(loader, baud) for loader in (wanted, *others) for baud in loader.bauds]:
+    expected = _LOADERS[chip]
+    unexpected = [candidate for candidate in _LOADERS.values() if candidate is not expected]
+    for make, baud in [(loader, baud) for loader in (expected, *unexpected) for baud in loader.bauds]:
         link = SerialPort(port, baud)
         try:
-            if heard := _heard(make, link):
-                loader, found = heard
-                if _SIGNATURES.get(found) == chip:
+            if reply := _identify_chip(make, link):
+                loader, signature = reply
+                if _SIGNATURES.get(signature) == chip:
                     return loader, link, baud
-                name = _SIGNATURES.get(found, f"of signature {found.hex(' ')}")
+                name = _SIGNATURES.get(signature, f"of signature {signature.hex(' ')}")
                 fitting = [board.kind for board in BOARDS.values() if board.chip == name]
                 raise LinkError(
                     f"the chip on {port} is an {name}; {kind} is for an {chip}: nothing was written\n"
@@ -98,7 +98,7 @@ def _loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
     )
 
 
-def _heard(make: type[Stk500v1] | type[Stk500v2], link: SerialPort) -> tuple[Loader, bytes] | None:
+def _identify_chip(make: type[Stk500v1] | type[Stk500v2], link: SerialPort) -> tuple[Loader, bytes] | None:
     """The boot loader behind a port, and its chip's signature; None if none answers.
 
     One whose answer came late has been called twice, may have heard that in part and say no more: the board is reset.
@@ -113,25 +113,25 @@ def _heard(make: type[Stk500v1] | type[Stk500v2], link: SerialPort) -> tuple[Loa
     return None
 
 
-def _write(loader: Loader, flash: bytes, tick: Tick) -> None:
+def _write_and_compare(loader: Loader, flash: bytes, tick: Tick) -> None:
     """Write the flash's bytes, then compare them."""
     size = loader.page
-    pages = [(at, flash[at : at + size].ljust(size, b"\xff")) for at in range(0, len(flash), size)]
-    at = 0
+    pages = [(address, flash[address : address + size].ljust(size, b"\xff")) for address in range(0, len(flash), size)]
+    address = 0
     try:
-        for at, page in pages:
-            loader.write(at, page)
-            tick(min(at + size, len(flash)), 2 * len(flash))
-        for at, page in pages:
-            if loader.read(at, size) != page:
-                raise LinkError(f"the flash at byte {at} is not what was written")
-            tick(len(flash) + min(at + size, len(flash)), 2 * len(flash))
+        for address, page in pages:
+            loader.write(address, page)
+            tick(min(address + size, len(flash)), 2 * len(flash))
+        for address, page in pages:
+            if loader.read(address, size) != page:
+                raise LinkError(f"the flash at byte {address} is not what was written")
+            tick(len(flash) + min(address + size, len(flash)), 2 * len(flash))
         loader.leave()
     except (LinkError, KeyboardInterrupt) as error:
-        raise _interrupted(str(error) or "stopped", f"{at}") from None
+        raise _interruption_error(str(error) or "stopped", f"{address}") from None
 
 
-def _interrupted(reason: str, progress: str) -> LinkError:
+def _interruption_error(reason: str, progress: str) -> LinkError:
     return LinkError(
         f"{reason.splitlines()[0]}: {progress} bytes were written, so that the board has no whole program now\n"
         "its boot loader stays: the same command writes it again"
@@ -142,15 +142,17 @@ def _to_boot_drive(image: Image, port: str, tick: Tick) -> FlashResult:
     folder = Path(port)
     if not folder.is_dir():
         SerialPort(port, _TO_BOOT_DRIVE).close()
-        folder = boot_drive.appearing()
-    before = {found.device for found in list_ports()}
-    boot_drive.write(folder, image.path.name, image.data)
+        folder = boot_drive.wait_for_drive()
+    before = {port_info.device for port_info in list_ports()}
+    boot_drive.copy_image(folder, image.path.name, image.data)
     tick(len(image.data), len(image.data))
     end = time.monotonic() + _RESTART
     while time.monotonic() < end:
-        new = [found.device for found in list_ports() if found.device == port or found.device not in before]
-        if new:
-            return FlashResult(new[0], len(image.data), "UF2", _answered_version(image.kind, new[0]))
+        ports = [
+            port_info.device for port_info in list_ports() if port_info.device == port or port_info.device not in before
+        ]
+        if ports:
+            return FlashResult(ports[0], len(image.data), "UF2", _answered_version(image.kind, ports[0]))
         time.sleep(0.1)
     return FlashResult(None, len(image.data), "UF2", None)
 

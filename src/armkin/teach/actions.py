@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.teach import request_checks
-from armkin.teach.arm_description import first_lock, jogs, scene
+from armkin.teach.arm_description import first_lock, jog_axes, scene_json
 from armkin.teach.page_key import RefusedError
 from armkin.teach.program_actions import ProgramActions
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
@@ -27,7 +27,7 @@ class Actions:
     def __init__(
         self, arm: Arm, port: str | None = None, baud: int | None = None, meshes: dict[str, Any] | None = None
     ) -> None:
-        """port: of a board, as `armkin send` takes it; meshes: see `armkin.teach.urdf_meshes.meshes`.
+        """port: of a board, as `armkin send` takes it; meshes: see `armkin.teach.urdf_meshes.meshes_json`.
 
         Raises UsageError if the robot file says too little for the board.
         """
@@ -96,21 +96,23 @@ class Actions:
 
     def warm(self) -> None:
         """Have the first page's answer ready, while its browser still loads the files."""
-        from armkin.teach.pose_answers import Question, look
+        from armkin.teach.pose_answers import Question, answer_question
 
         with self._solving:
             if not self._last_answer:
                 held = first_lock(self.arm)
-                self._last_answer = look(self.arm, Question(self.arm.home, held=() if held is None else (held,)))
+                self._last_answer = answer_question(
+                    self.arm, Question(self.arm.home, held=() if held is None else (held,))
+                )
 
     def _open(self) -> dict[str, Any]:
         tab = self.tabs.open()
         self.warm()
         board = None if self.board is None else self.board.thread.state()
-        moved = [] if self.board is None else jogs(self.arm)
+        moved = [] if self.board is None else jog_axes(self.arm)
         return {
             "tab": tab.id,
-            "scene": scene(self.arm) | {"meshes": self.meshes, "jogs": moved},
+            "scene": scene_json(self.arm) | {"meshes": self.meshes, "jogs": moved},
             "look": self._last_answer,
             "program": self.program_actions.program.state(),
             "board": board,
@@ -122,18 +124,18 @@ class Actions:
         `goal`: a person drags or types it: an arm that follows goes there. Any other new pose ends following: a drag
         from there would take the arm along to what nobody dragged.
         """
-        from armkin.teach.pose_answers import look  # the solver: imported while the browser loads the page
+        from armkin.teach.pose_answers import answer_question  # the solver: imported while the browser loads the page
         from armkin.teach.quick_ik import QuickIk
 
         question = self._question(fields)
         with self._solving:
             self._quick = self._quick or QuickIk()
-            answer = look(self.arm, question, self._quick)
+            answer = answer_question(self.arm, question, self._quick)
         before, self._last_answer = self._last_answer, answer
         self.tabs.publish("look", answer, except_tab=tab)
         if self.board is None:
             return answer
-        if request_checks.flag(fields, "goal"):
+        if request_checks.flag_field(fields, "goal"):
             if not answer["outside"]:
                 self.board.follow_pose(tab, units.joints_in(self.arm, answer["q"]))
         elif not before or answer["q"] != before["q"]:
@@ -145,21 +147,21 @@ class Actions:
         from armkin.teach.pose_answers import Question
 
         arm = self.arm
-        q = units.joints_in(arm, request_checks.numbers(fields, "q", arm.n))
+        q = units.joints_in(arm, request_checks.number_list_field(fields, "q", arm.n))
         held = fields.get("held", [])
         if not isinstance(held, list) or any(name not in arm.joint_names for name in held):
             raise UsageError("held: expected names of joints")
         target = fields.get("target")
         if target is not None:
             count = len(target) if isinstance(target, list) and len(target) <= 6 else 6
-            target = request_checks.numbers(fields, "target", count)
+            target = request_checks.number_list_field(fields, "target", count)
         return Question(
             q,
             target,
             tuple(name for name in arm.joint_names if name in held),
-            request_checks.text(fields, "branch") if fields.get("branch") is not None else "",
-            request_checks.flag(fields, "best"),
-            request_checks.flag(fields, "nearest"),
+            request_checks.text_field(fields, "branch") if fields.get("branch") is not None else "",
+            request_checks.flag_field(fields, "best"),
+            request_checks.flag_field(fields, "nearest"),
             self.standing_pulses(),
         )
 

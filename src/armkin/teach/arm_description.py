@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def scene(arm: Arm) -> dict[str, Any]:
+def scene_json(arm: Arm) -> dict[str, Any]:
     """The arm: links and bodies (see `armkin.view.skeleton.shape`), joints, motors."""
     form = shape(arm)
     limits = [[units.finite(end) for end in pair] for pair in units.limits_out(arm)]
@@ -38,10 +38,10 @@ def scene(arm: Arm) -> dict[str, Any]:
                 "home": home,
                 "prismatic": bool(sliding),
                 "ratio": float(ratio),
-                "at": float(at),
+                "at": float(offset),
                 "step": step,
             }
-            for name, unit, (low, high), home, sliding, ratio, at, step in zip(
+            for name, unit, (low, high), home, sliding, ratio, offset, step in zip(
                 arm.joint_names,
                 units.names(arm),
                 limits,
@@ -49,14 +49,14 @@ def scene(arm: Arm) -> dict[str, Any]:
                 arm.prismatic,
                 arm.ratio,
                 form.joint_offsets,
-                _steps(arm),
+                _joint_steps(arm),
                 strict=True,
             )
         ],
         "poses": units.poses_out(arm),
-        "obstacles": _obstacles(arm),
-        **_motors(arm),
-        "gripper": _gripper(arm),
+        "obstacles": _obstacle_triangles(arm),
+        **_motors_json(arm),
+        "gripper": _gripper_json(arm),
         "lock": first_lock(arm),
         "locks": arm.n > 6 or first_lock(arm) is not None,
     }
@@ -71,7 +71,7 @@ def first_lock(arm: Arm) -> str | None:
     return redundant_joint(actual(arm), None) or None
 
 
-def _steps(arm: Arm) -> list[float]:
+def _joint_steps(arm: Arm) -> list[float]:
     """What each joint resolves [deg | mm]: the most that a pulse turns it; 0.1 where there are no drives."""
     try:
         per_pulse = np.abs(joints_per_pulse(arm)).max(axis=1)
@@ -80,16 +80,18 @@ def _steps(arm: Arm) -> list[float]:
     return [float(step) or 0.1 for step in units.joints_out(arm, per_pulse)]
 
 
-def _obstacles(arm: Arm) -> list[float]:
+def _obstacle_triangles(arm: Arm) -> list[float]:
     """The surfaces of all keep-outs, as triangles: nine numbers each, in the frame of targets."""
     if not arm.keep_out:
         return []
     from armkin.keep_out.body_pairs import guard
 
-    return [x for _, one in guard(arm).obstacles for x in one.triangles(1.4 * arm.reach).round(2).ravel().tolist()]
+    return [
+        x for _, obstacle in guard(arm).obstacles for x in obstacle.triangles(1.4 * arm.reach).round(2).ravel().tolist()
+    ]
 
 
-def jogs(arm: Arm) -> list[str]:
+def jog_axes(arm: Arm) -> list[str]:
     """The axes that the tip may be jogged along: none where no task fits."""
     from armkin.motion.jog_line import jog_axes
 
@@ -99,7 +101,7 @@ def jogs(arm: Arm) -> list[str]:
         return []
 
 
-def _motors(arm: Arm) -> dict[str, Any]:
+def _motors_json(arm: Arm) -> dict[str, Any]:
     try:
         joints_per_pulse(arm)
     except UsageError as error:
@@ -108,7 +110,7 @@ def _motors(arm: Arm) -> dict[str, Any]:
     return {"motors": [{"name": name, "unit": unit} for name, unit in named], "no_motors": ""}
 
 
-def _gripper(arm: Arm) -> dict[str, Any] | None:
+def _gripper_json(arm: Arm) -> dict[str, Any] | None:
     file = arm.gripper
     if file is None:
         return None

@@ -47,7 +47,7 @@ class BoardActions:
 
     def actions(self) -> dict[str, Action]:
         """Name -> action, for the page in control. Each but `follow` ends following, also where it is refused."""
-        others = {
+        stopping = {
             "connect": self.connect,
             "send": self.send,
             "run": self.run_program,
@@ -58,9 +58,9 @@ class BoardActions:
             "jog_end": self.jog_end,
             "grip": self.grip,
         }
-        return {"follow": self.follow, **{name: self._unfollowed(action) for name, action in others.items()}}
+        return {"follow": self.follow, **{name: self._ending_follow(action) for name, action in stopping.items()}}
 
-    def _unfollowed(self, action: Action) -> Action:
+    def _ending_follow(self, action: Action) -> Action:
         def act(tab: Tab, fields: Fields) -> dict[str, Any]:
             self.end_follow()
             return action(tab, fields)
@@ -87,8 +87,8 @@ class BoardActions:
     def send(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Move to joint values, at a percentage of the joints' speeds."""
         arm = self.arm
-        q = units.joints_in(arm, request_checks.numbers(fields, "q", arm.n))
-        speed = request_checks.number(fields, "speed", 1, 100) / 100
+        q = units.joints_in(arm, request_checks.number_list_field(fields, "q", arm.n))
+        speed = request_checks.number_field(fields, "speed", 1, 100) / 100
         check_limits(arm, q[None])
         self.check_file()
         self.thread.submit("send", lambda machine: self.run(machine, q[None], speed))
@@ -96,14 +96,14 @@ class BoardActions:
 
     def run_program(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Carry out the page's program from where the arm stands."""
-        speed = request_checks.number(fields, "speed", 1, 100) / 100
+        speed = request_checks.number_field(fields, "speed", 1, 100) / 100
         self.check_file()
         self.thread.submit("run", lambda machine: self._run_program(machine, speed))
         return {}
 
     def assume_home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Take the operator's word that the arm stands in its home pose."""
-        if not request_checks.flag(fields, "consent"):
+        if not request_checks.flag_field(fields, "consent"):
             raise UsageError("say first that the arm stands in its home pose")
         self.check_file()
 
@@ -118,7 +118,7 @@ class BoardActions:
         board = self.thread.board
         board.check_home()
         self.check_file()
-        self.thread.submit("home", lambda machine: _home(board))
+        self.thread.submit("home", lambda machine: _run_homing(board))
         return {}
 
     def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -127,8 +127,8 @@ class BoardActions:
         One press begins one jog: neither a sign of life that is late nor a request that is overtaken by the button's
         release moves the arm.
         """
-        press = _press(fields)
-        percent = request_checks.number(fields, "percent", -100, 100)
+        press = _press_number(fields)
+        percent = request_checks.number_field(fields, "percent", -100, 100)
         if percent == 0:
             raise UsageError("percent: 0 is no jog")
         job = self._jog_of(fields, percent)
@@ -143,11 +143,11 @@ class BoardActions:
     def _jog_of(self, fields: Fields, percent: float) -> Job:
         """The job that jogs what is asked for."""
         if "axis" not in fields:
-            joint = request_checks.index(fields, "joint", self.arm.n)
+            joint = request_checks.index_field(fields, "joint", self.arm.n)
             return lambda machine: self._jog(machine, joint, percent)
         from armkin.motion.jog_line import jog_axes
 
-        axis, frame = request_checks.text(fields, "axis", 10), request_checks.text(fields, "frame", 10)
+        axis, frame = request_checks.text_field(fields, "axis", 10), request_checks.text_field(fields, "frame", 10)
         if axis not in jog_axes(self.arm) or frame not in ("base", "tool"):
             raise UsageError(f"axis, frame: expected one of {', '.join(jog_axes(self.arm))}, and base or tool")
         tool: Frame = "tool" if frame == "tool" else "base"
@@ -155,7 +155,7 @@ class BoardActions:
 
     def jog_on(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """The button is still held. Where the last sign of life was too long ago, its jog is over."""
-        press = _press(fields)
+        press = _press_number(fields)
         with self._lock:
             now = time.monotonic()
             if press == tab.press and now < self._alive:
@@ -164,7 +164,7 @@ class BoardActions:
 
     def jog_end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """The button was let go; what comes later of that press moves nothing."""
-        press = _press(fields)
+        press = _press_number(fields)
         with self._lock:
             tab.press = max(tab.press, press)
             self._alive = 0.0
@@ -175,22 +175,22 @@ class BoardActions:
         value = fields.get("value")
         if isinstance(value, str) and value not in ("open", "closed"):
             raise UsageError("value: expected open, closed or a number")
-        wanted = value if isinstance(value, str) else request_checks.number(fields, "value", -1e6, 1e6)
+        target = value if isinstance(value, str) else request_checks.number_field(fields, "value", -1e6, 1e6)
         board = self.thread.board
-        board.grip_value(wanted)
-        assume = request_checks.flag(fields, "assume")
+        board.grip_value(target)
+        assume = request_checks.flag_field(fields, "assume")
         self.check_file()
-        self.thread.submit("grip", lambda machine: _grip(self.thread.board, wanted, assume))
+        self.thread.submit("grip", lambda machine: _move_gripper(self.thread.board, target, assume))
         return {}
 
     def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Let the arm follow what is dragged or typed in this page, slowly; off at every start."""
-        on = request_checks.flag(fields, "on")
-        if on and self.thread.standing_pulses() is None:
+        follows = request_checks.flag_field(fields, "on")
+        if follows and self.thread.standing_pulses() is None:
             raise LinkError("the arm's position is not known: it does not follow from there")
         self._goal = None
-        self.thread.set_follower(tab.id if on else "")
-        return {"on": on}
+        self.thread.set_follower(tab.id if follows else "")
+        return {"on": follows}
 
     def end_follow(self) -> None:
         """The arm follows no page; a hop that is under way ends where it was to end."""
@@ -214,31 +214,31 @@ class BoardActions:
         if not self.arm.path:
             return
         try:
-            data = Path(locate(self.arm.path)).read_bytes()
+            content = Path(locate(self.arm.path)).read_bytes()
         except OSError as error:
             raise FileError(f"{self.arm.path}: {error.strerror}: the arm was not moved") from None
-        if hashlib.sha256(data).hexdigest() != self.arm.sha256:
+        if hashlib.sha256(content).hexdigest() != self.arm.sha256:
             raise FileError(f"{self.arm.path} has changed: start armkin teach again, the arm was not moved")
 
     def run(self, machine: Backend, goals: Array, speed: float) -> None:
         """Move through joint values (w, n), stopping at each."""
-        _prepare(machine)
+        _prepare_motors(machine)
         plan = machine.plan(machine.counts(), goals, speed=speed)
         self.thread.parts = [plan.trajectory]
-        machine.run([plan], self._progress)
+        machine.run([plan], self._report_progress)
 
     def _run_program(self, machine: Backend, speed: float) -> None:
         """Every part is planned and laid out before the first one moves: the gripper's moves stand between them."""
-        _prepare(machine)
+        _prepare_motors(machine)
         plan = self.program(machine.joints(), speed)
         path_run.check_gripper(plan, self.thread.board)
         path_run.check_pauses(plan, answers=False)
         board = self.thread.board
-        self._carry_out(plan, path_run.parts(plan, machine.counts(), board.lay))
+        self._carry_out(plan, path_run.lay_parts(plan, machine.counts(), board.lay))
 
     def _carry_out(self, plan: PathPlan, parts: list[Planned]) -> None:
         self.thread.parts = [part.trajectory for part in parts]
-        path_run.follow(self.thread.board, plan, parts, self._progress)
+        path_run.follow_plan(self.thread.board, plan, parts, self._report_progress)
 
     def _jog(self, machine: Backend, joint: int, percent: float) -> None:
         board = self.thread.board
@@ -249,11 +249,11 @@ class BoardActions:
         """Line after line along an axis; each is planned to its rest, and held on its way when nobody asks for it."""
         from armkin.motion.jog_line import jog_line
 
-        _prepare(machine)
+        _prepare_motors(machine)
         why = ""
         while not why and self._held_down():
             plan, why = jog_line(self.arm, machine.joints(), axis, frame, share)
-            parts = path_run.parts(plan, machine.counts(), self.thread.board.lay)
+            parts = path_run.lay_parts(plan, machine.counts(), self.thread.board.lay)
             with self.thread.held_motion(lambda: not self._held_down()):
                 self._carry_out(plan, parts)
         if why and self._held_down():
@@ -269,9 +269,9 @@ class BoardActions:
         scale = np.where(self.arm.prismatic, 0.5, 180 / np.pi) / FOLLOW_HOP
         try:
             while (goal := self._goal) is not None and self.thread.follower:
-                here = machine.joints()
-                far = float((np.abs(goal - here) * scale).max())
-                self.run(machine, (here + (goal - here) / max(far, 1.0))[None], FOLLOW_SPEED)
+                standing = machine.joints()
+                far = float((np.abs(goal - standing) * scale).max())
+                self.run(machine, (standing + (goal - standing) / max(far, 1.0))[None], FOLLOW_SPEED)
                 with self._lock:
                     if far <= 1.0 and goal is self._goal:
                         self._goal = None
@@ -279,32 +279,32 @@ class BoardActions:
             self.end_follow()
             raise
 
-    def _progress(self, done: float, total: float) -> None:
-        self.thread.progress, self.thread.progress_seconds = (round(done, 1), round(total, 1)), done
+    def _report_progress(self, elapsed: float, total: float) -> None:
+        self.thread.progress, self.thread.progress_seconds = (round(elapsed, 1), round(total, 1)), elapsed
 
 
-def _press(fields: Fields) -> int:
+def _press_number(fields: Fields) -> int:
     """Which press of a jog's button, counted by the page."""
-    return request_checks.index(fields, "press", 2**31)
+    return request_checks.index_field(fields, "press", 2**31)
 
 
-def _prepare(machine: Backend) -> None:
+def _prepare_motors(machine: Backend) -> None:
     """Switch the motors on; LinkError if the position is lost."""
     if machine.position() == "lost" and not machine.port.simulated:
         raise LinkError("the arm's position is lost: home it, or put it in its home pose and say so; it was not moved")
     machine.prepare()
 
 
-def _grip(board: Board, value: str | float, assume: bool) -> None:
+def _move_gripper(board: Board, value: str | float, assume: bool) -> None:
     """Move the gripper; assume: it stands open now, if nothing is known of it."""
-    known = board.grip_known()
-    if not known and not assume:
+    is_known = board.grip_known()
+    if not is_known and not assume:
         raise LinkError(
             "the gripper's position is lost: say first that it stands open\n"
             "a servo jumps there at once, at its full speed: keep your fingers out"
         )
-    board.grip(value, None if known else "open")
+    board.grip(value, None if is_known else "open")
 
 
-def _home(board: Board) -> None:
+def _run_homing(board: Board) -> None:
     board.home()

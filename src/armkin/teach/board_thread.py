@@ -58,7 +58,7 @@ class BoardThread:
         self._published: dict[str, Any] = {}
         self._told_at = 0.0
         self._telling = threading.Lock()
-        self._thread = threading.Thread(target=self._run, name="board")
+        self._thread = threading.Thread(target=self._run_jobs, name="board")
         self._thread.start()
 
     # What pages ask for, in threads of theirs
@@ -110,16 +110,16 @@ class BoardThread:
 
     def state(self) -> dict[str, Any]:
         """JSON: what the pages are told."""
-        return self._published or self._state()
+        return self._published or self._state_json()
 
     def standing_pulses(self) -> tuple[int, ...] | None:
         """Pulses where the arm stands; None if that is not known."""
-        found = self.state()["pulses"]
-        return None if found is None else tuple(found)
+        counts = self.state()["pulses"]
+        return None if counts is None else tuple(counts)
 
     # The thread that owns the port
 
-    def _run(self) -> None:
+    def _run_jobs(self) -> None:
         while not self._ended:
             self._wake.wait(_POLL)
             self._wake.clear()
@@ -141,10 +141,10 @@ class BoardThread:
             machine = self._open()
             job(machine)
         except StoppedError as error:
-            self._stopped(error)
+            self._note_stop(error)
         except ArmkinError as error:
             self._error = error.message
-            if self.machine is None or not self._answers(self.machine):
+            if self.machine is None or not self._board_answers(self.machine):
                 self._disconnect()
         except Exception as error:
             # Whatever went wrong, the arm must not go on with it.
@@ -202,7 +202,7 @@ class BoardThread:
         self._publish()
         self._stop.clear()
 
-    def _stopped(self, error: StoppedError) -> None:
+    def _note_stop(self, error: StoppedError) -> None:
         if self.machine is not None:
             self.board.stopped(error)
         self._error = "stopped"
@@ -216,7 +216,7 @@ class BoardThread:
             self._disconnect()
         self._publish()
 
-    def _answers(self, machine: Backend) -> bool:
+    def _board_answers(self, machine: Backend) -> bool:
         try:
             machine.refresh()
         except LinkError:
@@ -229,9 +229,9 @@ class BoardThread:
         self.link = self.machine = None
         self.set_follower("")
 
-    def _state(self) -> dict[str, Any]:
+    def _state_json(self) -> dict[str, Any]:
         machine = self.machine
-        found: dict[str, Any] = {
+        state: dict[str, Any] = {
             "port": self.port,
             "board": self.board.kind,
             "simulated": self.port == SIM,
@@ -244,17 +244,17 @@ class BoardThread:
             "position": "unknown" if machine is None else machine.position(),
             "pulses": None,
             "joints": None,
-            "commanded": self._commanded(),
+            "commanded": self._planned_joints(),
             "error": self._error,
             "differences": [] if machine is None else list(machine.differences),
         }
-        if machine is not None and found["position"] in ("known", "retained"):
+        if machine is not None and state["position"] in ("known", "retained"):
             counts = machine.counts()
-            found["pulses"] = list(counts)
-            found["joints"] = units.joints_out(self.arm, joints_of(self.arm, counts)).tolist()
-        return found
+            state["pulses"] = list(counts)
+            state["joints"] = units.joints_out(self.arm, joints_of(self.arm, counts)).tolist()
+        return state
 
-    def _commanded(self) -> list[float] | None:
+    def _planned_joints(self) -> list[float] | None:
         """Where the plan has the arm now [deg | mm]; None while no planned motion is under way."""
         left = self.progress_seconds
         for part in self.parts if self._doing else ():
@@ -265,7 +265,7 @@ class BoardThread:
 
     def _publish(self) -> None:
         with self._telling:
-            state = self._state()
+            state = self._state_json()
             if state != self._published:
                 self._published, self._told_at = state, time.monotonic()
                 self.publish(state)

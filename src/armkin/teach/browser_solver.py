@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def about(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
+def solver_json(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
     """What a page must know of the module: the task, its numbers' names and units, how far the motors go."""
     spare = redundancy(actual(arm), task_name)
     task = spare.task if spare else solver(actual(arm), task_name)[0]
@@ -36,6 +36,6 @@ def own_solver(arm: Arm) -> dict[str, Any]:
     from armkin.export.js.es_module import module  # only pages that are open need it
 
     try:
-        return {"module": module(arm), "about": about(arm)}
+        return {"module": module(arm), "about": solver_json(arm)}
     except UsageError:
         return {"module": None, "about": None}

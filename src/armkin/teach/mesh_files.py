@@ -23,7 +23,7 @@ _DEEPEST = 40  # nodes within nodes
 _Index = NDArray[np.int64]
 
 
-def triangles(path: Path) -> Array:
+def read_triangles(path: Path) -> Array:
     """The triangles (N, 3, 3) of a file, in its own units; a Collada file's in metres. Raises UsageError."""
     try:
         size = path.stat().st_size
@@ -33,15 +33,15 @@ def triangles(path: Path) -> Array:
     except OSError as error:
         raise UsageError(f"{path}: cannot read the mesh: {error.strerror}") from None
     try:
-        found = _collada(raw) if path.suffix.lower() == ".dae" else _stl(raw)
+        corners = _parse_collada(raw) if path.suffix.lower() == ".dae" else _parse_stl(raw)
     except (ValueError, LookupError, TypeError, OverflowError) as error:
         raise UsageError(f"{path}: is no mesh that can be read: {error}") from None
-    if not np.isfinite(found).all():
+    if not np.isfinite(corners).all():
         raise UsageError(f"{path}: holds a number that is not finite")
-    return found
+    return corners
 
 
-def _stl(raw: bytes) -> Array:
+def _parse_stl(raw: bytes) -> Array:
     if len(raw) >= 84 and len(raw) == 84 + 50 * int.from_bytes(raw[80:84], "little"):
         rows = np.frombuffer(raw, np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")]), offset=84)
         return rows["v"].astype(float)
@@ -51,7 +51,7 @@ def _stl(raw: bytes) -> Array:
     return vertices.reshape(-1, 3, 3)
 
 
-def _collada(raw: bytes) -> Array:
+def _parse_collada(raw: bytes) -> Array:
     try:
         from defusedxml.ElementTree import fromstring
     except ImportError:
@@ -66,30 +66,36 @@ def _collada(raw: bytes) -> Array:
         element.tag = str(element.tag).rpartition("}")[2]
     unit = root.find("asset/unit")
     metre = 1.0 if unit is None else float(unit.get("meter", 1.0))
-    shapes = {one.get("id"): list(_polygons(one.find("mesh"))) for one in root.iter("geometry") if one.find("mesh")}
+    shapes = {
+        geometry.get("id"): list(_geometry_triangles(geometry.find("mesh")))
+        for geometry in root.iter("geometry")
+        if geometry.find("mesh")
+    }
     nodes = {node.get("id"): node for node in root.iter("node")}
     parts = [np.zeros((0, 3, 3))]
     for scene in root.iter("visual_scene"):
         for node in scene.findall("node"):
-            parts += _placed(node, np.eye(4), shapes, nodes, 0)
+            parts += _node_triangles(node, np.eye(4), shapes, nodes, 0)
     return np.concatenate(parts) * metre
 
 
-def _placed(node: Any, T: Array, shapes: dict[Any, list[Array]], nodes: dict[Any, Any], depth: int) -> Iterator[Array]:
+def _node_triangles(
+    node: Any, T: Array, shapes: dict[Any, list[Array]], nodes: dict[Any, Any], depth: int
+) -> Iterator[Array]:
     """The triangles of a node and of those within it."""
     if depth > _DEEPEST:
         raise ValueError(f"nodes nested deeper than {_DEEPEST}")
     for element in node:
-        T = T @ _motion(element.tag, [float(x) for x in (element.text or "").split()]) if element.text else T
+        T = T @ _transformation(element.tag, [float(x) for x in (element.text or "").split()]) if element.text else T
     for used in node.findall("instance_geometry"):
         for corners in shapes.get(used.get("url", "").removeprefix("#"), []):
             yield corners @ T[:3, :3].T + T[:3, 3]
-    used = [nodes[one.get("url", "").removeprefix("#")] for one in node.findall("instance_node")]
+    used = [nodes[instance.get("url", "").removeprefix("#")] for instance in node.findall("instance_node")]
     for child in [*node.findall("node"), *used]:
-        yield from _placed(child, T, shapes, nodes, depth + 1)
+        yield from _node_triangles(child, T, shapes, nodes, depth + 1)
 
 
-def _motion(tag: str, values: list[float]) -> Array:
+def _transformation(tag: str, values: list[float]) -> Array:
     T = np.eye(4)
     if tag == "matrix":
         T[:] = np.reshape(values, (4, 4))
@@ -105,17 +111,17 @@ def _motion(tag: str, values: list[float]) -> Array:
     return T
 
 
-def _polygons(mesh: Any) -> Iterator[Array]:
+def _geometry_triangles(mesh: Any) -> Iterator[Array]:
     """The triangles of a geometry's triangles, polylists and polygons: polygons are taken to be convex."""
-    sources = dict(_sources(mesh))
+    sources = dict(_source_arrays(mesh))
     vertices = {one.get("id"): one for one in mesh.findall("vertices")}
     for kind, index_of in _INDEX_OF.items():
         for group in mesh.findall(kind):
             inputs = group.findall("input")
             width = 1 + max(int(one.get("offset", 0)) for one in inputs)
-            vertex = _input(inputs, "VERTEX")
+            vertex = _input_of(inputs, "VERTEX")
             owner = vertices[vertex.get("source", "").removeprefix("#")]
-            place = _input(owner.findall("input"), "POSITION")
+            place = _input_of(owner.findall("input"), "POSITION")
             points = sources[place.get("source", "").removeprefix("#")][:, :3]
             lists = [np.array((one.text or "").split(), dtype=np.int64) for one in group.findall("p")]
             corners = [one.reshape(-1, width)[:, int(vertex.get("offset", 0))] for one in lists]
@@ -125,13 +131,13 @@ def _polygons(mesh: Any) -> Iterator[Array]:
                 yield points[one]
 
 
-def _input(inputs: list[Any], semantic: str) -> Any:
+def _input_of(inputs: list[Any], semantic: str) -> Any:
     """The only one of inputs that means this."""
-    [found] = [one for one in inputs if one.get("semantic") == semantic]
-    return found
+    [match] = [source for source in inputs if source.get("semantic") == semantic]
+    return match
 
 
-def _sources(mesh: Any) -> Iterator[tuple[str, Array]]:
+def _source_arrays(mesh: Any) -> Iterator[tuple[str, Array]]:
     """Arrays of numbers by their ids, a row for each vertex."""
     for source in mesh.findall("source"):
         numbers, accessor = source.find("float_array"), source.find("technique_common/accessor")
@@ -141,23 +147,23 @@ def _sources(mesh: Any) -> Iterator[tuple[str, Array]]:
             yield source.get("id"), values[: len(values) // stride * stride].reshape(-1, stride)
 
 
-def _of_triangles(group: Any, corners: list[_Index]) -> list[_Index]:
-    return [one[: len(one) // 3 * 3].reshape(-1, 3) for one in corners]
+def _triangle_indices(group: Any, corners: list[_Index]) -> list[_Index]:
+    return [indices[: len(indices) // 3 * 3].reshape(-1, 3) for indices in corners]
 
 
-def _of_polygons(group: Any, corners: list[_Index]) -> list[_Index]:
-    return [_fan(one) for one in corners]
+def _polygon_indices(group: Any, corners: list[_Index]) -> list[_Index]:
+    return [_fan_triangles(polygon) for polygon in corners]
 
 
-def _of_polylist(group: Any, corners: list[_Index]) -> list[_Index]:
+def _polylist_indices(group: Any, corners: list[_Index]) -> list[_Index]:
     counts = np.array(group.findtext("vcount", "").split(), dtype=np.int64)
-    return [_fan(one) for one in np.split(np.concatenate(corners), np.cumsum(counts)[:-1])]
+    return [_fan_triangles(polygon) for polygon in np.split(np.concatenate(corners), np.cumsum(counts)[:-1])]
 
 
-_INDEX_OF = {"triangles": _of_triangles, "polylist": _of_polylist, "polygons": _of_polygons}
+_INDEX_OF = {"triangles": _triangle_indices, "polylist": _polylist_indices, "polygons": _polygon_indices}
 
 
-def _fan(corners: _Index) -> _Index:
+def _fan_triangles(corners: _Index) -> _Index:
     """A polygon's triangles."""
     fan = [[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)]
     return np.array(fan, dtype=np.int64).reshape(-1, 3)

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armkin.export.js.es_module import module
-from armkin.teach.arm_description import scene
-from armkin.teach.browser_solver import about
-from armkin.teach.plan_samples import playback
+from armkin.teach.arm_description import scene_json
+from armkin.teach.browser_solver import solver_json
+from armkin.teach.plan_samples import playback_json
 from armkin.teach.reach_slice import reach_slice
 
 if TYPE_CHECKING:
@@ -24,12 +24,12 @@ _LOCAL = Path(__file__).parent / "local" / "local.js"
 _IMPORT = re.compile(r'((?:from|import)\s*\(?\s*)"([./][^"]+)"')
 
 
-def html(
+def arm_html(
     arm: Arm, task_name: str | None = None, plan: PathPlan | None = None, meshes: dict[str, Any] | None = None
 ) -> str:
     """The arm in one HTML file: every branch as the pose is dragged; plan: of a path, which the page plays.
 
-    meshes: what the bodies look like, see `armkin.teach.urdf_meshes.meshes`.
+    meshes: what the bodies look like, see `armkin.teach.urdf_meshes.meshes_json`.
 
     Raises UsageError if the task does not fit the arm, or if its class has no form in JavaScript.
     """
@@ -37,14 +37,14 @@ def html(
     modules["js/server.js"] = _LOCAL.read_text(encoding="utf-8").replace('"../static/js/', '"./')
     for path in sorted((_STATIC / "vendor" / "three").glob("*.js")):
         modules[f"vendor/three/{path.name}"] = path.read_text(encoding="utf-8")
-    modules |= {"arm.js": module(arm, task_name), "data.js": _data(arm, task_name, plan, meshes)}
-    imports = {f"armkin/{name}": _url(_by_name(_stripped(text), name)) for name, text in modules.items()}
+    modules |= {"arm.js": module(arm, task_name), "data.js": _page_json(arm, task_name, plan, meshes)}
+    imports = {f"armkin/{name}": _data_url(_by_name(_strip_comments(text), name)) for name, text in modules.items()}
     imports["three"] = imports.pop("armkin/vendor/three/three.module.min.js")
     import_map = re.sub("<(?=[/!]|script)", r"\\u003c", json.dumps({"imports": imports}), flags=re.IGNORECASE)
     main = 'import "armkin/js/main.js";'
     style = (_STATIC / "page.css").read_text(encoding="utf-8")
-    scripts = f"{_hash(import_map)} {_hash(main)} data:"
-    policy = f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; img-src data:"
+    scripts = f"{_csp_hash(import_map)} {_csp_hash(main)} data:"
+    policy = f"default-src 'none'; script-src {scripts}; style-src {_csp_hash(style)}; img-src data:"
     text = (_STATIC / "index.html").read_text(encoding="utf-8")
     text = re.sub(r'<link rel="(?:modulepreload|stylesheet)"[^>]*>\n', "", text)
     text = re.sub(r"<script .*?</script>\n", "", text, flags=re.DOTALL)
@@ -55,7 +55,7 @@ def html(
     return text.replace("</head>", head, 1)
 
 
-def _stripped(text: str) -> str:
+def _strip_comments(text: str) -> str:
     """A module without its whole-line comments and indentation; no string of ours goes on over lines."""
     text = re.sub(r"^[ \t]*/\*\*(?:(?!\*/).)*\*/[ \t]*$", "", text, flags=re.DOTALL | re.MULTILINE)
     lines = (line.strip() for line in text.splitlines())
@@ -73,29 +73,33 @@ def _by_name(text: str, name: str) -> str:
     return _IMPORT.sub(named, text)
 
 
-def _url(text: str) -> str:
+def _data_url(text: str) -> str:
     """A module as a `data:` URL: only what would end it is escaped."""
     for letter in ("%", "#", "\r", "\n", "\t"):
         text = text.replace(letter, f"%{ord(letter):02X}")
     return f"data:text/javascript;charset=utf-8,{text}"
 
 
-def _hash(text: str) -> str:
+def _csp_hash(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def _data(arm: Arm, task_name: str | None, plan: PathPlan | None, meshes: dict[str, Any] | None) -> str:
+def _page_json(arm: Arm, task_name: str | None, plan: PathPlan | None, meshes: dict[str, Any] | None) -> str:
     """What the page must know besides the solver: the scene, words, and a plan."""
-    solver = about(arm, task_name)
-    drawn = {**scene(arm), "robot_file": Path(arm.path).name if arm.path else arm.name, "lock": solver["held"] or None}
+    solver = solver_json(arm, task_name)
+    drawn = {
+        **scene_json(arm),
+        "robot_file": Path(arm.path).name if arm.path else arm.name,
+        "lock": solver["held"] or None,
+    }
     values = {
         "arm": drawn | {"locks": False, "meshes": meshes},
         "solver": solver,
-        "plan": None if plan is None else playback(arm, plan),
+        "plan": None if plan is None else playback_json(arm, plan),
         "slice": None if task_name else reach_slice(arm),  # of the task that fits the arm
     }
-    return "".join(f"export const {name} = {_json(value)};\n" for name, value in values.items())
+    return "".join(f"export const {name} = {_json_text(value)};\n" for name, value in values.items())
 
 
-def _json(value: Any) -> str:
+def _json_text(value: Any) -> str:
     return json.dumps(value, allow_nan=False).replace("<", "\\u003c")

@@ -18,13 +18,13 @@ SHOWN = 0.2  # [mm] that the tip shown may be off where it is looked at, so that
 MOST = 160_000  # samples of some 80 bytes; a plan that needs more is shown less exactly, and the page says so
 
 
-def playback(arm: Arm, plan: PathPlan) -> dict[str, Any]:
+def playback_json(arm: Arm, plan: PathPlan) -> dict[str, Any]:
     """Joint values over time, the tip's way, speeds as shares of the limits; `shown_mm`: what the tip shown is off.
 
     `approach_s`: of the joint move that comes before it, from where the arm stands to its start.
     """
     begins = [] if plan.trajectory is None else plan.trajectory.begins.tolist()
-    t, off = sample_times(arm, plan, begins, SHOWN, MOST)
+    t, deviation = sample_times(arm, plan, begins, SHOWN, MOST)
     q = plan.q(t)
     with np.errstate(invalid="ignore"):
         shares = np.nan_to_num(np.abs(plan.qd(t)) / arm.max_speed)
@@ -32,7 +32,7 @@ def playback(arm: Arm, plan: PathPlan) -> dict[str, Any]:
         "duration_s": plan.duration,
         "approach_s": 0.0 if plan.approach is None else plan.approach.duration,
         "length_mm": plan.length,
-        "shown_mm": off,
+        "shown_mm": deviation,
         "time": t.round(4).tolist(),
         "joints": units.joints_out(arm, q).round(5).tolist(),
         "tips": fk(arm, q)[:, :3, 3].round(3).tolist(),

@@ -43,44 +43,50 @@ class Question:
     standing_pulses: tuple[int, ...] | None = None  # pulses where the arm stands; None: not known
 
 
-def look(arm: Arm, question: Question, quick: QuickIk | None = None) -> dict[str, Any]:
+def answer_question(arm: Arm, question: Question, quick: QuickIk | None = None) -> dict[str, Any]:
     """The answer, as JSON in mm and degrees; quick: what solves, if not Python alone; it is built for what is asked."""
-    solved = _solved(arm, question, quick)
+    solved = _branches_json(arm, question, quick)
     q = solved.pop("q", question.q)
     T = fk(arm, q) + 0.0  # no -0.0
     return {
         **solved,
         "q": units.joints_out(arm, q).tolist(),
-        "outside": _words(arm, q),
-        "red": _red(arm, q),
+        "outside": _warnings(arm, q),
+        "red": _hit_bodies(arm, q),
         "tip": {
             "position_mm": T[:3, 3].tolist(),
             "rpy_deg": units.angles_out(rpy(T[:3, :3])).tolist(),
         },
-        "motors": motors(arm, q, question.standing_pulses, best=question.best),
+        "motors": motors_json(arm, q, question.standing_pulses, best=question.best),
     }
 
 
-def motors(arm: Arm, q: Array, standing_pulses: Sequence[int] | None, *, best: bool = False) -> dict[str, Any] | None:
+def motors_json(
+    arm: Arm, q: Array, standing_pulses: Sequence[int] | None, *, best: bool = False
+) -> dict[str, Any] | None:
     """Pulses of a pose, the moves from where the arm stands (unknown: from home), what rounding costs at the tip."""
     try:
-        found = best_pulses(arm, q).chosen if best else rounding(arm, q)
+        rounded = best_pulses(arm, q).chosen if best else rounding(arm, q)
     except UsageError:
         return None  # no drives; the scene says why
     start = pulses(arm, arm.home) if standing_pulses is None else np.asarray(standing_pulses)
-    bad = [name for name, out in zip(motor_names(arm), outside_travel(arm, found.pulses), strict=True) if out]
+    bad = [
+        name
+        for name, is_outside in zip(motor_names(arm), outside_travel(arm, rounded.pulses), strict=True)
+        if is_outside
+    ]
     return {
-        "pulses": found.pulses.tolist(),
-        "moves": (found.pulses - start).tolist(),
+        "pulses": rounded.pulses.tolist(),
+        "moves": (rounded.pulses - start).tolist(),
         "from": "home" if standing_pulses is None else "arm",
-        "error_mm": float(found.error),
+        "error_mm": float(rounded.error),
         "best": best,
         "outside_travel": bad,
     }
 
 
 @lru_cache(maxsize=32)
-def _task(arm: Arm) -> tuple[Task | None, str]:
+def _solvable_task(arm: Arm) -> tuple[Task | None, str]:
     """The task that the page solves; None, and why, if no branches can be listed."""
     try:
         task = task_for(arm)
@@ -90,7 +96,7 @@ def _task(arm: Arm) -> tuple[Task | None, str]:
         return None, str(error)
 
 
-def _goal(arm: Arm, task: Task, question: Question, free_joints: list[int]) -> tuple[list[float], Array]:
+def _target_of(arm: Arm, task: Task, question: Question, free_joints: list[int]) -> tuple[list[float], Array]:
     """The target in its labels' units and as `ik` takes it: the question's own, or that of its pose.
 
     free_joints: the joints that are not held.
@@ -105,39 +111,39 @@ def _goal(arm: Arm, task: Task, question: Question, free_joints: list[int]) -> t
     return values, targets_in(task.labels, [values])[0]
 
 
-def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, Any]:
+def _branches_json(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, Any]:
     """Every branch of the target; `q` is the pose to show."""
     shown = units.joints_out(arm, question.q).tolist()
     held = {name: shown[arm.joint_names.index(name)] for name in question.held}
     request = choose_branch.Request(arm=arm, near=shown, held=held, ik=quick.ik if quick else ik)
     prepared = choose_branch.prepared(request)
-    task, why = _task(prepared)
+    task, why = _solvable_task(prepared)
     if task is None:
         return {"task": None, "why": why, "branches": [], "status": None}
     if quick:
         quick.build(prepared, task.name)
-    kept = [i for i, name in enumerate(arm.joint_names) if name not in held]
-    values, goal = _goal(arm, task, question, kept)
+    free_joints = [i for i, name in enumerate(arm.joint_names) if name not in held]
+    values, goal = _target_of(arm, task, question, free_joints)
     request = replace(request, task=task.name)
-    [found] = choose_branch.solve(request, goal[None])
-    branches = found.branches
+    [answer_set] = choose_branch.solve(request, goal[None])
+    branches = answer_set.branches
     answer: dict[str, Any] = {
         "task": task.name,
         "labels": list(task.labels),
         "units": label_units(task.labels),
         "target": values,
-        "status": found.status,
-        "method": found.method,
-        "complete": found.complete,
-        "free": found.free,
-        "branches": [_row(arm, branch) for branch in branches],
-        "names": list(found.names),
+        "status": answer_set.status,
+        "method": answer_set.method,
+        "complete": answer_set.complete,
+        "free": answer_set.free,
+        "branches": [_branch_json(arm, branch) for branch in branches],
+        "names": list(answer_set.names),
         "chosen": None,
         "closest": None,
     }
     if question.target is None:
         answer["chosen"] = _branch_of_pose(branches, question.q)
-    elif found.within_limits:
+    elif answer_set.within_limits:
         stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
         answer["chosen"] = stay[0] if stay else 0  # a free one, if there is one
         answer["q"] = branches[answer["chosen"]].q
@@ -151,7 +157,7 @@ def _solved(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, An
     return answer
 
 
-def _row(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
+def _branch_json(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
     """A branch as the page lists it."""
     return {
         "name": branch.name,
@@ -172,7 +178,7 @@ def _branch_of_pose(branches: Sequence[choose_branch.Branch], q: Array) -> int |
     return None
 
 
-def _red(arm: Arm, q: Array) -> list[int]:
+def _hit_bodies(arm: Arm, q: Array) -> list[int]:
     """Bodies that hit something, 0 the base's: also those that others hit."""
     if not arm.keep_out:
         return []
@@ -181,9 +187,9 @@ def _red(arm: Arm, q: Array) -> list[int]:
     return [k for k, name in enumerate(bodies) if name in named]
 
 
-def _words(arm: Arm, q: Array) -> list[str]:
+def _warnings(arm: Arm, q: Array) -> list[str]:
     """Each joint outside its limits, and what the pose hits, in words."""
-    found = [outside_text(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
+    complaints = [outside_text(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
     if arm.keep_out and (hit := hits(arm, q[None])[0][1]):
-        found.append(f"it {hits_text(hit)}")
-    return found
+        complaints.append(f"it {hits_text(hit)}")
+    return complaints

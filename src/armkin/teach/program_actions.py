@@ -11,7 +11,7 @@ from armkin.forward import fk
 from armkin.model import units
 from armkin.motors import joints as joints_of
 from armkin.teach import request_checks
-from armkin.teach.plan_samples import playback
+from armkin.teach.plan_samples import playback_json
 from armkin.teach.recorded_program import Program
 
 if TYPE_CHECKING:
@@ -44,15 +44,16 @@ class ProgramActions:
         """One edit of the program."""
         with self._lock:
             self.program.edit(fields)
-            return self._answer()
+            return self._publish_program()
 
     def load(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Take a path file's text as the program."""
         with self._lock:
             self.program.load(
-                request_checks.text(fields, "text", request_checks.LARGEST), request_checks.text(fields, "name")
+                request_checks.text_field(fields, "text", request_checks.LARGEST),
+                request_checks.text_field(fields, "name"),
             )
-            return self._answer()
+            return self._publish_program()
 
     def save(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """The text of a path file, for `armkin path` and `armkin send`."""
@@ -68,24 +69,24 @@ class ProgramActions:
             with self._lock:
                 program = self.program.copied()
             try:
-                return playback(self.arm, program.plan(self.start()))
+                return playback_json(self.arm, program.plan(self.start()))
             except NoSolutionError as error:
                 if "joints" not in error.fields:
                     raise
                 q = units.joints_in(self.arm, error.fields["joints"])
-                whole = error.plan is not None and error.plan.trajectory is not None
-                way = playback(self.arm, error.plan) if whole else {"tips": []}
+                has_motion = error.plan is not None and error.plan.trajectory is not None
+                way = playback_json(self.arm, error.plan) if has_motion else {"tips": []}
                 return {**way, "refused": str(error), "hit": fk(self.arm, q)[:3, 3].round(3).tolist()}
 
     def end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
         """Where a move ends."""
         with self._lock:
             program = self.program.copied()
-        index = request_checks.index(fields, "index", max(len(program.moves), 1))
+        index = request_checks.index_field(fields, "index", max(len(program.moves), 1))
         q = program.end_of(index, self.start())
         return {"q": units.joints_out(self.arm, q).tolist()}
 
-    def _answer(self) -> dict[str, Any]:
+    def _publish_program(self) -> dict[str, Any]:
         state = self.program.state()
         self._publish(state)
         return state

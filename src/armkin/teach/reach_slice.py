@@ -33,31 +33,31 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
 
     Raises UsageError for an arm without a task of its own.
     """
-    true = actual(arm)
-    free = redundancy(true, None)
+    real_arm = actual(arm)
+    free = redundancy(real_arm, None)
     step = arm.reach / ACROSS
     if free is None:  # azimuths 0 and 180 degrees alone: the plane
-        found = reach(arm, grid=step, azimuths=2, directions=DIRECTIONS, rolls=1, measures=False)
-        grid, shares, values = found.grid, found.columns["share"], 0
+        reach_map = reach(arm, grid=step, azimuths=2, directions=DIRECTIONS, rolls=1, measures=False)
+        grid, shares, values = reach_map.grid, reach_map.columns["share"], 0
     else:
-        grid = Grid(true, step, 2, DIRECTIONS, 1, False)
-        at = _values(true, free)
-        shares, values = _shares(grid, free, at), len(at)
+        grid = Grid(real_arm, step, 2, DIRECTIONS, 1, False)
+        values_held = _held_values(real_arm, free)
+        shares, values = _reached_shares(grid, free, values_held), len(values_held)
     plane = voxels.section(grid)
     share = shares[plane.row]
-    there = share > 0
+    reached = share > 0
     return {
         "size": grid.step,
         "frame": grid.frame.tolist(),
-        "centres": plane.centres[there].round(3).ravel().tolist(),
-        "shares": share[there].round(4).tolist(),
+        "centres": plane.centres[reached].round(3).ravel().tolist(),
+        "shares": share[reached].round(4).tolist(),
         "of": grid.orientations,
         "held": None if free is None else arm.joint_names[free.joint],
         "values": values,
     }
 
 
-def _values(arm: Arm, free: Redundancy) -> Array:
+def _held_values(arm: Arm, free: Redundancy) -> Array:
     """Values of the redundant joint that are asked [rad], home first."""
     low, high, home = (float(limit[free.joint]) for limit in (arm.lower, arm.upper, arm.home))
     if not free.by_formula:
@@ -66,13 +66,13 @@ def _values(arm: Arm, free: Redundancy) -> Array:
     return np.append(home, np.linspace(low, high, VALUES - 1))
 
 
-def _shares(grid: Grid, free: Redundancy, values: Array) -> Array:
+def _reached_shares(grid: Grid, free: Redundancy, values: Array) -> Array:
     """Of each cell the share of orientations that are reached at one of the values, free of hits."""
     arm, j = grid.arm, free.joint
     M, count = grid.azimuths, grid.orientations
-    at = np.repeat(grid.rings, M * count, axis=0)
+    centres = np.repeat(grid.rings, M * count, axis=0)
     azimuth = np.tile(np.repeat(np.arange(M) * (2 * np.pi / M), count), len(grid.rings))
-    target = grid.targets(at, azimuth, np.arange(len(at)) % count, np.zeros(len(at)))
+    target = grid.targets(centres, azimuth, np.arange(len(centres)) % count, np.zeros(len(centres)))
     reached = np.zeros(len(target), bool)
     near_enough = distance(arm, free.task, target) <= 1.0
     for value in values:

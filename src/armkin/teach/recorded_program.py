@@ -49,7 +49,7 @@ class Program:
         """JSON: what the pages show."""
         return {
             "moves": [
-                {"kind": _kind(move), "name": name, "said": _figures_text(move), "blend": move.get("blend")}
+                {"kind": _move_kind(move), "name": name, "said": _figures_text(move), "blend": move.get("blend")}
                 for move, name in zip(self.moves, self.names, strict=True)
             ],
             "blend": self.head.get("blend", 0),
@@ -62,13 +62,15 @@ class Program:
 
     def edit(self, fields: Mapping[str, Any]) -> None:
         """Carry out one edit: `do` names it. Raises UsageError and changes nothing if it makes no sense."""
-        what = request_checks.text(fields, "do", 20)
-        if what in ("undo", "redo"):
+        edit_name = request_checks.text_field(fields, "do", 20)
+        if edit_name in ("undo", "redo"):
             back, forth = (
-                (self._undo_states, self._redo_states) if what == "undo" else (self._redo_states, self._undo_states)
+                (self._undo_states, self._redo_states)
+                if edit_name == "undo"
+                else (self._redo_states, self._undo_states)
             )
             if back:
-                forth.append(self._copy())
+                forth.append(self._snapshot())
                 self._restore(back.pop())
             return
         edits = {
@@ -78,14 +80,14 @@ class Program:
             "reorder": self._reorder,
             "delete": self._delete,
             "clear": self._clear,
-            "blend": self._blend,
-            "settings": self._settings,
+            "blend": self._set_blend,
+            "settings": self._set_head,
         }
-        if what not in edits:
-            raise UsageError(f"do: '{what}' is none of {', '.join((*edits, 'undo', 'redo'))}")
-        before = self._copy()
+        if edit_name not in edits:
+            raise UsageError(f"do: '{edit_name}' is none of {', '.join((*edits, 'undo', 'redo'))}")
+        before = self._snapshot()
         try:
-            edits[what](fields)
+            edits[edit_name](fields)
             if self.moves:
                 self.file()
         except Exception:
@@ -119,17 +121,17 @@ class Program:
         file = path_file.parse(text, name)
         path_file.check_robot(file, self.arm.name, self.arm.path)
         check_numbers(self.arm, file)
-        data = file.model_dump(exclude_unset=True, exclude_none=True)
-        data.pop("robot", None)
-        moves = data.pop("moves")
+        document = file.model_dump(exclude_unset=True, exclude_none=True)
+        document.pop("robot", None)
+        moves = document.pop("moves")
         if len(moves) > MOST:
             raise UsageError(f"{name} has {len(moves)} moves; the page takes {MOST}")
-        self._undo_states = [*self._undo_states[-_UNDO + 1 :], self._copy()]
+        self._undo_states = [*self._undo_states[-_UNDO + 1 :], self._snapshot()]
         self._redo_states = []
-        self.head, self.moves, self.via = data, moves, None
+        self.head, self.moves, self.via = document, moves, None
         items = [line for line in text.splitlines() if line.lstrip().startswith("- ")]
-        found = [_NAMED.match(line) for line in items]
-        named = [match["name"][:60] if match else "" for match in found]
+        matches = [_NAMED.match(line) for line in items]
+        named = [match["name"][:60] if match else "" for match in matches]
         self.names = named if len(named) == len(moves) else [""] * len(moves)
 
     def plan(self, start: Array | None, speed: float = 1.0) -> PathPlan:
@@ -159,27 +161,27 @@ class Program:
         """Append a move to the pose q, or put it behind `index`."""
         if len(self.moves) >= MOST:
             raise UsageError(f"a program has at most {MOST} moves")
-        kind = request_checks.text(fields, "kind", 20)
-        at = (
+        kind = request_checks.text_field(fields, "kind", 20)
+        index = (
             len(self.moves)
             if fields.get("index") is None
-            else request_checks.index(fields, "index", len(self.moves)) + 1
+            else request_checks.index_field(fields, "index", len(self.moves)) + 1
         )
-        self.moves.insert(at, self._move(kind, fields))
-        self.names.insert(at, "")
+        self.moves.insert(index, self._make_move(kind, fields))
+        self.names.insert(index, "")
 
-    def _move(self, kind: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+    def _make_move(self, kind: str, fields: Mapping[str, Any]) -> dict[str, Any]:
         if kind == "wait":
-            return {"wait": request_checks.number(fields, "seconds", 0, 3600)}
+            return {"wait": request_checks.number_field(fields, "seconds", 0, 3600)}
         if kind == "grip":
-            value = request_checks.text(fields, "value", 10)
+            value = request_checks.text_field(fields, "value", 10)
             if value not in ("open", "closed"):
                 raise UsageError("value: expected open or closed")
             return {"grip": value}
-        values = request_checks.numbers(fields, "q", self.arm.n)
+        values = request_checks.number_list_field(fields, "q", self.arm.n)
         if kind == "joint":
-            return {"joint": _rounded(values)}
-        target = self._target(values)
+            return {"joint": _round_values(values)}
+        target = self._target_of(values)
         if kind == "line":
             return {"line": target}
         if kind == "arc":
@@ -189,68 +191,68 @@ class Program:
             return {"arc": {"via": via, "to": target}}
         raise UsageError(f"kind: '{kind}' is none of joint, line, arc, wait, grip")
 
-    def _target(self, values: Sequence[float]) -> list[float]:
+    def _target_of(self, values: Sequence[float]) -> list[float]:
         q = units.joints_in(self.arm, values)
         task = task_for(self.arm, self.head.get("task"))
         [target] = targets_out(task.labels, targets_of(task, fk(self.arm, q)[None], q[None]))
-        return _rounded(target)
+        return _round_values(target)
 
     def _set_via(self, fields: Mapping[str, Any]) -> None:
-        q = units.joints_in(self.arm, request_checks.numbers(fields, "q", self.arm.n))
-        self.via = _rounded(fk(self.arm, q)[:3, 3].tolist())
+        q = units.joints_in(self.arm, request_checks.number_list_field(fields, "q", self.arm.n))
+        self.via = _round_values(fk(self.arm, q)[:3, 3].tolist())
 
     def _rename(self, fields: Mapping[str, Any]) -> None:
-        given = request_checks.text(fields, "name", 60)  # as a comment of YAML may have it: what can be printed
-        kept = "".join(c if c.isprintable() else " " for c in given.replace("#", ""))
-        self.names[self._index(fields)] = " ".join(kept.split())
+        typed = request_checks.text_field(fields, "name", 60)  # as a comment of YAML may have it: what can be printed
+        printable = "".join(c if c.isprintable() else " " for c in typed.replace("#", ""))
+        self.names[self._move_index(fields)] = " ".join(printable.split())
 
     def _reorder(self, fields: Mapping[str, Any]) -> None:
-        at, to = self._index(fields), request_checks.index(fields, "to", len(self.moves))
-        self.moves.insert(to, self.moves.pop(at))
-        self.names.insert(to, self.names.pop(at))
+        index, to = self._move_index(fields), request_checks.index_field(fields, "to", len(self.moves))
+        self.moves.insert(to, self.moves.pop(index))
+        self.names.insert(to, self.names.pop(index))
 
     def _delete(self, fields: Mapping[str, Any]) -> None:
-        at = self._index(fields)
-        del self.moves[at], self.names[at]
+        index = self._move_index(fields)
+        del self.moves[index], self.names[index]
 
     def _clear(self, fields: Mapping[str, Any]) -> None:
         self.moves, self.names, self.head, self.via = [], [], {}, None
 
-    def _blend(self, fields: Mapping[str, Any]) -> None:
+    def _set_blend(self, fields: Mapping[str, Any]) -> None:
         """A move's own blend radius; null: the program's."""
-        move = self.moves[self._index(fields)]
+        move = self.moves[self._move_index(fields)]
         if fields.get("blend") is None:
             move.pop("blend", None)
         else:
-            move["blend"] = request_checks.number(fields, "blend", 0, 1e6)
+            move["blend"] = request_checks.number_field(fields, "blend", 0, 1e6)
 
-    def _settings(self, fields: Mapping[str, Any]) -> None:
+    def _set_head(self, fields: Mapping[str, Any]) -> None:
         for key in _SETTINGS:
             if key in fields:
                 if fields[key] is None:
                     self.head.pop(key, None)
                 else:
-                    self.head[key] = request_checks.number(fields, key, 0, 1e6)
+                    self.head[key] = request_checks.number_field(fields, key, 0, 1e6)
 
-    def _index(self, fields: Mapping[str, Any]) -> int:
+    def _move_index(self, fields: Mapping[str, Any]) -> int:
         if not self.moves:
             raise UsageError("the program has no moves")
-        return request_checks.index(fields, "index", len(self.moves))
+        return request_checks.index_field(fields, "index", len(self.moves))
 
-    def _copy(self) -> tuple[Any, ...]:
+    def _snapshot(self) -> tuple[Any, ...]:
         return copy.deepcopy((self.head, self.moves, self.names, self.via))
 
     def _restore(self, state: tuple[Any, ...]) -> None:
         self.head, self.moves, self.names, self.via = state
 
 
-def _kind(move: Mapping[str, Any]) -> str:
+def _move_kind(move: Mapping[str, Any]) -> str:
     return next(kind for kind in KINDS if kind in move)
 
 
 def _figures_text(move: Mapping[str, Any]) -> str:
     """A move's figures for people."""
-    value = move[_kind(move)]
+    value = move[_move_kind(move)]
     if isinstance(value, dict) and "to" in value:
         return ", ".join(f"{x:.1f}" for x in value["to"])
     if isinstance(value, list) and value and isinstance(value[0], int | float):
@@ -258,5 +260,5 @@ def _figures_text(move: Mapping[str, Any]) -> str:
     return str(value)
 
 
-def _rounded(values: Sequence[float]) -> list[float]:
+def _round_values(values: Sequence[float]) -> list[float]:
     return [round(float(value), _DIGITS) + 0.0 for value in values]

@@ -13,7 +13,7 @@ from armkin.teach.page_key import RefusedError
 LARGEST = 256 * 1024  # bytes of a body: a path file of ten thousand moves
 
 
-def length(headers: Mapping[str, str]) -> int:
+def body_length(headers: Mapping[str, str]) -> int:
     """Bytes of a body, known beforehand and bounded."""
     text = headers.get("Content-Length", "")
     if "Transfer-Encoding" in headers or not (text.isascii() and text.isdigit() and len(text) < 12):
@@ -23,22 +23,22 @@ def length(headers: Mapping[str, str]) -> int:
     return int(text)
 
 
-def body(data: bytes) -> dict[str, Any]:
+def body_fields(raw: bytes) -> dict[str, Any]:
     """A body as a JSON object without NaN or Infinity."""
     try:
-        found = json.loads(data.decode("utf-8"), parse_constant=_no_constant, parse_float=_finite)
+        fields = json.loads(raw.decode("utf-8"), parse_constant=_no_constant, parse_float=_finite_float)
     except (ValueError, RecursionError):
         raise RefusedError(400, "the body is no JSON, or has a number that is not finite") from None
-    if not isinstance(found, dict):
+    if not isinstance(fields, dict):
         raise RefusedError(400, "the body must be a JSON object")
-    return found
+    return fields
 
 
 def _no_constant(name: str) -> float:
     raise ValueError(name)
 
 
-def _finite(text: str) -> float:
+def _finite_float(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
         raise ValueError(text)
@@ -48,23 +48,23 @@ def _finite(text: str) -> float:
 # Fields of a body: what is not as it must be is a UsageError that names the field.
 
 
-def numbers(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
+def number_list_field(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
     """A list of so many finite numbers."""
-    found = fields.get(name)
-    if not isinstance(found, list) or len(found) != count:
+    values = fields.get(name)
+    if not isinstance(values, list) or len(values) != count:
         raise UsageError(f"{name}: expected {count} numbers")
-    return [_number(value, name) for value in found]
+    return [_bounded_number(value, name) for value in values]
 
 
-def number(fields: Mapping[str, Any], name: str, low: float, high: float) -> float:
+def number_field(fields: Mapping[str, Any], name: str, low: float, high: float) -> float:
     """A number from low to high."""
-    value = _number(fields.get(name), name)
+    value = _bounded_number(fields.get(name), name)
     if not low <= value <= high:
         raise UsageError(f"{name}: {value:g} is outside {low:g} to {high:g}")
     return value
 
 
-def index(fields: Mapping[str, Any], name: str, count: int) -> int:
+def index_field(fields: Mapping[str, Any], name: str, count: int) -> int:
     """An index: from 0, less than `count`."""
     value = fields.get(name)
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < count:
@@ -72,7 +72,7 @@ def index(fields: Mapping[str, Any], name: str, count: int) -> int:
     return value
 
 
-def text(fields: Mapping[str, Any], name: str, longest: int = 200) -> str:
+def text_field(fields: Mapping[str, Any], name: str, longest: int = 200) -> str:
     """A string of bounded length."""
     value = fields.get(name)
     if not isinstance(value, str) or len(value) > longest:
@@ -80,7 +80,7 @@ def text(fields: Mapping[str, Any], name: str, longest: int = 200) -> str:
     return value
 
 
-def flag(fields: Mapping[str, Any], name: str) -> bool:
+def flag_field(fields: Mapping[str, Any], name: str) -> bool:
     """True or false; false if it is not there."""
     value = fields.get(name, False)
     if not isinstance(value, bool):
@@ -88,13 +88,13 @@ def flag(fields: Mapping[str, Any], name: str) -> bool:
     return value
 
 
-def _number(value: Any, name: str) -> float:
+def _bounded_number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise UsageError(f"{name}: expected a number")
     try:
-        found = float(value)
+        number_value = float(value)
     except OverflowError:
         raise UsageError(f"{name}: the number is too large") from None
-    if not abs(found) <= 1e9:
-        raise UsageError(f"{name}: {found:g} is too large; at most 1e9 from 0")
-    return found
+    if not abs(number_value) <= 1e9:
+        raise UsageError(f"{name}: {number_value:g} is too large; at most 1e9 from 0")
+    return number_value

@@ -54,7 +54,7 @@ class Server(ThreadingHTTPServer):
             self._strangers[id(request)] = request
             while len(self._strangers) > _STRANGERS:
                 _, oldest = self._strangers.popitem(last=False)
-                _shut(oldest)
+                _shut_down(oldest)
         super().process_request(request, client_address)
 
     def accept(self, request: Any) -> None:
@@ -71,7 +71,7 @@ class Server(ThreadingHTTPServer):
         """A connection that breaks is nothing to print: `_Handler` answers what goes wrong in an action."""
 
 
-def _shut(connection: socket.socket) -> None:
+def _shut_down(connection: socket.socket) -> None:
     try:
         connection.shutdown(socket.SHUT_RDWR)
     except OSError:
@@ -79,13 +79,13 @@ def _shut(connection: socket.socket) -> None:
 
 
 @cache
-def files() -> dict[str, tuple[str, bytes]]:
+def served_files() -> dict[str, tuple[str, bytes]]:
     """Path -> kind and bytes of every file that is served; there are no others."""
-    found = {}
+    served = {}
     for path in sorted(STATIC.rglob("*")):
         if path.suffix in _KINDS:
-            found["/" + path.relative_to(STATIC).as_posix()] = (_KINDS[path.suffix], path.read_bytes())
-    return found
+            served["/" + path.relative_to(STATIC).as_posix()] = (_KINDS[path.suffix], path.read_bytes())
+    return served
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -99,69 +99,71 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """A file, or the stream of events."""
-        self._guarded(self._get)
+        self._serve_guarded(self._serve_get)
 
     def do_POST(self) -> None:
         """An action."""
-        self._guarded(self._post)
+        self._serve_guarded(self._serve_post)
 
-    def _guarded(self, serve: Callable[[], None]) -> None:
+    def _serve_guarded(self, serve: Callable[[], None]) -> None:
         try:
             serve()
         except RefusedError as error:
             self.close_connection = True  # its body may still be on the way
-            self._json(error.status, {"error": str(error), "kind": "refused"})
+            self._send_json(error.status, {"error": str(error), "kind": "refused"})
         except OSError:
             self.close_connection = True
 
-    def _get(self) -> None:
+    def _serve_get(self) -> None:
         path, _, query = self.path.partition("?")
-        self.server.guard.check_read(_headers(self), page=path == "/")
+        self.server.guard.check_read(_single_headers(self), page=path == "/")
         if path == "/events":
-            self._events(query)
+            self._send_events(query)
             return
-        kind, data = files().get("/index.html" if path == "/" else path, ("", b""))
+        kind, content = served_files().get("/index.html" if path == "/" else path, ("", b""))
         if not kind:
             raise RefusedError(404, "there is no such file")
         nonce = secrets.token_urlsafe(16)
-        self._answer(200, kind, data.replace(b"{{nonce}}", nonce.encode()) if kind == "text/html" else data, nonce)
+        self._send_content(
+            200, kind, content.replace(b"{{nonce}}", nonce.encode()) if kind == "text/html" else content, nonce
+        )
 
-    def _post(self) -> None:
-        headers = _headers(self)
+    def _serve_post(self) -> None:
+        headers = _single_headers(self)
         self.server.guard.check_action(headers)
         self.server.accept(self.connection)
         if not self.path.startswith("/api/"):
             raise RefusedError(404, "there is no such action")
-        fields = request_checks.body(self.rfile.read(request_checks.length(headers)))
+        fields = request_checks.body_fields(self.rfile.read(request_checks.body_length(headers)))
         try:
             answer = self.server.actions.act(self.path.removeprefix("/api/"), headers.get(TAB, ""), fields)
         except ArmkinError as error:
             status = 502 if isinstance(error, LinkError) else 422
-            self._json(status, {"error": error.message, "kind": error.kind})
+            self._send_json(status, {"error": error.message, "kind": error.kind})
         except RefusedError:
             raise
         except Exception as error:
-            self._json(500, {"error": f"internal error: {error!r}: this is a bug in armkin", "kind": "internal"})
+            self._send_json(500, {"error": f"internal error: {error!r}: this is a bug in armkin", "kind": "internal"})
         else:
-            self._json(200, answer)
+            self._send_json(200, answer)
 
-    def _events(self, query: str) -> None:
+    def _send_events(self, query: str) -> None:
         """Tell a page what happens, until it is closed: its connection ends, which is looked at all the time."""
         tab = self.server.actions.tabs.find(query.removeprefix("tab="))
         self.server.actions.tabs.enter(tab)
         self.server.accept(self.connection)
         self.close_connection = True
         try:
-            self._head(200, "text/event-stream", "")
+            self._send_head(200, "text/event-stream", "")
             self.end_headers()
             self.wfile.write(b"retry: 1000\n\n")
             self.wfile.flush()
             silent = 0.0
-            while not self._gone():
+            while not self._is_gone():
                 news = tab.hear(_LOOK)
                 silent = 0.0 if news else silent + _LOOK
-                for topic, data in news.items():
-                    text = json.dumps(data, allow_nan=False)
+                for topic, message in news.items():
+                    text = json.dumps(message, allow_nan=False)
                     self.wfile.write(f"event: {topic}\ndata: {text}\n\n".encode())
                 if silent >= _SILENT:
                     self.wfile.write(b":\n\n")
@@ -170,25 +172,25 @@ class _Handler(BaseHTTPRequestHandler):
         finally:
             self.server.actions.tabs.close_tab(tab)
 
-    def _gone(self) -> bool:
+    def _is_gone(self) -> bool:
         ready, _, _ = select.select([self.connection], [], [], 0)
         return bool(ready) and not self.connection.recv(1, socket.MSG_PEEK)
 
-    def _json(self, status: int, value: Any) -> None:
-        self._answer(status, "application/json", json.dumps(value, allow_nan=False).encode(), "")
+    def _send_json(self, status: int, value: Any) -> None:
+        self._send_content(status, "application/json", json.dumps(value, allow_nan=False).encode(), "")
 
-    def _answer(self, status: int, kind: str, data: bytes, nonce: str) -> None:
-        self._head(status, kind, nonce)
-        self.send_header("Content-Length", str(len(data)))
+    def _send_content(self, status: int, kind: str, content: bytes, nonce: str) -> None:
+        self._send_head(status, kind, nonce)
+        self.send_header("Content-Length", str(len(content)))
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()
-        self.wfile.write(data)
+        self.wfile.write(content)
 
-    def _head(self, status: int, kind: str, nonce: str) -> None:
+    def _send_head(self, status: int, kind: str, nonce: str) -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind if kind == "text/event-stream" else f"{kind}; charset=utf-8")
-        self.send_header("Content-Security-Policy", _policy(nonce))
+        self.send_header("Content-Security-Policy", _content_policy(nonce))
         self.send_header("X-Frame-Options", "DENY")
         self.send_header("X-Content-Type-Options", "nosniff")
         self.send_header("Referrer-Policy", "no-referrer")
@@ -204,18 +206,18 @@ class _Handler(BaseHTTPRequestHandler):
         """Requests are not printed."""
 
 
-def _headers(handler: BaseHTTPRequestHandler) -> dict[str, str]:
+def _single_headers(handler: BaseHTTPRequestHandler) -> dict[str, str]:
     """Headers by their canonical names; one that is there twice is refused."""
-    found: dict[str, str] = {}
+    headers: dict[str, str] = {}
     for name, value in handler.headers.items():
         key = name.title()
-        if key in found and key in ("Host", "Origin", "Content-Length", KEY):
+        if key in headers and key in ("Host", "Origin", "Content-Length", KEY):
             raise RefusedError(400, f"{key} is there twice")
-        found[key] = value
-    return found
+        headers[key] = value
+    return headers
 
 
-def _policy(nonce: str) -> str:
+def _content_policy(nonce: str) -> str:
     """What the page may load: our own files, and scripts with this answer's nonce."""
     scripts = f"'nonce-{nonce}'" if nonce else "'none'"
     return (

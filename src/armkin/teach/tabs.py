@@ -25,10 +25,10 @@ class Tab:
         self._news: dict[str, Any] = {}
         self._ready = threading.Condition()
 
-    def publish(self, topic: str, data: Any) -> None:
+    def publish(self, topic: str, message: Any) -> None:
         """Have the page hear something; what it has not heard of the topic yet is replaced."""
         with self._ready:
-            self._news[topic] = data
+            self._news[topic] = message
             self._ready.notify()
 
     def hear(self, timeout: float) -> dict[str, Any]:
@@ -112,12 +112,12 @@ class Tabs:
             if self._control != tab.id:
                 raise RefusedError(409, "another page holds control: take control first")
 
-    def publish(self, topic: str, data: Any, except_tab: Tab | None = None) -> None:
+    def publish(self, topic: str, message: Any, except_tab: Tab | None = None) -> None:
         """Have all pages hear something, `except_tab` one."""
         with self._lock:
             for tab in self._tabs.values():
                 if tab is not except_tab:
-                    tab.publish(topic, data)
+                    tab.publish(topic, message)
 
     def _announce(self) -> None:
         for tab in self._tabs.values():

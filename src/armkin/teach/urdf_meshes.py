@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array
 from armkin.model.rotation import inverse
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.urdf_document import Joint, Tree, document
-from armkin.teach.mesh_files import triangles
+from armkin.teach.mesh_files import read_triangles
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -25,13 +25,13 @@ _COARSER = 1.25  # each next grid by so much, until no more triangles are left
 _APART = 0.1, 1e-3  # [mm], [rad] by which axes of the URDF and of the arm may differ
 
 
-def meshes(arm: Arm, path: str) -> dict[str, Any]:
+def meshes_json(arm: Arm, path: str) -> dict[str, Any]:
     """What a page draws: `unit` [mm], and of each body (0 the base) its triangles' corners as whole units.
 
     They are nine little-endian 16-bit numbers a triangle, in base64, in the frame after the body's joint (the base's:
     of targets); "" where a body has no mesh. Raises UsageError for the URDF of another arm, or a file that is no mesh.
     """
-    bodies = _bodies(arm, path)
+    bodies = _body_triangles(arm, path)
     unit = arm.reach / _GRID
     while True:
         coarse = [_on_grid(body, unit) for body in bodies]
@@ -51,11 +51,11 @@ def _on_grid(body: Array, unit: float) -> Array:
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     corners = corners[np.cross(b - a, c - a).any(axis=1)].reshape(-1, 9)
     corners = corners[np.lexsort(corners.T[::-1])]  # `np.unique` of rows takes longer where many are alike
-    new = np.append(True, (corners[1:] != corners[:-1]).any(axis=1))[: len(corners)]
-    return np.asarray(corners[new])
+    is_first = np.append(True, (corners[1:] != corners[:-1]).any(axis=1))[: len(corners)]
+    return np.asarray(corners[is_first])
 
 
-def _bodies(arm: Arm, path: str) -> list[Array]:
+def _body_triangles(arm: Arm, path: str) -> list[Array]:
     """The triangles (N, 3, 3) of each body, in its frame [mm]."""
     raw = urdf_reader.load(path)
     if len(raw) > urdf_reader.MAX_BYTES:
@@ -64,9 +64,9 @@ def _bodies(arm: Arm, path: str) -> list[Array]:
         )
     _, tree = document(raw, path)
     first = tree.base(None)
-    after = _frames(arm)
-    chain = _chain(arm, tree, first, after)
-    found: list[list[Array]] = [[np.zeros((0, 3, 3))] for _ in range(arm.n + 1)]
+    after = _joint_frames(arm)
+    chain = _matching_joints(arm, tree, first, after)
+    triangles_of: list[list[Array]] = [[np.zeros((0, 3, 3))] for _ in range(arm.n + 1)]
     stack = [(first, np.eye(4), 0)]
     files = 0
     while stack:
@@ -76,27 +76,27 @@ def _bodies(arm: Arm, path: str) -> list[Array]:
             if files > _FILES:
                 raise UsageError(f"{path}: more than {_FILES} meshes")
             if "mesh" in visual:
-                corners = _corners(path, link, visual) @ T[:3, :3].T + T[:3, 3]
+                corners = _mesh_triangles(path, link, visual) @ T[:3, :3].T + T[:3, 3]
                 way = arm.base if body == 0 else inverse(after[body - 1]) @ arm.base
-                found[body].append(corners * urdf_reader.METRE @ way[:3, :3].T + way[:3, 3])
+                triangles_of[body].append(corners * urdf_reader.METRE @ way[:3, :3].T + way[:3, 3])
         for joint in tree.children[link]:
             child = str(joint.text("child", "link"))
             stack.append(
                 (child, T @ urdf_reader.origin(joint, path), chain.index(joint) + 1 if joint in chain else body)
             )
-    return [np.concatenate(parts) for parts in found]
+    return [np.concatenate(parts) for parts in triangles_of]
 
 
-def _frames(arm: Arm) -> list[Array]:
+def _joint_frames(arm: Arm) -> list[Array]:
     """The frame after each joint at joint values 0."""
-    out, T = [], np.eye(4)
+    frames, T = [], np.eye(4)
     for link in arm.link[:-1]:
         T = T @ link
-        out.append(T)
-    return out
+        frames.append(T)
+    return frames
 
 
-def _chain(arm: Arm, tree: Tree, first: str, after: list[Array]) -> list[Joint]:
+def _matching_joints(arm: Arm, tree: Tree, first: str, after: list[Array]) -> list[Joint]:
     """The moving joints of the URDF that are the arm's: those with its axes at joint values 0."""
     worst = ""
     for leaf in tree.leaves(first):
@@ -109,10 +109,14 @@ def _chain(arm: Arm, tree: Tree, first: str, after: list[Array]) -> list[Joint]:
             worst = worst or f"it has {len(axes)} moving joints on the way to {leaf}, the arm {arm.n}"
             continue
         for k, (joint, z, p) in enumerate(axes[: arm.n]):
-            own = inverse(arm.base) @ after[k]
-            off = p - own[:3, 3]
-            away = 0.0 if arm.prismatic[k] else float(np.linalg.norm(off - (off @ own[:3, 2]) * own[:3, 2]))
-            if away > _APART[0] or np.linalg.norm(z - own[:3, 2]) > _APART[1]:
+            joint_frame = inverse(arm.base) @ after[k]
+            offset = p - joint_frame[:3, 3]
+            away = (
+                0.0
+                if arm.prismatic[k]
+                else float(np.linalg.norm(offset - (offset @ joint_frame[:3, 2]) * joint_frame[:3, 2]))
+            )
+            if away > _APART[0] or np.linalg.norm(z - joint_frame[:3, 2]) > _APART[1]:
                 worst = f"at joint values 0 the axis of its joint {joint.name} is not that of {arm.joint_names[k]}"
                 break
         else:
@@ -120,28 +124,28 @@ def _chain(arm: Arm, tree: Tree, first: str, after: list[Array]) -> list[Joint]:
     raise UsageError(f"{tree.name}: is not the URDF of {arm.name}: {worst}")
 
 
-def _corners(path: str, link: str, visual: dict[str, dict[str, str]]) -> Array:
+def _mesh_triangles(path: str, link: str, visual: dict[str, dict[str, str]]) -> Array:
     """A mesh's triangles in its link's frame [m]."""
-    where = f"{path}: visual of {link}"
+    context = f"{path}: visual of {link}"
     name = visual["mesh"].get("filename", "")
-    scale = urdf_reader.triple(visual["mesh"].get("scale"), (1.0, 1.0, 1.0), f"{where}: mesh scale")
-    T = urdf_reader.origin_pose(visual.get("origin", {}), where)
-    return np.asarray(triangles(_file(path, name, where)) * scale @ T[:3, :3].T + T[:3, 3])
+    scale = urdf_reader.triple(visual["mesh"].get("scale"), (1.0, 1.0, 1.0), f"{context}: mesh scale")
+    T = urdf_reader.origin_pose(visual.get("origin", {}), context)
+    return np.asarray(read_triangles(_mesh_path(path, name, context)) * scale @ T[:3, :3].T + T[:3, 3])
 
 
-def _file(path: str, name: str, context: str) -> Path:
+def _mesh_path(path: str, name: str, context: str) -> Path:
     """The local file that a URDF names: beside it, or package://NAME/..., in a folder NAME above it."""
-    scheme, colon, rest = name.partition("://")
+    scheme, colon, address = name.partition("://")
     if Path(name).suffix.lower() not in (".stl", ".dae"):
         raise UsageError(f"{context}: mesh {name[:80] or 'without a filename'} is neither .stl nor .dae")
     folder = Path(path).resolve().parent
     if not colon:
         return folder / name
     if scheme == "file":
-        return Path(rest)
+        return Path(address)
     if scheme != "package":
         raise UsageError(f"{context}: mesh {name[:80]} is no local file: package://, file:// or a path beside the URDF")
-    package, _, inside = rest.partition("/")
+    package, _, inside = address.partition("/")
     for above in [folder, *folder.parents]:
         for place in (above / package / inside, above / inside):
             if place.is_file():

@@ -119,7 +119,7 @@ class Backend(ABC):
         """A trajectory that starts at counts (motors,), refused if the board is too slow for it."""
 
     @abstractmethod
-    def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> object:
+    def run(self, plans: Iterable[Any], progress: Progress = lambda elapsed, total: None) -> object:
         """Carry out plans, one after another; None in between: nothing to do yet."""
 
     @abstractmethod

@@ -31,19 +31,19 @@ def arm_with_assumptions(arm: Arm) -> tuple[Arm, list[str]]:
     >>> arm_with_assumptions(armkin.load("puma560"))[1][1]
     'max_speed of q1, q2, q3, q4, q5, q6: 30 deg/s'
     """
-    said = []
+    assumptions = []
     if bare := undriven(arm):
-        arm = _driven(arm, bare)
-        said.append(f"motors of {', '.join(bare)}: steppers of 200 full steps, 16 microsteps, gear {_GEAR:g}")
+        arm = _with_steppers(arm, bare)
+        assumptions.append(f"motors of {', '.join(bare)}: steppers of 200 full steps, 16 microsteps, gear {_GEAR:g}")
         if any(arm.prismatic[arm.joint_names.index(name)] for name in bare):
-            said[-1] += f" (slides: {_LEAD:g} mm a turn)"
+            assumptions[-1] += f" (slides: {_LEAD:g} mm a turn)"
     arm, rates_said = with_rates(arm)
-    return arm, said + rates_said
+    return arm, assumptions + rates_said
 
 
 def with_rates(arm: Arm) -> tuple[Arm, list[str]]:
     """The arm with a max_speed and a max_accel where it has none, and in words which: for plans that move nothing."""
-    said = []
+    assumptions = []
     for key, names in missing_rates(arm).items():
         values = getattr(arm, key).copy()
         for name in names:
@@ -55,12 +55,12 @@ def with_rates(arm: Arm) -> tuple[Arm, list[str]]:
         per = "s" if key == "max_speed" else "s2"
         for group, value, unit in ((turning, _RATES[key][0], "deg"), (sliding, _RATES[key][1], "mm")):
             if group:
-                said.append(f"{key} of {', '.join(group)}: {value:g} {unit}/{per}")
+                assumptions.append(f"{key} of {', '.join(group)}: {value:g} {unit}/{per}")
         arm = replace(arm, **{key: values})
-    return arm, said
+    return arm, assumptions
 
 
-def _driven(arm: Arm, joints: list[str]) -> Arm:
+def _with_steppers(arm: Arm, joints: list[str]) -> Arm:
     """The arm with a stepper for each of these joints."""
     motors, gain = list(arm.motors), [*arm.motor_gain]
     for name in joints:

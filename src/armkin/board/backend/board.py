@@ -215,8 +215,8 @@ class Board(ABC):
         while left > 0 and (goes_on is None or goes_on()):
             piece = left if goes_on is None else min(JOG_PIECE, left)
             counts = self.machine.counts()
-            here = legal_with_same_pulses(arm, self.machine.joints())
-            goal = jog_goal(arm, here, joint, rate * piece, refuse=left == seconds)
+            standing = legal_with_same_pulses(arm, self.machine.joints())
+            goal = jog_goal(arm, standing, joint, rate * piece, refuse=left == seconds)
             way = straight_move(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
             if not way.duration:
                 return  # at its limit, or before a keep-out
@@ -267,10 +267,10 @@ class Board(ABC):
         """Where the gripper is to go: open, closed, or a value between them. Raises UsageError for others."""
         gripper = self.gripper()
         low, high = sorted((gripper.open, gripper.closed))
-        wanted = {"open": gripper.open, "closed": gripper.closed}[value] if isinstance(value, str) else value
-        if not low <= wanted <= high:
-            raise UsageError(f"grip: {wanted:g} is outside of the gripper's {low:g} to {high:g}")
-        return wanted
+        target = {"open": gripper.open, "closed": gripper.closed}[value] if isinstance(value, str) else value
+        if not low <= target <= high:
+            raise UsageError(f"grip: {target:g} is outside of the gripper's {low:g} to {high:g}")
+        return target
 
     def grip_known(self) -> bool:
         """Whether the gripper may be moved without somebody's word for where it stands."""

@@ -42,53 +42,55 @@ def missing_by_command(arm: Arm) -> dict[str, list[str]]:
 
 def missing_for_motion(arm: Arm, *, board: bool = True) -> list[str]:
     """What the robot file lacks before the arm can be moved, in words; board: on a board, not in simulation."""
-    return [words for words, _ in lacks(arm, board=board)]
+    return [words for words, _ in find_lacks(arm, board=board)]
 
 
 def lines_to_add(arm: Arm) -> list[str]:
     """Lines for the robot file of an arm that shall move on a board."""
-    return [line for _, added in lacks(arm) for line in added]
+    return [line for _, added in find_lacks(arm) for line in added]
 
 
-def lacks(arm: Arm, *, board: bool = True) -> list[Lack]:
+def find_lacks(arm: Arm, *, board: bool = True) -> list[Lack]:
     """What the robot file lacks before the arm can be moved; board: on a board, not in simulation."""
     return _without_rates(arm, board) + (without_board(arm) if board else [])
 
 
 def _without_rates(arm: Arm, board: bool) -> list[Lack]:
     """Missing drives and rates: what a plan needs."""
-    found: list[Lack] = []
+    lacks_found: list[Lack] = []
     try:
         joints_per_pulse(arm)  # raises if a joint has no motor
     except UsageError as error:
         still = undriven(arm)
-        found.append((_lack_text(arm, still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), []))
+        lacks_found.append(
+            (_lack_text(arm, still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), [])
+        )
     absent = missing_rates(arm)
-    found += [(_lack_text(arm, names, key), []) for key, names in absent.items()]
+    lacks_found += [(_lack_text(arm, names, key), []) for key, names in absent.items()]
     if absent:
-        found[-1] = (found[-1][0], rate_lines(arm))
-    return found
+        lacks_found[-1] = (lacks_found[-1][0], rate_lines(arm))
+    return lacks_found
 
 
 def _drive_lines(arm: Arm, joints: list[str], board: bool) -> list[str]:
     """A stepper for each joint without a motor; board: with an axis of its own."""
-    axes = list(_axes(arm)) if board else []
+    axes = list(_axis_names(arm)) if board else []
     taken = {motor.axis for motor in arm.motors}
     free = iter([axis for axis in axes if axis not in taken])
     groups: dict[str, list[str]] = {}
     for name in joints:
         lead = ", lead: 8" if arm.prismatic[arm.joint_names.index(name)] else ""
         axis = next(free, None)
-        at = "" if axis is None else f"axis: {axis}, "
-        groups.setdefault(f"drive: {{{at}full_steps: 200, microsteps: 16{lead}}}", []).append(name)
+        axis_key = "" if axis is None else f"axis: {axis}, "
+        groups.setdefault(f"drive: {{{axis_key}full_steps: 200, microsteps: 16{lead}}}", []).append(name)
     return [f"{drive}   # for example; {_to_joints(names)}" for drive, names in groups.items()]
 
 
-def _axes(arm: Arm) -> tuple[str, ...]:
+def _axis_names(arm: Arm) -> tuple[str, ...]:
     """Names of the stepper axes of the arm's board, or of the one that `without_board` proposes."""
     kind = _board_for(arm) if arm.board is None else arm.board.kind
-    other = board_catalogue.foreign_board(kind)
-    return BOARDS[kind].steppers if other is None else other.axes
+    foreign = board_catalogue.foreign_board(kind)
+    return BOARDS[kind].steppers if foreign is None else foreign.axes
 
 
 def _board_for(arm: Arm) -> str:
@@ -121,21 +123,21 @@ def _without_foreign_axes(arm: Arm, foreign: ForeignBoard) -> list[Lack]:
 
 def _without_driver(arm: Arm, settings: Board) -> list[Lack]:
     """Missing axes and the missing driver of a board with our firmware."""
-    found: list[Lack] = []
+    lacks_found: list[Lack] = []
     board = BOARDS[settings.kind]
     driven: list[tuple[str, Drive]] = [(f"motor {motor.name}", motor) for motor in arm.motors]
     driven += [] if arm.gripper is None else [("the gripper", arm.gripper)]
-    for what, motor in driven:
+    for owner, motor in driven:
         if motor.axis is None:
             free = board.servos if motor.kind == "servo" else board.steppers
-            add = f"axis: {(*free, '?')[0]}   # into the drive of {what} ({', '.join(free)})"
-            found.append((f"{what} has no axis", [add]))
+            add = f"axis: {(*free, '?')[0]}   # into the drive of {owner} ({', '.join(free)})"
+            lacks_found.append((f"{owner} has no axis", [add]))
     if settings.driver is None and any(motor.kind == "stepper" for _, motor in driven):
         why = "its board has no driver: it sets the pulse timing"
         keys = {**settings.model_dump(exclude_none=True), "driver": _DRIVER}
         line = f"board: {{{', '.join(f'{key}: {value}' for key, value in keys.items())}}}"
-        found.append((why, [f"{line}   # for example, in place of board:; drivers: {', '.join(DRIVERS)}"]))
-    return found
+        lacks_found.append((why, [f"{line}   # for example, in place of board:; drivers: {', '.join(DRIVERS)}"]))
+    return lacks_found
 
 
 def _without_drives(arm: Arm) -> list[str]:

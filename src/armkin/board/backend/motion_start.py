@@ -56,15 +56,15 @@ def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
     if np.abs(first - start).max(initial=0) > (len(arm.motor_gain) > arm.n):
         raise StartError(f"a plan that begins at {first.tolist()} counts was made for an arm at {list(start)}")
     check_free(trajectory)
-    out = beyond(arm, trajectory.start)
-    if not out.any():
+    excess = excess_over_limits(arm, trajectory.start)
+    if not excess.any():
         return
     for stretch in trajectory.stretches:
         times = [stretch.duration] if isinstance(stretch, Straight) else np.linspace(0.0, stretch.duration, _SAMPLES)
         reached = stretch.evaluate(np.asarray(times, dtype=float))
-        farther = beyond(arm, reached).max(axis=0) > out + SLACK
+        farther = excess_over_limits(arm, reached).max(axis=0) > excess + SLACK
         if farther.any():
-            raise _farther(arm, int(farther.argmax()), trajectory.start)
+            raise _farther_out_error(arm, int(farther.argmax()), trajectory.start)
 
 
 def jog_goal(arm: Arm, standing: Array, joint: int, change: float, *, refuse: bool) -> Array:
@@ -85,11 +85,11 @@ def jog_goal(arm: Arm, standing: Array, joint: int, change: float, *, refuse: bo
 
 def check_jog(arm: Arm, q: Array, joint: int, rate: float) -> None:
     """Raise NoSolutionError if a joint that stands outside its limits, arm at q (n,), is to move farther out."""
-    if beyond(arm, q)[joint] > 0 and (q[joint] > arm.upper[joint]) == (rate > 0):
-        raise _farther(arm, joint, q)
+    if excess_over_limits(arm, q)[joint] > 0 and (q[joint] > arm.upper[joint]) == (rate > 0):
+        raise _farther_out_error(arm, joint, q)
 
 
-def _farther(arm: Arm, joint: int, q: Array) -> NoSolutionError:
+def _farther_out_error(arm: Arm, joint: int, q: Array) -> NoSolutionError:
     value = float(q[joint])
     return NoSolutionError(
         f"{outside_text(arm, joint, value)}, where the arm stands, and this takes it farther out: nothing was moved",
@@ -98,7 +98,7 @@ def _farther(arm: Arm, joint: int, q: Array) -> NoSolutionError:
     )
 
 
-def beyond(arm: Arm, q: Array) -> Array:
+def excess_over_limits(arm: Arm, q: Array) -> Array:
     """How far joints are outside their limits: (..., n) [rad | mm]; 0 inside, and for half a step outside."""
     values = legal_with_same_pulses(arm, q)
     return np.abs(values - np.clip(values, arm.lower, arm.upper))
@@ -106,10 +106,10 @@ def beyond(arm: Arm, q: Array) -> Array:
 
 def is_believable(arm: Arm, counts: Sequence[int]) -> bool:
     """Whether an arm may stand at counts: no joint more than a turn (a slide: its travel) outside its limits."""
-    return unbelievable(arm, counts) is None
+    return why_impossible(arm, counts) is None
 
 
-def unbelievable(arm: Arm, counts: Sequence[int]) -> str | None:
+def why_impossible(arm: Arm, counts: Sequence[int]) -> str | None:
     """Why an arm cannot stand at counts, in words; None: it can."""
     try:
         q = joints(arm, counts)
@@ -130,12 +130,14 @@ def from_counts(
     tolerance: [counts] of a kind that measures where it stands, and does so before each plan. None in between:
     nothing to do yet. Raises StartError for a plan that begins elsewhere.
     """
-    at: NDArray[np.int64] | None = None
+    standing: NDArray[np.int64] | None = None
     for plan in plans:
         if plan is not None:
-            here = np.asarray(counts() if at is None or tolerance is not None else at, dtype=np.int64)
-            if np.abs(plan.start - here).max(initial=0) > (tolerance or 0):
-                raise StartError(f"a plan begins at {plan.start.tolist()} counts, the arm stands at {here.tolist()}")
-            at = plan.end
+            expected = np.asarray(counts() if standing is None or tolerance is not None else standing, dtype=np.int64)
+            if np.abs(plan.start - expected).max(initial=0) > (tolerance or 0):
+                raise StartError(
+                    f"a plan begins at {plan.start.tolist()} counts, the arm stands at {expected.tolist()}"
+                )
+            standing = plan.end
             LOG.info("motion from %s to %s in %.3f s", plan.start.tolist(), plan.end.tolist(), plan.duration)
         yield plan

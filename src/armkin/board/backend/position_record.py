@@ -48,12 +48,12 @@ class Record:
     def __init__(self, port: Port, arm: Arm) -> None:
         self._path = None if port.simulated else record_path(port.name)
         self._arm = arm
-        self.note = None if self._path is None else _read(self._path)
+        self.note = None if self._path is None else _read_record(self._path)
 
     def write_position(self, marks: Marks, counts: Sequence[int], offset: Sequence[int]) -> None:
         """The arm stands there, by armkin's own doing or somebody's word."""
-        kept = {name: value if isinstance(value, str) else list(value) for name, value in marks.items()}
-        self._write(BoardNote(_digest(self._arm), kept, list(map(int, offset)), list(map(int, counts))))
+        plain_marks = {name: value if isinstance(value, str) else list(value) for name, value in marks.items()}
+        self._write(BoardNote(_arm_digest(self._arm), plain_marks, list(map(int, offset)), list(map(int, counts))))
 
     def write_motion(self, job: Job, piece: float) -> None:
         """A motion begins, of which curves are sent in pieces of so many seconds."""
@@ -73,32 +73,32 @@ class Record:
         left = self.note
         if left is None:
             return "nobody has told armkin on this computer where it stands"
-        if left.arm != _digest(self._arm) or len(left.offset) != len(self._arm.motor_gain):
+        if left.arm != _arm_digest(self._arm) or len(left.offset) != len(self._arm.motor_gain):
             return "the robot file's drives or home pose are others than when it was told"
         for name in sorted({*marks, *left.marks}):
-            found, was = _comparable(marks.get(name)), _comparable(left.marks.get(name))
-            if found != was:
-                return f"{name} is {_value_text(found)}, and armkin left {_value_text(was)}: {why}"
+            value, value_left = _comparable_value(marks.get(name)), _comparable_value(left.marks.get(name))
+            if value != value_left:
+                return f"{name} is {_value_text(value)}, and armkin left {_value_text(value_left)}: {why}"
         return None
 
     def moved_text(self, counts: Sequence[int]) -> str | None:
         """How the arm stands elsewhere than armkin left it, in words; None: it does not."""
         left = self.note
         assert left is not None
-        at = np.asarray(counts, dtype=np.int64)
-        if at.tolist() == left.counts or (left.plan is not None and is_on_path(left.plan, at)):
+        standing = np.asarray(counts, dtype=np.int64)
+        if standing.tolist() == left.counts or (left.plan is not None and is_on_path(left.plan, standing)):
             return None
-        where = (
+        place_left = (
             f"at {left.counts}" if left.plan is None else f"on a motion from {left.counts} to {left.plan[-1].tolist()}"
         )
-        return f"it stands at {at.tolist()} steps, and armkin left it {where}: another program has moved it"
+        return f"it stands at {standing.tolist()} steps, and armkin left it {place_left}: another program has moved it"
 
     def _write(self, note: BoardNote) -> None:
         self.note = note
         if self._path is not None:
-            plan = None if note.plan is None else _packed(note.plan)
-            told = {"arm": note.arm, "marks": note.marks, "offset": note.offset, "counts": note.counts, "plan": plan}
-            write_note(self._path, told)
+            plan = None if note.plan is None else _pack_plan(note.plan)
+            record = {"arm": note.arm, "marks": note.marks, "offset": note.offset, "counts": note.counts, "plan": plan}
+            write_note(self._path, record)
 
 
 def path_corners(job: Job, piece: float) -> NDArray[np.int64]:
@@ -119,19 +119,21 @@ def is_on_path(points: NDArray[np.int64], counts: NDArray[np.int64]) -> bool:
     """
     if len(points) == 1:
         return bool(np.abs(counts - points[0]).max(initial=0) <= _STEP)
-    line, off = np.diff(points, axis=0), counts - points[:-1]
+    line, offset = np.diff(points, axis=0), counts - points[:-1]
     with np.errstate(divide="ignore"):
-        ends = np.stack([(off - _STEP) / line, (off + _STEP) / line])  # shares of the line at which a motor is near
+        ends = np.stack(
+            [(offset - _STEP) / line, (offset + _STEP) / line]
+        )  # shares of the line at which a motor is near
     first, last = ends.min(axis=0).max(axis=1, initial=0.0), ends.max(axis=0).min(axis=1, initial=1.0)
     return bool((first <= last).any())
 
 
-def _digest(arm: Arm) -> str:
+def _arm_digest(arm: Arm) -> str:
     parts = arm.motor_gain, arm.home, arm.motor_bias
     return hashlib.sha256(repr([np.round(part, 9).tolist() for part in parts]).encode()).hexdigest()[:16]
 
 
-def _comparable(value: Sequence[float] | str | None) -> list[float] | str | None:
+def _comparable_value(value: Sequence[float] | str | None) -> list[float] | str | None:
     return value if value is None or isinstance(value, str) else [x + 0.0 for x in value]
 
 
@@ -141,33 +143,33 @@ def _value_text(value: list[float] | str | None) -> str:
     return value if isinstance(value, str) else " ".join(f"{x:.10g}" for x in value)
 
 
-def _packed(plan: NDArray[np.int64]) -> str:
+def _pack_plan(plan: NDArray[np.int64]) -> str:
     rows = np.diff(plan, axis=0, prepend=np.zeros_like(plan[:1])).astype("<i8")
     return base64.b64encode(zlib.compress(rows.tobytes())).decode()
 
 
-def _unpacked(text: str, motors: int) -> NDArray[np.int64]:
-    data = zlib.decompressobj().decompress(base64.b64decode(text), _MOST)
-    rows = np.frombuffer(data, dtype="<i8").reshape(-1, motors)
+def _unpack_plan(text: str, motors: int) -> NDArray[np.int64]:
+    raw = zlib.decompressobj().decompress(base64.b64decode(text), _MOST)
+    rows = np.frombuffer(raw, dtype="<i8").reshape(-1, motors)
     if not len(rows):
         raise ValueError(text)
     return np.cumsum(rows, axis=0).astype(np.int64)
 
 
-def _read(path: str) -> BoardNote | None:
+def _read_record(path: str) -> BoardNote | None:
     """What a record says, if it is one."""
-    told = read_note(path, _MOST)
-    if told is None:
+    record = read_note(path, _MOST)
+    if record is None:
         return None
     try:
-        offset, counts, plan = told["offset"], told["counts"], told["plan"]
+        offset, counts, plan = record["offset"], record["counts"], record["plan"]
         if not all(type(x) is int for x in (*offset, *counts)) or len(offset) != len(counts):
             return None
         marks: dict[str, Any] = {
             name: value if isinstance(value, str) else [float(x) for x in value]
-            for name, value in told["marks"].items()
+            for name, value in record["marks"].items()
         }
-        rows = None if plan is None else _unpacked(plan, len(counts))
-        return BoardNote(str(told["arm"]), marks, offset, counts, rows)
+        rows = None if plan is None else _unpack_plan(plan, len(counts))
+        return BoardNote(str(record["arm"]), marks, offset, counts, rows)
     except (ValueError, KeyError, TypeError, AttributeError, zlib.error):
         return None

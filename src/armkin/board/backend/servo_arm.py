@@ -44,19 +44,19 @@ def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
 
 def servo_ids(arm: Arm) -> list[int]:
     """Numbers of the arm's servos on their bus, in the motors' order. Raises UsageError for other motors."""
-    where = arm.path or arm.name
+    robot_file = arm.path or arm.name
     motors = arm.motors
     if not motors:
-        raise UsageError(f"{where}: no joint has a drive")
+        raise UsageError(f"{robot_file}: no joint has a drive")
     for motor, name in zip(motors, motor_names(arm), strict=True):
         if motor.kind != "bus" or motor.id is None:
             raise UsageError(
-                f"{where}: motor {name} is a {motor.kind}; a servo bus needs drive: {{kind: bus, id: ...}}"
+                f"{robot_file}: motor {name} is a {motor.kind}; a servo bus needs drive: {{kind: bus, id: ...}}"
             )
     ids = [motor.id for motor in motors if motor.id is not None]
     for number in ids:
         if ids.count(number) > 1:
-            raise UsageError(f"{where}: two servos have id {number}; every servo of a bus has its own")
+            raise UsageError(f"{robot_file}: two servos have id {number}; every servo of a bus has its own")
     return ids
 
 
@@ -165,11 +165,11 @@ class ServoArm(Backend):
         self._check_limits(made)
         return made
 
-    def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> None:
+    def run(self, plans: Iterable[Any], progress: Progress = lambda elapsed, total: None) -> None:
         """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
-        total = done = 0.0
-        for one in filter(None, plans if isinstance(plans, list) else ()):
-            self._check_limits(one)  # all of them, before anything moves
+        total = elapsed = 0.0
+        for ahead_job in filter(None, plans if isinstance(plans, list) else ()):
+            self._check_limits(ahead_job)  # all of them, before anything moves
         for job in from_counts(plans, self._measured, tolerance=STRAY):
             if job is None:
                 self._heed()
@@ -177,10 +177,10 @@ class ServoArm(Backend):
                 continue
             self._check_limits(job)
             total += job.duration
-            self._follow(job.trajectory, partial(_report_progress, progress, done, total))
+            self._follow(job.trajectory, partial(_report_progress, progress, elapsed, total))
             self._arrive(job.end)
-            done = total
-            progress(done, total)
+            elapsed = total
+            progress(elapsed, total)
 
     def hold(self) -> None:
         """Stay where the arm stands."""
@@ -207,20 +207,20 @@ class ServoArm(Backend):
         watched, t, pace, stopping = begin, 0.0, 1.0, False
         ramp = max(braking_time(trajectory), PERIOD)
         while t < trajectory.duration and pace > 0.0:
-            now = self.port.now()
-            if now - last < PERIOD - 1e-4:
-                self.port.read(PERIOD - (now - last))
+            present = self.port.now()
+            if present - last < PERIOD - 1e-4:
+                self.port.read(PERIOD - (present - last))
                 continue
             stopping = stopping or self._stop()
-            passed, last = min(now - last, LATE), now
+            passed, last = min(present - last, LATE), present
             if stopping:
                 pace = max(0.0, pace - passed / ramp)
             t = min(trajectory.duration, t + passed * pace)
             ahead = min(trajectory.duration, t + PERIOD * pace)
             self._send(pulses(self.arm, trajectory.q(ahead)), np.abs(self.arm.motor_gain @ trajectory.qd(ahead)))
             report(t)
-            if now - watched > WATCH:
-                watched = now
+            if present - watched > WATCH:
+                watched = present
                 self._watch(pulses(self.arm, trajectory.q(t)))
         if stopping:
             self.hold()
@@ -234,27 +234,27 @@ class ServoArm(Backend):
             self.port.read(PERIOD)
             self._read()
             self._check()
-            off = np.abs(self._counts - end)
-            if off.max() <= SETTLED:
+            distance = np.abs(self._counts - end)
+            if distance.max() <= SETTLED:
                 return
             if self.port.now() > limit:
-                k = int(off.argmax())
+                k = int(distance.argmax())
                 self.hold()
                 raise LinkError(
-                    f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) stands {off[k]} counts from its goal: is it "
-                    f"blocked or overloaded?\n{self.standing_text()}"
+                    f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) stands {distance[k]} counts from its goal: is "
+                    f"it blocked or overloaded?\n{self.standing_text()}"
                 )
             self._heed()
 
     def _watch(self, expected: NDArray[np.int64]) -> None:
         """Hold the arm if a servo reports an error or falls far behind."""
         self._read()
-        off = np.abs(self._counts - expected)
-        if off.max() > LAG:
-            k = int(off.argmax())
+        lag = np.abs(self._counts - expected)
+        if lag.max() > LAG:
+            k = int(lag.argmax())
             self.hold()
             raise LinkError(
-                f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) is {off[k]} counts behind: blocked or overloaded?\n"
+                f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) is {lag[k]} counts behind: blocked or overloaded?\n"
                 f"{self.standing_text()}"
             )
         self._check()
@@ -262,9 +262,9 @@ class ServoArm(Backend):
     def _check(self) -> None:
         """Raise LinkError for a servo that reports an error."""
         for number, name in zip(self.ids, motor_names(self.arm), strict=True):
-            if found := self._faults(number):
+            if faults := self._faults(number):
                 raise LinkError(
-                    f"servo {number} ({name}) reports {', '.join(found)}: switch the power off, find the cause\n"
+                    f"servo {number} ({name}) reports {', '.join(faults)}: switch the power off, find the cause\n"
                     f"{self.standing_text()}"
                 )
 
@@ -300,5 +300,5 @@ class ServoArm(Backend):
         """What a servo says of itself, by its last state: load_percent, voltage, temperature."""
 
 
-def _report_progress(progress: Progress, done: float, total: float, t: float) -> None:
-    progress(done + t, total)
+def _report_progress(progress: Progress, elapsed: float, total: float, t: float) -> None:
+    progress(elapsed + t, total)

@@ -30,18 +30,18 @@ def steppers(arm: Arm, called: str, letters: Iterable[str]) -> Iterator[tuple[in
 
     Raises UsageError, naming the motor, for one that is no stepper, or has no axis of its own.
     """
-    where = arm.path or arm.name
+    file = arm.path or arm.name
     if not arm.motors:
-        raise UsageError(f"{where}: no joint has a drive")
+        raise UsageError(f"{file}: no joint has a drive")
     speed = np.nan_to_num(np.abs(arm.motor_gain) @ np.nan_to_num(arm.max_speed), posinf=0.0)  # all joints at once
     accel = np.nan_to_num(motor_accel(arm), posinf=0.0)
     free = list(letters)
     for k, (motor, name) in enumerate(zip(arm.motors, motor_names(arm), strict=True)):
         if motor.kind != "stepper":
-            raise UsageError(f"{where}: motor {name} is a {motor.kind}; {called} drives steppers alone")
+            raise UsageError(f"{file}: motor {name} is a {motor.kind}; {called} drives steppers alone")
         if motor.axis not in free:
             raise UsageError(
-                f"{where}: motor {name} is on axis {motor.axis}; {called} has {', '.join(letters)}, one motor on each"
+                f"{file}: motor {name} is on axis {motor.axis}; {called} has {', '.join(letters)}, one motor on each"
             )
         free.remove(motor.axis)
         steps = motor.pulses_per_unit()
@@ -73,7 +73,7 @@ class StepperArm(Backend):
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
-        return {"settings": [str(one) for one in self.wrong()], "lost_because": self.loss_reason or None}
+        return {"settings": [str(difference) for difference in self.wrong()], "lost_because": self.loss_reason or None}
 
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
@@ -93,39 +93,39 @@ class StepperArm(Backend):
         self.vouch(pulses(self.arm, self.arm.home if assume is None else assume).tolist())
         return True
 
-    def run(self, plans: Iterable[Any], progress: Progress = lambda done, total: None) -> None:
+    def run(self, plans: Iterable[Any], progress: Progress = lambda elapsed, total: None) -> None:
         """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
-        total = done = 0.0
-        seen = False  # where the arm stands was read just now
+        total = elapsed = 0.0
+        was_read = False  # where the arm stands was read just now
         for job in from_counts(plans, self.counts):
             if job is None:
                 if self._stop():
                     self.hold()
                     raise StoppedError
                 self.port.read(0.01)
-                seen = False
+                was_read = False
                 continue
-            self._begin(job, position_read=seen)
+            self._begin(job, position_read=was_read)
             total += job.duration
 
-            def tell(t: float, done: float = done, total: float = total) -> None:
-                progress(min(done + t, total), total)
+            def tell(t: float, elapsed: float = elapsed, total: float = total) -> None:
+                progress(min(elapsed + t, total), total)
 
             try:
-                whole = self._carry_out(job, tell)
+                is_complete = self._carry_out(job, tell)
             except LinkError as error:
                 raise self._explain(error) from None
-            if not whole:
+            if not is_complete:
                 self.hold()
                 raise StoppedError
             if self.loss_reason or self.counts() != tuple(job.end.tolist()):
                 cause = (
                     "" if self.loss_reason else ": a line was damaged on its way, or another program has moved the arm"
                 )
-                where = f"the arm stands at {list(self.counts())} steps, the plan ends at {job.end.tolist()}"
-                raise LinkError(f"{where}{cause}\n{self.standing_text()}")
-            done, seen = total, True
-            progress(done, total)
+                mismatch = f"the arm stands at {list(self.counts())} steps, the plan ends at {job.end.tolist()}"
+                raise LinkError(f"{mismatch}{cause}\n{self.standing_text()}")
+            elapsed, was_read = total, True
+            progress(elapsed, total)
 
     def _begin(self, job: Job, *, position_read: bool) -> None:
         """Make sure that the arm stands where a job starts, and record the motion."""

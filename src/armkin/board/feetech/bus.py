@@ -35,7 +35,9 @@ class Bus:
 
     def read(self, servo: int, register: Register) -> int:
         """A register of one servo. Raises LinkError if it does not answer."""
-        answer = self._sure(packet.read(servo, register.address, register.size), [servo], register.size)
+        answer = self._require_answers(
+            packet.read_registers(servo, register.address, register.size), [servo], register.size
+        )
         return register.unpack(answer[servo], register.address)
 
     def write(self, servo: int, register: Register, value: int) -> None:
@@ -44,18 +46,18 @@ class Bus:
         Raises LinkError if the servo does not answer or keeps another value.
         """
         for _ in range(_TRIES):
-            self._ask(packet.write(servo, register.address, register.pack(value)), [servo], 0, tries=1)
+            self._ask(packet.write_registers(servo, register.address, register.pack(value)), [servo], 0, tries=1)
             if self.read(servo, register) == value:
                 return
         raise LinkError(f"servo {servo} on {self.port.name} does not take {value} for register {register.address}")
 
     def read_all(self, servos: Sequence[int], address: int, size: int) -> dict[int, bytes]:
         """The same registers of several servos, asked together; those that stay silent again one by one."""
-        found = self._ask(packet.sync_read(servos, address, size), servos, size, tries=2)
+        answers = self._ask(packet.sync_read(servos, address, size), servos, size, tries=2)
         for servo in servos:
-            if servo not in found:
-                found |= self._sure(packet.read(servo, address, size), [servo], size)
-        return found
+            if servo not in answers:
+                answers |= self._require_answers(packet.read_registers(servo, address, size), [servo], size)
+        return answers
 
     def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
         """Write the same registers of several servos at one moment; nobody acknowledges it."""
@@ -70,18 +72,18 @@ class Bus:
         for servo in servos:
             self.write(servo, TORQUE, int(on))
 
-    def _sure(self, question: bytes, servos: Sequence[int], size: int) -> dict[int, bytes]:
-        found = self._ask(question, servos, size, tries=_TRIES)
-        missing = [servo for servo in servos if servo not in found]
+    def _require_answers(self, question: bytes, servos: Sequence[int], size: int) -> dict[int, bytes]:
+        answers = self._ask(question, servos, size, tries=_TRIES)
+        missing = [servo for servo in servos if servo not in answers]
         if missing:
             raise LinkError(
                 f"servo {missing[0]} on {self.port.name} does not answer: is its cable plugged in, is the bus powered?"
             )
-        return found
+        return answers
 
     def _ask(self, question: bytes, servos: Sequence[int], size: int, *, tries: int) -> dict[int, bytes]:
         """Answers by servo; size: bytes that a whole one has."""
-        found: dict[int, bytes] = {}
+        answers: dict[int, bytes] = {}
         for attempt in range(tries):
             self.repeats += attempt > 0
             self._splitter.clear()
@@ -89,14 +91,14 @@ class Bus:
                 pass  # late answers to an earlier question
             self.port.write(question)
             end = self.port.now() + (_ANSWER + 0.002 * len(servos)) * (1 + attempt // 2)  # a busy computer is late
-            while len(found) < len(servos) and self.port.now() < end:
+            while len(answers) < len(servos) and self.port.now() < end:
                 for answer in self._splitter.feed(self.port.read(0.002)):
-                    self._take(answer, servos, size, found)
-            if len(found) == len(servos):
+                    self._take_answer(answer, servos, size, answers)
+            if len(answers) == len(servos):
                 break
-        return found
+        return answers
 
-    def _take(self, answer: Reply, servos: Sequence[int], size: int, data: dict[int, bytes]) -> None:
+    def _take_answer(self, answer: Reply, servos: Sequence[int], size: int, answers: dict[int, bytes]) -> None:
         if answer.id in servos and len(answer.data) == size:
             self.errors[answer.id] = answer.errors
-            data[answer.id] = answer.data
+            answers[answer.id] = answer.data

@@ -40,26 +40,29 @@ class ServoMachine(ServoArm):
 
     def _faults(self, number: int) -> list[str]:
         """What a servo says is wrong with it, by its last answer."""
-        return registers.errors(self.bus.errors.get(number, 0))
+        return registers.error_names(self.bus.errors.get(number, 0))
 
     def _servo_report(self, number: int) -> dict[str, Any]:
         """What a servo says of itself, by its last state."""
         state = self._states[number]
         return {
-            "load_percent": self._value(registers.LOAD, state) / 10,
-            "voltage": self._value(registers.VOLTAGE, state) / 10,
-            "temperature": self._value(registers.TEMPERATURE, state),
+            "load_percent": self._state_value(registers.LOAD, state) / 10,
+            "voltage": self._state_value(registers.VOLTAGE, state) / 10,
+            "temperature": self._state_value(registers.TEMPERATURE, state),
         }
 
     def _own_limits(self) -> NDArray[np.int64]:
         """The servos' own limits, which whoever set them up has written into them: (motors, 2) [counts]."""
-        found = self.bus.read_all(self.ids, *registers.LIMITS)
-        pairs = [[self._limit(registers.LEAST, found[n]), self._limit(registers.MOST, found[n])] for n in self.ids]
+        limit_bytes = self.bus.read_all(self.ids, *registers.LIMITS)
+        pairs = [
+            [self._limit_value(registers.LEAST, limit_bytes[n]), self._limit_value(registers.MOST, limit_bytes[n])]
+            for n in self.ids
+        ]
         return np.array([pair if any(pair) else [-_ENDLESS, _ENDLESS] for pair in pairs], dtype=np.int64)
 
     @staticmethod
-    def _limit(register: registers.Register, data: bytes) -> int:
-        return register.unpack(data, registers.LIMITS[0])
+    def _limit_value(register: registers.Register, raw: bytes) -> int:
+        return register.unpack(raw, registers.LIMITS[0])
 
     def _send(self, counts: NDArray[np.int64], rates: Array) -> None:
         """Goal positions for all servos at one moment, with the speed that reaches them; 0: as fast as it can."""
@@ -79,9 +82,9 @@ class ServoMachine(ServoArm):
     def _read(self) -> None:
         self._states = self.bus.states(self.ids)
         self._counts = np.array(
-            [self._value(registers.POSITION, self._states[number]) for number in self.ids], dtype=np.int64
+            [self._state_value(registers.POSITION, self._states[number]) for number in self.ids], dtype=np.int64
         )
 
     @staticmethod
-    def _value(register: registers.Register, state: bytes) -> int:
+    def _state_value(register: registers.Register, state: bytes) -> int:
         return register.unpack(state, registers.STATE[0])

@@ -66,44 +66,44 @@ class ServoCalibration:
     def check(self, machine: ServoMachine) -> None:
         """Raise LinkError, naming the motor, if the register 31 of a servo is not the file's homing_offset."""
         for motor in (*self.motors, *([self.gripper] if self.gripper is not None else [])):
-            found = machine.bus.read(motor.id, registers.OFFSET)
-            if found != motor.homing_offset:
+            offset = machine.bus.read(motor.id, registers.OFFSET)
+            if offset != motor.homing_offset:
                 raise LinkError(
-                    f"servo {motor.id} ({motor.name}): its homing offset (register 31) is {found}, the file says "
+                    f"servo {motor.id} ({motor.name}): its homing offset (register 31) is {offset}, the file says "
                     f"{motor.homing_offset}: the file is another arm's, or the servo was calibrated again since"
                 )
 
 
-def read(path: str) -> dict[int, Motor]:
+def read_calibration(path: str) -> dict[int, Motor]:
     """The motors of a calibration file, by their ids. Raises FileError, naming the motor, for what is none."""
     try:
         with open(path, encoding="utf-8") as file:
             text = file.read(_LONGEST + 1)
-        told = json.loads(text) if len(text) <= _LONGEST else None
+        entries = json.loads(text) if len(text) <= _LONGEST else None
     except OSError as error:
         raise FileError(f"{path}: {error.strerror or error}", file=path) from None
     except (ValueError, RecursionError):
-        told = None
-    if not isinstance(told, dict) or not told:
+        entries = None
+    if not isinstance(entries, dict) or not entries:
         raise FileError(f"{path} is no calibration file of LeRobot: a JSON object of motors by their names", file=path)
-    found: dict[int, Motor] = {}
-    for name, values in told.items():
+    motors: dict[int, Motor] = {}
+    for name, values in entries.items():
         motor = Motor(name, **{key: _whole_number(path, name, values, key) for key in _WHOLE})
-        if motor.id in found:
-            raise FileError(f"{path}: {found[motor.id].name} and {name} have the same id {motor.id}", file=path)
+        if motor.id in motors:
+            raise FileError(f"{path}: {motors[motor.id].name} and {name} have the same id {motor.id}", file=path)
         if motor.range_min >= motor.range_max:
             ends = f"{motor.range_min} to {motor.range_max}"
             raise FileError(f"{path}: {name}: range_min to range_max is {ends}: calibrate it again", file=path)
-        found[motor.id] = motor
-    return found
+        motors[motor.id] = motor
+    return motors
 
 
 def _whole_number(path: str, name: str, values: Any, key: str) -> int:
     value = values.get(key) if isinstance(values, Mapping) else None
     low, high = _WHOLE[key]
     if type(value) is not int or not low <= value <= high:
-        said = "is missing" if value is None else f"is {str(value)[:40]}"
-        raise FileError(f"{path}: {name}: {key} {said}: a whole number from {low} to {high}", file=path)
+        complaint = "is missing" if value is None else f"is {str(value)[:40]}"
+        raise FileError(f"{path}: {name}: {key} {complaint}: a whole number from {low} to {high}", file=path)
     return value
 
 
@@ -113,25 +113,25 @@ def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibrati
     pose: (n,) [rad] where the middles of all ranges are; None: every joint's value is 0 there. Raises FileError for
     what is no calibration file; UsageError, naming the joint, where it does not fit the arm.
     """
-    there = read(path)
+    calibrated = read_calibration(path)
     middle = np.zeros(arm.n) if pose is None else pose
     motors, zero, limits, edits = list[Motor](), list[float](), list[tuple[float, float]](), Edits()
     for drive, gain in zip(arm.motors, arm.motor_gain, strict=True):
         j = int(np.flatnonzero(gain)[0])
         name = arm.joint_names[j]
-        motor = _calibrated_motor(there, drive.id, name, path, drive.counts)
+        motor = _calibrated_motor(calibrated, drive.id, name, path, drive.counts)
         if pose is None:
             _check_middle(arm, j)
         per = drive.pulses_per_unit() * (-1 if motor.drive_mode else 1)  # [counts/deg]
-        at = motor.middle - per * float(middle[j]) / DEGREE
-        low, high = sorted((count - at) / per for count in (motor.range_min, motor.range_max))
+        zero_count = motor.middle - per * float(middle[j]) / DEGREE
+        low, high = sorted((count - zero_count) / per for count in (motor.range_min, motor.range_max))
         motors.append(motor)
-        zero.append(at)
+        zero.append(zero_count)
         limits.append((low, high))
         edits["joints", j, "limits"] = f"[{low:.6f}, {high:.6f}]"
-        edits["joints", j, "drive", "zero"] = _int_if_whole(at)
+        edits["joints", j, "drive", "zero"] = _int_if_whole(zero_count)
         edits["joints", j, "drive", "invert"] = "true" if motor.drive_mode else "false"
-    jaw, ends = _gripper(arm, there, path, edits)
+    jaw, ends = _gripper_calibration(arm, calibrated, path, edits)
     return ServoCalibration(tuple(motors), tuple(zero), tuple(limits), jaw, ends, edits)
 
 
@@ -144,7 +144,7 @@ def _calibrated_motor(
     motor = motors[number]
     if counts != registers.COUNTS:
         raise UsageError(f"{path}: joint {name} has {counts} counts a turn; LeRobot's files are for {registers.COUNTS}")
-    if motor.name != name and name in (other.name for other in motors.values()):
+    if motor.name != name and name in (listed.name for listed in motors.values()):
         raise UsageError(f"{path}: joint {name} is servo {number}, which is {motor.name} in the file")
     return motor
 
@@ -162,7 +162,7 @@ def _check_middle(arm: Arm, joint: int) -> None:
         )
 
 
-def _gripper(
+def _gripper_calibration(
     arm: Arm, motors: Mapping[int, Motor], path: str, edits: Edits
 ) -> tuple[Motor | None, tuple[float, float] | None]:
     """The gripper's motor and its ends, open and closed [deg]: LeRobot closes it at 0 %, range_min of drive_mode 0."""

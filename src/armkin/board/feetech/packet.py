@@ -46,14 +46,14 @@ def packet(servo: int, kind: int, parameters: bytes = b"") -> bytes:
     return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
 
 
-def read(servo: int, address: int, size: int) -> bytes:
+def read_registers(servo: int, address: int, size: int) -> bytes:
     """Ask one servo for registers."""
     return packet(servo, Instruction.READ, bytes([address, size]))
 
 
-def write(servo: int, address: int, data: bytes) -> bytes:
+def write_registers(servo: int, address: int, values: bytes) -> bytes:
     """Write registers of one servo, which acknowledges it."""
-    return packet(servo, Instruction.WRITE, bytes([address]) + data)
+    return packet(servo, Instruction.WRITE, bytes([address]) + values)
 
 
 def sync_read(servos: Sequence[int], address: int, size: int) -> bytes:
@@ -61,10 +61,10 @@ def sync_read(servos: Sequence[int], address: int, size: int) -> bytes:
     return packet(ALL, Instruction.SYNC_READ, bytes([address, size, *servos]))
 
 
-def sync_write(address: int, data: Mapping[int, bytes]) -> bytes:
+def sync_write(address: int, values_of: Mapping[int, bytes]) -> bytes:
     """Write the same registers of several servos at one moment; nobody acknowledges it."""
-    size = len(next(iter(data.values())))
-    rows = b"".join(bytes([servo]) + values for servo, values in data.items())
+    size = len(next(iter(values_of.values())))
+    rows = b"".join(bytes([servo]) + values for servo, values in values_of.items())
     return packet(ALL, Instruction.SYNC_WRITE, bytes([address, size]) + rows)
 
 
@@ -74,9 +74,9 @@ class Splitter:
     def __init__(self) -> None:
         self._bytes = bytearray()
 
-    def feed(self, data: bytes) -> Iterator[Reply]:
+    def feed(self, received: bytes) -> Iterator[Reply]:
         """Add bytes and yield every whole packet; of an instruction, `errors` is its number."""
-        self._bytes += data
+        self._bytes += received
         while (begin := self._bytes.find(b"\xff\xff")) >= 0:
             del self._bytes[:begin]
             if len(self._bytes) < 4:

@@ -24,9 +24,9 @@ class Register(NamedTuple):
             value = -value | 1 << self.sign
         return value.to_bytes(self.size, "little")
 
-    def unpack(self, data: bytes, base: int) -> int:
+    def unpack(self, raw: bytes, base: int) -> int:
         """The register's value in bytes that were read from address `base` on."""
-        value = int.from_bytes(data[self.address - base : self.address - base + self.size], "little")
+        value = int.from_bytes(raw[self.address - base : self.address - base + self.size], "little")
         if self.sign is not None and value >> self.sign & 1:
             return -(value & ~(1 << self.sign))
         return value
@@ -55,10 +55,10 @@ STATE = (POSITION.address, 8)  # position, speed, load, voltage, temperature: re
 ERRORS = {1: "voltage", 2: "angle sensor", 4: "overheating", 8: "overcurrent", 32: "overload"}
 
 
-def errors(bits: int) -> list[str]:
+def error_names(bits: int) -> list[str]:
     """Names of the error bits that a servo's answer carries.
 
-    >>> errors(36)
+    >>> error_names(36)
     ['overheating', 'overload']
     """
     return [name for bit, name in ERRORS.items() if bits & bit]

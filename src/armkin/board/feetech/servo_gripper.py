@@ -20,39 +20,39 @@ THERE = 0.1  # [s] or, that close to the goal, has arrived
 PERIOD = 0.02  # [s] between readings
 
 
-def grip(bus: Bus, gripper: Gripper, value: float, stop: Callable[[], bool]) -> float:
+def move_gripper(bus: Bus, gripper: Gripper, value: float, stop: Callable[[], bool]) -> float:
     """Move the gripper and return where it comes to rest, both in its drive's degrees.
 
     Raises LinkError if its servo does not answer, StoppedError (the jaw stays where it is) if `stop` says so.
     """
-    port, number, per = bus.port, _servo(bus, gripper), _per_unit(gripper)
+    port, number, per = bus.port, _servo_number(bus, gripper), _per_unit(gripper)
     goal = round(gripper.zero + per * value)
-    at = bus.read(number, registers.POSITION)
+    position = bus.read(number, registers.POSITION)
     if not bus.read(number, registers.TORQUE):
-        bus.write(number, registers.GOAL_POSITION, at)  # so that it does not jump to an old goal
+        bus.write(number, registers.GOAL_POSITION, position)  # so that it does not jump to an old goal
         bus.write(number, registers.TORQUE, 1)
     speed = abs(per) * gripper.max_speed if gripper.max_speed is not None else SPEED
     bus.write(number, registers.GOAL_SPEED, round(min(speed, 32767)))
     bus.write(number, registers.GOAL_POSITION, goal)
     since = port.now()
-    while at != goal and port.now() - since < (THERE if abs(at - goal) <= ARRIVED else STANDING):
+    while position != goal and port.now() - since < (THERE if abs(position - goal) <= ARRIVED else STANDING):
         port.read(PERIOD)
         if stop():
             bus.write(number, registers.GOAL_POSITION, bus.read(number, registers.POSITION))
             raise StoppedError
-        before, at = at, bus.read(number, registers.POSITION)
-        if at != before:
+        before, position = position, bus.read(number, registers.POSITION)
+        if position != before:
             since = port.now()
-    return (at - gripper.zero) / per
+    return (position - gripper.zero) / per
 
 
-def zero(bus: Bus, gripper: Gripper, value: float) -> tuple[int, int]:
+def gripper_zero(bus: Bus, gripper: Gripper, value: float) -> tuple[int, int]:
     """The gripper's count now, and its `zero` if it stands at a value of its drive's degrees."""
-    count = bus.read(_servo(bus, gripper), registers.POSITION)
+    count = bus.read(_servo_number(bus, gripper), registers.POSITION)
     return count, round(count - _per_unit(gripper) * value)
 
 
-def _servo(bus: Bus, gripper: Gripper) -> int:
+def _servo_number(bus: Bus, gripper: Gripper) -> int:
     if gripper.id is None or not bus.ping(gripper.id):
         raise LinkError(f"the gripper's servo {gripper.id} does not answer on {bus.port.name}")
     return gripper.id

@@ -8,7 +8,7 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING
 
 from armkin.board.firmware.segments.remaining_plan import left_of
-from armkin.board.firmware.streaming import LEAD_BAD, LEAD_MOST, batches, pieces, seconds_of, stream
+from armkin.board.firmware.streaming import LEAD_BAD, LEAD_MOST, motion_batches, ramp_pieces, seconds_of, stream_frames
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.motion_frame import Batch
 from armkin.board.firmware.wire.protocol import Error, Status
@@ -38,9 +38,9 @@ class _UnderWay:
         taken: frames that the board took; of moves before the last such frame's nothing is left.
         """
         self._moves.append((frames, seconds, plan, number))
-        self._forget(taken)
+        self._forget_finished(taken)
 
-    def _forget(self, taken: int) -> None:
+    def _forget_finished(self, taken: int) -> None:
         while len(self._moves) > 1 and self._moves[1][0] < taken:
             self._moves.popleft()
 
@@ -54,16 +54,16 @@ class _UnderWay:
         if not self._moves:
             return None
         began, status = session.port.now(), _at_rest(session)
-        self._forget(session.taken)
+        self._forget_finished(session.taken)
         frames, seconds, plan, number = self._moves[0]
         if not all(status.known >> axis & 1 for axis in axes) or (frames == 0 and not first):
             return None
         plans = [plan, *(plan for *_, plan, k in islice(self._moves, 1, None) if k == 0)]
-        found = left_of(plans, number, [status.counts[axis] for axis in axes], lay)
+        left = left_of(plans, number, [status.counts[axis] for axis in axes], lay)
         stood = session.deaf + session.port.now() - began
-        if found is None or found[1].seconds > _BEGINNING or stood > _STOOD:
+        if left is None or left[1].seconds > _BEGINNING or stood > _STOOD:
             return None
-        return found[0], seconds + found[1].elapsed
+        return left[0], seconds + left[1].elapsed
 
 
 def carry_out(
@@ -77,11 +77,11 @@ def carry_out(
     follows, with more time to fill the queue: unless the arm stood for so long that somebody may be near.
     """
     run = _Run(session, axes, progress)
-    least, todo = 0.0, iter(plans)
+    least, plans_left = 0.0, iter(plans)
     while True:
         session.attend()
         try:
-            return stream(session, run.frames(todo, least), run.report_progress), run.end
+            return stream_frames(session, run.frames(plans_left, least), run.report_progress), run.end
         except DeviceError as error:
             dry = error.error == Error.DRY
             left = run.under_way.remaining_plan(session, axes, lay, first=least < LEAD_MOST) if dry else None
@@ -91,7 +91,7 @@ def carry_out(
         run.begin_anew(left[1])
         # a line of which it is known by now is given a bad one's lead, then four times that, and then the longest
         least = min(max(LEAD_BAD, 4 * least), LEAD_MOST) if session.line.damaged else LEAD_MOST
-        todo = chain(left[0], todo)
+        plans_left = chain(left[0], plans_left)
 
 
 class _Run:
@@ -110,16 +110,16 @@ class _Run:
 
     def frames(self, plans: Iterable[Cut | None], least: float) -> Iterator[Batch | None]:
         """The frames of plans, None where there is no plan yet; least: [s] that the arm stands before its first."""
-        given = 0
+        frame_count = 0
         for plan in plans:
             if plan is None:
                 yield None
                 continue
             before, self._total = self._total, self._total + plan.duration
-            for k, move in enumerate(plan.moves(lambda: pieces(self._session))):
-                self.under_way.add(given, before, plan, k, self._session.taken)
-                for batch in batches(self._session, move, self._axes, plan.clock, least):
-                    given += 1
+            for k, move in enumerate(plan.moves(lambda: ramp_pieces(self._session))):
+                self.under_way.add(frame_count, before, plan, k, self._session.taken)
+                for batch in motion_batches(self._session, move, self._axes, plan.clock, least):
+                    frame_count += 1
                     self._begun += batch.seconds
                     yield batch
             self.end = plan.end
@@ -139,7 +139,7 @@ def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: in
     while (move := lay(count)) is not None:
         session.attend()
         try:
-            return stream(session, batches(session, move, (axis,), clock, least), lambda left: None)
+            return stream_frames(session, motion_batches(session, move, (axis,), clock, least), lambda left: None)
         except DeviceError as error:
             if error.error != Error.DRY or least:
                 raise

@@ -54,11 +54,11 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
     """
     _refuse_incomplete(arm, board=not rehearsal)
-    board, names = _board(arm, rehearsal=rehearsal)
+    board, names = _board_and_axes(arm, rehearsal=rehearsal)
     axes = tuple(board.axes.index(name) for name in names[:-1])
     grip = as_axis(board.axes.index(names[-1]), arm.gripper) if arm.gripper is not None else None
     images = [AxisImage() for _ in board.axes]
-    low, high = _limits(arm)
+    low, high = _count_limits(arm)
     home = pulses(arm, arm.home)
     rate, accel = np.abs(arm.motor_gain) @ arm.max_speed, motor_accel(arm)
     for k, (motor, axis) in enumerate(zip(arm.motors, axes, strict=True)):
@@ -71,16 +71,16 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
             low[k],
             high[k],
             int(home[k]),
-            _rate(board, rate[k]),
-            _accel(accel[k]),
+            _board_rate(board, rate[k]),
+            _board_accel(accel[k]),
         )
     if grip is not None and arm.gripper is not None:
         images[grip.axis] = _grip_image(board, arm.gripper, grip)
-    driver = _driver(arm)
+    driver = _pulse_timing(arm)
     image = Image(
         tuple(images),
-        _rows(arm, board, axes, low, high),
-        _guards(arm, board, axes),
+        _limit_rows(arm, board, axes, low, high),
+        _switch_guards(arm, board, axes),
         abort_closed=arm.board is not None and arm.board.abort == "closed",
         enable_high=arm.board is not None and arm.board.enable == "high",
         power_sensed=arm.board is not None and arm.board.power is not None,
@@ -88,12 +88,12 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
         step_low=driver.step_low,
         dir_setup=driver.dir_setup,
         wake=driver.wake,
-        meaning=_meaning(arm, grip),
+        meaning=_meaning_checksum(arm, grip),
     )
     return Configuration(board, image, axes, grip)
 
 
-def _board(arm: Arm, *, rehearsal: bool) -> tuple[Board, list[str]]:
+def _board_and_axes(arm: Arm, *, rehearsal: bool) -> tuple[Board, list[str]]:
     """The board, and the names of the axes of all motors and of the gripper; made up for a rehearsal without one."""
     if rehearsal and missing_keys.without_board(arm):
         return _rehearsal_board(arm), [*(motor.name for motor in arm.motors), "gripper"]
@@ -111,11 +111,11 @@ def _refuse_incomplete(arm: Arm, *, board: bool) -> None:
             robot_file=arm.path,
             lines_to_add=[line],
         )
-    if lacks := missing_keys.lacks(arm, board=board):
-        said = ", ".join(words for words, _ in lacks)
+    if lacks := missing_keys.find_lacks(arm, board=board):
+        summary = ", ".join(words for words, _ in lacks)
         lines = [line for _, added in lacks for line in added]
         raise UsageError(
-            "".join([f"{arm.name}: {said}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)]),
+            "".join([f"{arm.name}: {summary}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)]),
             robot_file=arm.path,
             lines_to_add=lines,
         )
@@ -132,7 +132,7 @@ def _rehearsal_board(arm: Arm) -> Board:
     return Board("sim", 0, tuple(steppers), tuple(servos), tuple(switches), 128, 240, 129)
 
 
-def _limits(arm: Arm) -> tuple[list[int], list[int]]:
+def _count_limits(arm: Arm) -> tuple[list[int], list[int]]:
     """Lowest and highest count of every motor that the joint limits allow."""
     ends: list[list[int]] = [[], []]
     for k, gain in enumerate(arm.motor_gain):
@@ -149,7 +149,7 @@ def _limits(arm: Arm) -> tuple[list[int], list[int]]:
     return low, high
 
 
-def _rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: list[int]) -> tuple[RowImage, ...]:
+def _limit_rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: list[int]) -> tuple[RowImage, ...]:
     """A row for every limited joint that does not have a motor of its own."""
     per_count = np.linalg.pinv(arm.motor_gain)  # (n, motors)
     per_count[np.abs(per_count) < 1e-12 * np.abs(per_count).max()] = 0.0
@@ -161,13 +161,13 @@ def _rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: l
             continue  # the axis limits say it
         if not (math.isfinite(arm.lower[j]) or math.isfinite(arm.upper[j])):
             continue
-        rows.append(_row(arm, board, axes, per_count[j], j, far))
+        rows.append(_limit_row(arm, board, axes, per_count[j], j, far))
     if len(rows) > board.rows:
         raise UsageError(f"{arm.name} has {len(rows)} coupled joints with limits; {board.kind} takes {board.rows}")
     return tuple(rows)
 
 
-def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int, widest: Array) -> RowImage:
+def _limit_row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int, widest: Array) -> RowImage:
     """Scaled to 16-bit weights, the bounds widened by what rounding weights and counts may do."""
     most = float(np.abs(per_count) @ widest)
     scale = min(32767 / float(np.abs(per_count).max()), (2**30 - 2**20) / most)
@@ -187,7 +187,7 @@ def _row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int
     return RowImage(bounds[0], bounds[1], tuple(weights))
 
 
-def _guards(arm: Arm, board: Board, axes: tuple[int, ...]) -> tuple[GuardImage, ...]:
+def _switch_guards(arm: Arm, board: Board, axes: tuple[int, ...]) -> tuple[GuardImage, ...]:
     """What every switch input of the board guards: the joint that it homes, in the switch's direction."""
     guards = [GuardImage() for _ in board.switches]
     per_count = np.linalg.pinv(arm.motor_gain)
@@ -197,19 +197,19 @@ def _guards(arm: Arm, board: Board, axes: tuple[int, ...]) -> tuple[GuardImage, 
         toward = per_count[j] * homing.direction
         toward[np.abs(toward) < 1e-12 * np.abs(toward).max()] = 0.0
         weights = [0] * len(board.axes)
-        for axis, w in zip(axes, _bytes(toward), strict=True):
+        for axis, w in zip(axes, _weight_bytes(toward), strict=True):
             weights[axis] = w
         guards[board.switches.index(homing.switch)] = GuardImage(homing.normally == "closed", tuple(weights))
     return tuple(guards)
 
 
-def _bytes(weights: Array) -> list[int]:
+def _weight_bytes(weights: Array) -> list[int]:
     """Weights as signed bytes: exact where they are small whole multiples of the least, else to 1/127."""
     least = np.abs(weights[weights != 0]).min()
-    whole = weights / least
-    if np.abs(whole).max() > 127 or np.abs(whole - np.rint(whole)).max() > 1e-9:
-        whole = weights * (127 / np.abs(weights).max())
-    return [int(w) for w in np.rint(whole)]
+    scaled = weights / least
+    if np.abs(scaled).max() > 127 or np.abs(scaled - np.rint(scaled)).max() > 1e-9:
+        scaled = weights * (127 / np.abs(weights).max())
+    return [int(w) for w in np.rint(scaled)]
 
 
 def _check_servo(name: str, low: int, high: int) -> None:
@@ -218,12 +218,12 @@ def _check_servo(name: str, low: int, high: int) -> None:
         raise UsageError(f"{name}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}")
 
 
-def _rate(board: Board, rate: float) -> int:
+def _board_rate(board: Board, rate: float) -> int:
     fastest = board.clock // board.min_interval
     return max(1, min(math.ceil(rate * _SLACK - 1e-9), fastest))
 
 
-def _accel(accel: float) -> int:
+def _board_accel(accel: float) -> int:
     return max(1, min(math.ceil(accel - 1e-9), 2**24 - 1))
 
 
@@ -234,16 +234,16 @@ def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:
     if gripper.kind == "servo":
         _check_servo("the gripper", low, high)
     invert = gripper.invert and gripper.kind == "stepper"
-    return AxisImage(True, invert, low, high, grip.open, _rate(board, grip.top), _accel(grip.accel))
+    return AxisImage(True, invert, low, high, grip.open, _board_rate(board, grip.top), _board_accel(grip.accel))
 
 
-def _driver(arm: Arm) -> Driver:
+def _pulse_timing(arm: Arm) -> Driver:
     """Pulse timing; without steppers, or on a made-up board, any will do."""
     name = None if arm.board is None else arm.board.driver
     return Driver(1, 1, 1, 1) if name is None else DRIVERS[name]
 
 
-def _meaning(arm: Arm, grip: Grip | None) -> int:
+def _meaning_checksum(arm: Arm, grip: Grip | None) -> int:
     """Checksum of what counts mean and the limits do not say: the step chains and the home pose."""
     exact: list[object] = [
         [[f"{value:.12g}" for value in row] for row in arm.motor_gain],

@@ -10,14 +10,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from armkin.board.backend import Backend, Position, Progress, StoppedError
-from armkin.board.backend.motion_start import from_counts, unbelievable
+from armkin.board.backend.motion_start import from_counts, why_impossible
 from armkin.board.firmware import resets_and_stops
 from armkin.board.firmware.board_status import as_json
 from armkin.board.firmware.carry_out_plans import carry_out, carry_out_axis
 from armkin.board.firmware.segments import trajectory_to_counts
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Flag, Status
-from armkin.board.firmware.wire.session import DeviceError, Session, probe
+from armkin.board.firmware.wire.session import DeviceError, Session, probe_line
 from armkin.board_catalogue import board_name
 from armkin.errors import LinkError, PositionKnownError
 from armkin.model.units import joints_out
@@ -70,7 +70,7 @@ class FirmwareMachine(Backend):
         mask = protocol.mask_of(self.configuration.axes)
         if not self.configured or self.status.known & mask != mask:
             return "lost"
-        if unbelievable(self.arm, self.counts()):
+        if why_impossible(self.arm, self.counts()):
             return "lost"
         return "retained" if self.status.flags & Flag.RETAINED else "known"
 
@@ -81,7 +81,7 @@ class FirmwareMachine(Backend):
             return ""
         if self.info.config and not self.configured:
             return "the board is configured for another arm, or the robot file has changed"
-        return unbelievable(self.arm, self.counts()) or "the board forgot it, or nobody has said where the arm stands"
+        return why_impossible(self.arm, self.counts()) or "the board forgot it, or nobody has said where the arm stands"
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, as last read."""
@@ -128,7 +128,7 @@ class FirmwareMachine(Backend):
             counts = pulses(self.arm, self.arm.home if assume is None else assume).tolist()
             self.vouch(dict(zip(self.configuration.axes, counts, strict=True)))
         self.enable(self.configuration.axes)
-        probe(self.session)
+        probe_line(self.session)
         return lost
 
     def configure(self) -> None:
@@ -136,9 +136,9 @@ class FirmwareMachine(Backend):
         image = self.configuration.image.pack()
         piece = self.info.frame - 8
         for offset in range(0, len(image), piece):
-            self._call(partial(protocol.config, offset=offset, data=image[offset : offset + piece]))
-        self._call(lambda tag: protocol.commit(tag, len(image), self.configuration.image.crc()))
-        self._renew()
+            self._call_board(partial(protocol.config, offset=offset, piece=image[offset : offset + piece]))
+        self._call_board(lambda tag: protocol.commit(tag, len(image), self.configuration.image.crc()))
+        self._renew_info()
 
     def enable(self, axes: Sequence[int]) -> None:
         """Switch on what these axes need, and what was on or has a position already."""
@@ -146,11 +146,11 @@ class FirmwareMachine(Backend):
         need = (protocol.mask_of(axes) | self.status.known) & protocol.mask_of(
             i for i, axis in enumerate(self.configuration.image.axes) if axis.used
         )
-        on = self.status.flags & (Flag.DRIVERS | Flag.SERVOS)
-        what = on | (Flag.DRIVERS if need & ~servos else 0) | (Flag.SERVOS if need & servos else 0)
-        if what != on:
-            self._call(lambda tag: protocol.enable(tag, int(what)))
-            self._renew()
+        switched_on = self.status.flags & (Flag.DRIVERS | Flag.SERVOS)
+        switches = switched_on | (Flag.DRIVERS if need & ~servos else 0) | (Flag.SERVOS if need & servos else 0)
+        if switches != switched_on:
+            self._call_board(lambda tag: protocol.enable(tag, int(switches)))
+            self._renew_info()
 
     def vouch(self, counts: dict[int, int]) -> None:
         """Take the operator's word for where lost axes stand: {axis: counts}."""
@@ -161,10 +161,10 @@ class FirmwareMachine(Backend):
                 "off and on to forget all"
             )
         if missing:
-            self._call(lambda tag: protocol.set_position(tag, missing))
-            self._renew()
+            self._call_board(lambda tag: protocol.set_position(tag, missing))
+            self._renew_info()
 
-    def _renew(self) -> None:
+    def _renew_info(self) -> None:
         """Read again what configuration, position or power have changed."""
         self.status = self.session.status()
         config = self.configuration.image.crc() if self.status.flags & Flag.CONFIGURED else 0
@@ -175,16 +175,18 @@ class FirmwareMachine(Backend):
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> trajectory_to_counts.Cut:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each, for the board that is there."""
         info = self.info
-        return trajectory_to_counts.plan(
+        return trajectory_to_counts.plan_moves(
             self.arm, start, targets, speed=speed, clock=info.clock, min_interval=info.min_interval
         )
 
     def lay(self, trajectory: Trajectory, start: Counts) -> trajectory_to_counts.Cut:
         """A trajectory that starts at counts (motors,), for the board that is there."""
-        return trajectory_to_counts.cut(trajectory, start, clock=self.info.clock, min_interval=self.info.min_interval)
+        return trajectory_to_counts.cut_trajectory(
+            trajectory, start, clock=self.info.clock, min_interval=self.info.min_interval
+        )
 
     def run(
-        self, plans: Iterable[trajectory_to_counts.Cut | None], progress: Progress = lambda done, total: None
+        self, plans: Iterable[trajectory_to_counts.Cut | None], progress: Progress = lambda elapsed, total: None
     ) -> Status:
         """Carry out plans, one after another; None in between: nothing to do yet.
 
@@ -198,9 +200,9 @@ class FirmwareMachine(Backend):
             self.status = stopped.status or self.status
             raise
         except DeviceError as error:
-            raise resets_and_stops.explain(self, error) from None
+            raise resets_and_stops.explain_error(self, error) from None
         if self.position() == "lost":
-            raise resets_and_stops.lost(self, "the board has lost the arm's position on the way")
+            raise resets_and_stops.position_lost_error(self, "the board has lost the arm's position on the way")
         self.in_time()
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
@@ -219,14 +221,14 @@ class FirmwareMachine(Backend):
         try:
             self.status = carry_out_axis(self.session, lay, axis, self.status.counts[axis], clock)
         except DeviceError as error:
-            raise resets_and_stops.explain(self, error) from None
+            raise resets_and_stops.explain_error(self, error) from None
         return self.status
 
     # Words
 
     def describe(self) -> str:
         """Where it stands, in words: ``q1 = 0, q2 = 90, q3 = -90 deg``."""
-        return describe(self.arm, self.joints())
+        return joints_text(self.arm, self.joints())
 
     def standing_text(self) -> str:
         """Where the arm has come to rest, and what that means for the next command."""
@@ -234,14 +236,14 @@ class FirmwareMachine(Backend):
             return "the arm's position is lost"
         return f"the arm stands at {self.describe()}, its position is known: the next command starts there"
 
-    def _call(self, make: Callable[[int], bytes]) -> None:
+    def _call_board(self, make: Callable[[int], bytes]) -> None:
         try:
             self.session.call(make)
         except DeviceError as error:
-            raise resets_and_stops.explain(self, error) from None
+            raise resets_and_stops.explain_error(self, error) from None
 
 
-def describe(arm: Arm, q: Array) -> str:
+def joints_text(arm: Arm, q: Array) -> str:
     """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90 deg``."""
     values = [f"{name} = {value:.4f}" for name, value in zip(arm.joint_names, joints_out(arm, q), strict=True)]
     words = "mm" if arm.prismatic.all() else "deg" if not arm.prismatic.any() else "(deg, mm)"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armkin.board.firmware.segments.straight_lines import line
+from armkin.board.firmware.segments.straight_lines import straight_line
 from armkin.errors import GripperKnownError, GripperLostError, LinkError, UsageError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def gripper_known(machine: FirmwareMachine, gripper: Grip) -> bool:
     return machine.configured and bool(machine.status.known >> gripper.axis & 1)
 
 
-def prepare(machine: FirmwareMachine, gripper: Grip, start: int | None) -> None:
+def prepare_gripper(machine: FirmwareMachine, gripper: Grip, start: int | None) -> None:
     """Have the gripper's axis configured, known and on; start: counts where a lost one is taken to stand."""
     is_known = gripper_known(machine, gripper)
     if is_known and start is not None:
@@ -60,16 +60,20 @@ def prepare(machine: FirmwareMachine, gripper: Grip, start: int | None) -> None:
     machine.enable((gripper.axis,))
 
 
-def grip(machine: FirmwareMachine, gripper: Grip, target: int) -> int:
+def move_gripper(machine: FirmwareMachine, gripper: Grip, target: int) -> int:
     """Move the gripper to counts; where it stands then."""
     assert gripper.top is not None
     assert gripper.accel is not None
     top, accel, board = gripper.top, gripper.accel, machine.configuration.board
 
-    def lay(at: int) -> Move | None:
-        far = abs(target - at)
+    def lay(position: int) -> Move | None:
+        far = abs(target - position)
         clock, least = board.clock, board.min_interval
-        return line([at], [target], top / far, accel / far, clock=clock, min_interval=least) if far else None
+        return (
+            straight_line([position], [target], top / far, accel / far, clock=clock, min_interval=least)
+            if far
+            else None
+        )
 
     if machine.status.counts[gripper.axis] != target:
         machine.run_axis(lay, gripper.axis, board.clock)

@@ -68,14 +68,14 @@ def searches(
     """
     for name in names:
         joint_index(arm, name)
-    wanted = [j for j, name in enumerate(arm.joint_names) if not names or name in names]
-    wanted = [j for group in _groups(arm, wanted) for j in group]
-    orders = _orders(arm, wanted, rest_at_home=rest_at_home)
+    chosen = [j for j, name in enumerate(arm.joint_names) if not names or name in names]
+    chosen = [j for group in _coupled_groups(arm, chosen) for j in group]
+    orders = _homing_orders(arm, chosen, rest_at_home=rest_at_home)
     in_order = sorted(orders, key=lambda j: (orders[j] is None, orders[j] or 0, j))
-    return [_search(arm, configuration, j) for j in in_order]
+    return [_search_of(arm, configuration, j) for j in in_order]
 
 
-def _orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
+def _homing_orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
     """Of the joints that have a homing: joint -> its order. Raises NoHomingError for others that are not left out."""
     orders = {j: homing.order for j in joints if (homing := arm.homing[j]) is not None}
     bare = [arm.joint_names[j] for j in joints if j not in orders]
@@ -90,7 +90,7 @@ def _orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int,
     return orders
 
 
-def home(
+def home_joints(
     machine: FirmwareMachine,
     names: Sequence[str] = (),
     announce: Callable[[str], None] = lambda name: None,
@@ -103,20 +103,22 @@ def home(
     homing: where they were known before, the result tells how far they were from where the switches are.
     """
     arm = machine.arm
-    todo = searches(arm, machine.configuration, names, rest_at_home=rest_at_home)
+    pending = searches(arm, machine.configuration, names, rest_at_home=rest_at_home)
     if not machine.configured:
         machine.configure()
     machine.enable(machine.configuration.axes)
     q = arm.home.copy()
     axes = list(machine.configuration.axes)
-    lost_before, found = lost_joints(machine), []
+    lost_before, lost_steps = lost_joints(machine), []
     per_count = np.linalg.pinv(arm.motor_gain)
-    turn = {search.joint: i for i, search in enumerate(todo)}
-    for group in sorted(_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
-        for search in (s for s in todo if s.joint in group):
+    turn = {search.joint: i for i, search in enumerate(pending)}
+    for group in sorted(_coupled_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
+        for search in (s for s in pending if s.joint in group):
             announce(arm.joint_names[search.joint])
             status, edge = _run_search(machine, search)
-            found.append(_lost(machine, search, edge, known=arm.joint_names[search.joint] not in lost_before))
+            lost_steps.append(
+                _lost_steps(machine, search, edge, was_known=arm.joint_names[search.joint] not in lost_before)
+            )
             beyond = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
             q[search.joint] = _switch_value(arm, search.joint) + per_count[search.joint] @ beyond
         motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))
@@ -124,13 +126,13 @@ def home(
     if rest_at_home:
         left = [k for k, axis in enumerate(axes) if not machine.status.known >> axis & 1]
         machine.vouch(dict(zip([axes[k] for k in left], pulses(arm, q)[left].tolist(), strict=True)))
-    return found
+    return lost_steps
 
 
-def _lost(machine: FirmwareMachine, search: Search, edge: Status, *, known: bool) -> LostSteps:
+def _lost_steps(machine: FirmwareMachine, search: Search, edge: Status, *, was_known: bool) -> LostSteps:
     """The counts at a switch's edge, against where the robot file says that it is."""
     arm, j = machine.arm, search.joint
-    if not known:
+    if not was_known:
         return LostSteps(arm.joint_names[j], None, None)
     counts = [edge.counts[axis] for axis in machine.configuration.axes]
     gain = arm.motor_gain[:, j]
@@ -150,18 +152,18 @@ def _run_search(machine: FirmwareMachine, search: Search) -> tuple[Status, Statu
         machine.in_time()
         return machine.status, session.status(page=1)
     except DeviceError as error:
-        raise resets_and_stops.explain(machine, error) from None
+        raise resets_and_stops.explain_error(machine, error) from None
 
 
 def lost_joints(machine: FirmwareMachine) -> list[str]:
     """Names of the joints that a motor of unknown position turns."""
-    arm, known = machine.arm, machine.status.known if machine.configured else 0
-    lost = [not known >> axis & 1 for axis in machine.configuration.axes]
+    arm, known_axes = machine.arm, machine.status.known if machine.configured else 0
+    lost = [not known_axes >> axis & 1 for axis in machine.configuration.axes]
     moved = np.abs(arm.motor_gain[lost]).sum(axis=0) > 0
     return [name for name, unknown in zip(arm.joint_names, moved, strict=True) if unknown]
 
 
-def switches(arm: Arm, configuration: Configuration) -> Callable[[int, Sequence[int]], bool]:
+def switch_levels(arm: Arm, configuration: Configuration) -> Callable[[int, Sequence[int]], bool]:
     """The limit inputs' levels of a simulated arm that was switched on in its home pose.
 
     The result takes the number of an input and the net steps of all axes since then.
@@ -185,7 +187,7 @@ def switches(arm: Arm, configuration: Configuration) -> Callable[[int, Sequence[
     return level
 
 
-def _groups(arm: Arm, joints: Sequence[int]) -> list[list[int]]:
+def _coupled_groups(arm: Arm, joints: Sequence[int]) -> list[list[int]]:
     """Joints that share motors home together: sets of joints, in file order."""
     left, groups = set(joints), []
     while left:
@@ -208,7 +210,7 @@ def _switch_value(arm: Arm, joint: int) -> float:
     return float(homing.at * scale(arm)[joint])
 
 
-def _search(arm: Arm, configuration: Configuration, j: int) -> Search:
+def _search_of(arm: Arm, configuration: Configuration, j: int) -> Search:
     name, unit, homing = arm.joint_names[j], float(scale(arm)[j]), arm.homing[j]
     assert homing is not None
     board = configuration.board

@@ -25,7 +25,7 @@ _LONGEST = 60.0  # [s] of a jog that is looked at
 SLOW = 8  # a lost position: at most an eighth of max_speed
 
 
-def prepare(machine: FirmwareMachine) -> None:
+def prepare_jog(machine: FirmwareMachine) -> None:
     """Have the motors configured and on; LinkError if the board knows the position of another arm."""
     if machine.session.port.simulated:
         machine.prepare()
@@ -42,7 +42,7 @@ def prepare(machine: FirmwareMachine) -> None:
     machine.enable(machine.configuration.axes)
 
 
-def rates(machine: FirmwareMachine, joint: int, speed: float) -> dict[int, int]:
+def count_rates(machine: FirmwareMachine, joint: int, speed: float) -> dict[int, int]:
     """Counts per second of a joint's motors, by axis; speed: [deg/s | mm/s], signed.
 
     Raises NoSolutionError if the joint would go farther outside its limits.
@@ -53,14 +53,14 @@ def rates(machine: FirmwareMachine, joint: int, speed: float) -> dict[int, int]:
     vector[joint] = speed
     exact = machine.arm.motor_gain @ units.joints_in(machine.arm, vector)
     # Towards zero: rounding must not exceed what the board allows.
-    found = {axis: int(value) for axis, value in zip(machine.configuration.axes, exact, strict=True)}
-    if not any(found.values()):
+    rate_of_axis = {axis: int(value) for axis, value in zip(machine.configuration.axes, exact, strict=True)}
+    if not any(rate_of_axis.values()):
         raise UsageError(f"SPEED: {speed:g} is less than one count a second")
-    return found
+    return rate_of_axis
 
 
 def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) -> float:
-    """How long a joint's motors may be told to jog at rates (see `rates`) so that it stands before it hits anything.
+    """How long a joint's motors may jog at rates (see `count_rates`) so that it stands before it hits anything.
 
     Whole counts a second turn the other joints of coupled motors a little, too. Raises NoSolutionError if it could not
     stand before. inf where nothing is in the way, or nobody knows.
@@ -69,10 +69,12 @@ def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) ->
     if not arm.keep_out or machine.position() == "lost":
         return math.inf
     q = machine.joints()
-    each = np.linalg.pinv(arm.motor_gain) @ [rates[axis] for axis in machine.configuration.axes]  # [rad/s | mm/s]
-    rate = float(each[joint])
+    joint_rates = np.linalg.pinv(arm.motor_gain) @ [
+        rates[axis] for axis in machine.configuration.axes
+    ]  # [rad/s | mm/s]
+    rate = float(joint_rates[joint])
     room = max(float((arm.lower, arm.upper)[rate > 0][joint] - q[joint]) / rate, 0.0)
-    goal = q + min(room, _LONGEST) * each
+    goal = q + min(room, _LONGEST) * joint_rates
     free, why = free_way(arm, q, goal)
     if why is None:
         return math.inf
@@ -83,7 +85,7 @@ def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) ->
     return seconds
 
 
-def jog(
+def jog_axes(
     machine: FirmwareMachine, rate: dict[int, int], seconds: float, goes_on: Callable[[], bool] = lambda: True
 ) -> None:
     """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.
@@ -105,6 +107,6 @@ def jog(
         for _ in session.arrivals():
             pass
     except DeviceError as error:
-        raise resets_and_stops.explain(machine, error) from None
+        raise resets_and_stops.explain_error(machine, error) from None
     machine.status = session.status()
     machine.in_time()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from armkin.board.backend.motion_start import unbelievable
+from armkin.board.backend.motion_start import why_impossible
 from armkin.board.firmware.board_status import WHY
 from armkin.board.firmware.wire.protocol import Error
 from armkin.errors import HeldError, LinkError, PositionLostError
@@ -51,7 +51,7 @@ class Machine(Protocol):
         """The same, and what it means for the next command."""
 
 
-def explain(machine: Machine, error: DeviceError) -> LinkError:
+def explain_error(machine: Machine, error: DeviceError) -> LinkError:
     """What the board's error means, and where the arm stands now."""
     why = WHY.get(error.error)
     if why is None:
@@ -67,7 +67,7 @@ def explain(machine: Machine, error: DeviceError) -> LinkError:
     except LinkError:
         return LinkError(f"{why}; then the board did not answer any more: armkin status tells where it stands")
     if machine.position() == "lost":
-        return lost(machine, f"{why}\n{machine.standing_text()}")
+        return position_lost_error(machine, f"{why}\n{machine.standing_text()}")
     return HeldError(
         f"{why}\nthe arm stands at {machine.describe()}, its position is known",
         advice="the next motion starts there",
@@ -77,16 +77,16 @@ def explain(machine: Machine, error: DeviceError) -> LinkError:
 
 def must_be_told(machine: Machine) -> PositionLostError:
     """A motion was asked for while the position is lost."""
-    what = "the arm's position is lost"
+    reason = "the arm's position is lost"
     if machine.info.config and not machine.configured:
         changed = f"{machine.arm.path} has changed"
-        what = f"the board is configured for another arm, or {changed}: its position is lost"
-    elif machine.configured and (far := unbelievable(machine.arm, machine.counts())):
-        what = f"{what}: {far}"
-    return lost(machine, what)
+        reason = f"the board is configured for another arm, or {changed}: its position is lost"
+    elif machine.configured and (far := why_impossible(machine.arm, machine.counts())):
+        reason = f"{reason}: {far}"
+    return position_lost_error(machine, reason)
 
 
-def lost(machine: Machine, message: str) -> PositionLostError:
+def position_lost_error(machine: Machine, message: str) -> PositionLostError:
     """The position is lost, and by what it is found again."""
     homing = all(machine.arm.homing)
     put = "put the arm in its home pose and prepare(assume=arm.home)"

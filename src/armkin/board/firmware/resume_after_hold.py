@@ -40,14 +40,14 @@ class Note:
     stands: list[int] | None = None  # counts where it came to rest; None: the sender ended before it was told
 
 
-def digest(parts: Sequence[Cut]) -> str:
+def plan_digest(parts: Sequence[Cut]) -> str:
     """A digest of a plan: its ends, its time and its way, to what a board can tell apart."""
-    found = hashlib.sha256()
+    hasher = hashlib.sha256()
     for part in parts:
         q = part.trajectory.q(np.linspace(0.0, part.duration, 33))
-        found.update(repr((part.start.tolist(), part.ends.tolist(), round(part.duration, 3))).encode())
-        found.update(np.rint(q * 1e4).astype(np.int64).tobytes())
-    return found.hexdigest()
+        hasher.update(repr((part.start.tolist(), part.ends.tolist(), round(part.duration, 3))).encode())
+        hasher.update(np.rint(q * 1e4).astype(np.int64).tobytes())
+    return hasher.hexdigest()
 
 
 class Trip:
@@ -62,7 +62,7 @@ class Trip:
         self._machine, self._file = machine, note_path(machine.port.name)
         self._keeps_note = not machine.port.simulated
         start = parts[0].start.tolist() if parts else list(machine.counts())
-        self._note, self._seconds_before = started or (Note(machine.arm.sha256, digest(parts), start, 0.0), 0.0)
+        self._note, self._seconds_before = started or (Note(machine.arm.sha256, plan_digest(parts), start, 0.0), 0.0)
         self._note = replace(self._note, seconds=self._seconds_before, stands=None)
 
     def __enter__(self) -> Self:
@@ -72,9 +72,9 @@ class Trip:
 
     def progress(self, seconds: float) -> None:
         """Note that so many seconds of what is left are done."""
-        done = self._seconds_before + seconds
-        if done - self._note.seconds >= _NOTED:
-            self._note = replace(self._note, seconds=done)
+        elapsed = self._seconds_before + seconds
+        if elapsed - self._note.seconds >= _NOTED:
+            self._note = replace(self._note, seconds=elapsed)
             if self._keeps_note:
                 write_note(self._file, asdict(self._note))
 
@@ -83,8 +83,8 @@ class Trip:
             return
         if isinstance(error, StoppedError) and error.status is not None:
             self._machine.status = error.status
-        known = self._machine.position() != "lost"
-        if kind is None or not known:
+        is_known = self._machine.position() != "lost"
+        if kind is None or not is_known:
             remove_note(self._file)
         elif isinstance(error, HeldError | StoppedError):
             write_note(self._file, asdict(replace(self._note, stands=list(self._machine.counts()))))
@@ -108,12 +108,12 @@ def under_way(
         yield left, 0 if place is None else place.part, trip.progress
 
 
-def recall(machine: FirmwareMachine) -> Note:
+def recall_note(machine: FirmwareMachine) -> Note:
     """The note of the motion that was held on this machine.
 
     Raises NothingHeldError if there is none, or it is of another robot file; LinkError if the arm has moved since.
     """
-    note = _read(note_path(machine.port.name))
+    note = _read_held_note(note_path(machine.port.name))
     if note is None or len(note.start) != len(machine.counts()):
         raise NothingHeldError(f"no motion was held on {machine.port.name}: there is nothing to go on with")
     if note.robot != machine.arm.sha256:
@@ -132,16 +132,16 @@ def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> Pl
 
     Raises NothingHeldError if it is another plan, LinkError if the arm does not stand on it.
     """
-    if digest(parts) != note.plan:
+    if plan_digest(parts) != note.plan:
         raise NothingHeldError("this is another motion than the one that was held")
-    found = list(places_on(parts, np.array(machine.counts())))
-    if not found:
+    places = list(places_on(parts, np.array(machine.counts())))
+    if not places:
         raise LinkError(
             f"the arm does not stand on the motion that was held: {machine.describe()}",
             advice="plan a new motion: it starts where the arm stands",
         )
-    nearest = min(abs(place.elapsed - note.seconds) for place in found)
-    return next(place for place in found if abs(place.elapsed - note.seconds) <= nearest + _SURE)
+    nearest = min(abs(place.elapsed - note.seconds) for place in places)
+    return next(place for place in places if abs(place.elapsed - note.seconds) <= nearest + _SURE)
 
 
 def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: Place) -> list[Cut]:
@@ -151,16 +151,16 @@ def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: Place
     return [machine.lay(left, counts), *parts[place.part + 1 :]]
 
 
-def _read(path: str) -> Note | None:
+def _read_held_note(path: str) -> Note | None:
     """The note, if there is one that this user wrote."""
-    told = read_note(path, _MOST)
-    if told is None:
+    fields = read_note(path, _MOST)
+    if fields is None:
         return None
     try:
-        start, stands = told["start"], told["stands"]
+        start, stands = fields["start"], fields["stands"]
         counts = [start] if stands is None else [start, stands]
         if not all(type(x) is int for row in counts for x in row) or len(counts[-1]) != len(start):
             return None
-        return Note(str(told["robot"]), str(told["plan"]), start, float(told["seconds"]), stands)
+        return Note(str(fields["robot"]), str(fields["plan"]), start, float(fields["seconds"]), stands)
     except (ValueError, KeyError, TypeError):
         return None

@@ -39,14 +39,14 @@ _BETWEEN = 2.2  # times that between ticks
 _ACK = 16  # [bytes] of an answer
 
 
-def stream(session: Session, frames: Iterator[Batch | None], report_left: Callable[[float], None]) -> Status:
+def stream_frames(session: Session, frames: Iterator[Batch | None], report_left: Callable[[float], None]) -> Status:
     """Send frames until there are no more and the arm stands; report_left: told the seconds of motion to come."""
     more, at_rest = True, False  # whether what was submitted ends at rest
     held: Batch | object | None = None  # the beginning of the next move
     while more or session.pending[0]:
         while more and session.pending[0] < 2:
             batch, held = (held or next(frames, _DONE)), None
-            if isinstance(batch, Batch) and at_rest and not _reaches(session, batch):
+            if isinstance(batch, Batch) and at_rest and not _may_follow_rest(session, batch):
                 held = batch
                 break
             if batch is _DONE:
@@ -74,29 +74,29 @@ def _status_at_rest(session: Session) -> Status:
 _DONE = object()
 
 
-def _reaches(session: Session, batch: Batch) -> bool:
+def _may_follow_rest(session: Session, batch: Batch) -> bool:
     """Whether the queue may go on behind a rest with the beginning of the next move.
 
     All the way down to the rest the queue holds just the time to a stop and what follows the rest: a short beginning
     behind a long ramp would pass for a queue that runs dry.
     """
     left = session.under_way + session.queued / 1000
-    return batch.at_rest or left <= 0 or left < _soonest(batch.seconds)
+    return batch.at_rest or left <= 0 or left < _earliest_follow(batch.seconds)
 
 
-def _soonest(seconds: float) -> float:
+def _earliest_follow(seconds: float) -> float:
     """Seconds before a rest, from when on a beginning of so many seconds may follow it in the queue."""
     return _MARGIN * (seconds - _SPARE)
 
 
-def pieces(session: Session) -> Pieces:
+def ramp_pieces(session: Session) -> Pieces:
     """How finely ramps are cut."""
     if session.line.noisy:
         return Pieces.ROUGH
-    return Pieces.FEW if _load(session) > 1 or session.line.slowest > _FAR else Pieces.FINE
+    return Pieces.FEW if _processor_load(session) > 1 or session.line.slowest > _FAR else Pieces.FINE
 
 
-def _load(session: Session) -> float:
+def _processor_load(session: Session) -> float:
     """Programs that want to run, for each processor: above 1 this one may have to wait for its turn."""
     if session.port.simulated or not hasattr(os, "getloadavg"):
         return 0.0
@@ -111,13 +111,15 @@ def _others_running() -> int:
         return 0
 
 
-def lead(session: Session, frames: Sequence[tuple[float, int, int]], least: float = 0.0, unheard: float = 0.0) -> float:
+def lead_time(
+    session: Session, frames: Sequence[tuple[float, int, int]], least: float = 0.0, unheard: float = 0.0
+) -> float:
     """Seconds that the arm stands before a motion, at least `least`, so that the queue does not run dry.
 
     frames: the first of the motion: seconds, segments and bytes on the line of each. unheard: [s] of them before
     the first step.
     """
-    busy = next((seconds for load, seconds in _LEAD_BUSY if _load(session) > load), 0.0)
+    busy = next((seconds for load, seconds in _LEAD_BUSY if _processor_load(session) > load), 0.0)
     bad = LEAD_BAD if session.line.damaged else 0.0
     return max(least, busy, bad, min(_LEAD + _lateness(session, frames, unheard), LEAD_MOST))
 
@@ -129,15 +131,15 @@ def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], un
     """
     bit = 10 / session.port.baud
     free = moves = 0.0  # free: when the line is; moves: when the arm does
-    there = list[float]()
+    queued = list[float]()
     for k, (_, segments, size) in enumerate(frames):
-        may = there[k - 2] + session.line.slowest + _ACK * bit if k > 1 else 0.0
+        may = queued[k - 2] + session.line.slowest + _ACK * bit if k > 1 else 0.0
         free = max(free, may) + size * bit
-        begins = max(free, there[-1] if there else 0.0)
+        begins = max(free, queued[-1] if queued else 0.0)
         ends = begins + _BUSY[0] + segments * _BUSY[1]
-        there.append(ends + (_BETWEEN - 1) * max(0.0, ends - max(begins, moves)) if k else ends)
+        queued.append(ends + (_BETWEEN - 1) * max(0.0, ends - max(begins, moves)) if k else ends)
         moves = moves or ends + _LEAD + unheard
-    return there
+    return queued
 
 
 def _lateness(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> float:
@@ -146,13 +148,13 @@ def _lateness(session: Session, frames: Sequence[tuple[float, int, int]], unhear
     The board's queue holds the time to a stop at any moment (section 7), which from rest is at most the time since then
     in which the arm would have speeded up evenly; a slow arm's need only not be empty.
     """
-    there, ahead = _queued_times(session, frames, unheard), unheard * (1 / UNHEARD - 1)
-    behind = done = 0.0  # done: [s] of motion in all before a frame
+    queued, ahead = _queued_times(session, frames, unheard), unheard * (1 / UNHEARD - 1)
+    behind = elapsed = 0.0  # done: [s] of motion in all before a frame
     for k, (seconds, _, _) in enumerate(frames):
         if k:
-            stops = (done - _SPARE - ahead * (_TWICE - 1)) / _TWICE
-            behind = max(behind, there[k] - there[0] - min(done, max(_SLOW - ahead, stops)))
-        done += seconds
+            stops = (elapsed - _SPARE - ahead * (_TWICE - 1)) / _TWICE
+            behind = max(behind, queued[k] - queued[0] - min(elapsed, max(_SLOW - ahead, stops)))
+        elapsed += seconds
     return behind
 
 
@@ -162,47 +164,49 @@ def _seconds_queued(session: Session) -> float:
     return session.under_way + max(0.0, queued)
 
 
-def batches(session: Session, move: Move, axes: Sequence[int], clock: int, least: float = 0.0) -> Iterator[Batch]:
-    """A move's segments in frames: as many as a good line takes, fewer on a bad one; least: see `lead`.
+def motion_batches(
+    session: Session, move: Move, axes: Sequence[int], clock: int, least: float = 0.0
+) -> Iterator[Batch]:
+    """A move's segments in frames: as many as a good line takes, fewer on a bad one; least: see `lead_time`.
 
     Two frames may be on their way: the second one fits what the board keeps while it is busy with the first.
     """
     assert session.info is not None
     line = session.line
     moving = sorted(move.moving, key=lambda k: axes[k])
-    at = [int(move.start[k]) for k in moving]
+    begin_counts = [int(move.start[k]) for k in moving]
     room = min(session.info.frame - 4, session.info.receive - QUESTION - 6)
-    places = [count * protocol.STEP + protocol.HALF for count in at]
+    places = [count * protocol.STEP + protocol.HALF for count in begin_counts]
     source = (s.for_axes(moving) for s in move.segments)
-    todo: list[Segment] = list(islice(source, _SEEN))
-    sizes = _insert_pause(session, todo, room, clock, least) if todo else []
+    segments: list[Segment] = list(islice(source, _SEEN))
+    sizes = _insert_pause(session, segments, room, clock, least) if segments else []
     begins = not sizes
-    while todo := todo + list(islice(source, max(0, _BATCH[1] + 1 - len(todo)))):
+    while segments := segments + list(islice(source, max(0, _BATCH[1] + 1 - len(segments)))):
         fits = _BATCH[1] if begins else max(_BATCH[0], session.pending[1])  # more would wait for room
         most = sizes.pop(0) if sizes else _BATCH[0] if line.noisy else min(fits, _BATCH[1])
         begins = False
-        n = _fit(todo, most, room)
-        part, todo = todo[:n], todo[n:]
-        if not todo:
-            todo = list(islice(source, 1))
+        n = _fitting_count(segments, most, room)
+        part, segments = segments[:n], segments[n:]
+        if not segments:
+            segments = list(islice(source, 1))
         places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
         end = [p // protocol.STEP for p in places]
-        yield Batch([axes[k] for k in moving], at, end, part, not todo, clock, move.brake)
-        at = end
+        yield Batch([axes[k] for k in moving], begin_counts, end, part, not segments, clock, move.brake)
+        begin_counts = end
 
 
-def _insert_pause(session: Session, todo: list[Segment], room: int, clock: int, least: float) -> list[int]:
+def _insert_pause(session: Session, segments: list[Segment], room: int, clock: int, least: float) -> list[int]:
     """Put the pause before a motion into its segments; how many of them its first frames have, none for no pause."""
-    pause, sizes = _start(session, todo, room, clock, least)
+    pause, sizes = _plan_start(session, segments, room, clock, least)
     # Behind a rest, for which it may wait until less is left there: the queue is filled while that lasts.
-    waits = _soonest(seconds_of(todo[: _fit(todo, _BATCH[1], room)], clock))
+    waits = _earliest_follow(seconds_of(segments[: _fitting_count(segments, _BATCH[1], room)], clock))
     if not session.line.damaged and min(_seconds_queued(session), waits) >= pause:
         return []
-    if longer := later(todo[0], pause, clock):
-        todo[0] = longer
+    if longer := delay_segment(segments[0], pause, clock):
+        segments[0] = longer
     else:
         ticks = math.ceil(pause * clock / _TICK)
-        todo.insert(0, Segment(ticks, math.ceil(pause * clock / ticks), 0, (0,) * len(todo[0].rates)))
+        segments.insert(0, Segment(ticks, math.ceil(pause * clock / ticks), 0, (0,) * len(segments[0].rates)))
         sizes[0] += 1
     return sizes
 
@@ -212,51 +216,53 @@ def seconds_of(segments: Sequence[Segment], clock: int) -> float:
     return sum(s.units() for s in segments) * 256 / clock
 
 
-def _fit(todo: Sequence[Segment], most: int, room: int) -> int:
+def _fitting_count(segments: Sequence[Segment], most: int, room: int) -> int:
     """How many of these segments go into the next frame: `most`, `room` bytes, and of one form behind a pause."""
     n = 1
     while (
-        n < min(most, len(todo))
-        and (todo[n].narrow == todo[0].narrow or not any(todo[0].rates))
-        and motion_size(len(todo[0].rates), todo[: n + 1]) <= room
+        n < min(most, len(segments))
+        and (segments[n].narrow == segments[0].narrow or not any(segments[0].rates))
+        and motion_size(len(segments[0].rates), segments[: n + 1]) <= room
     ):
         n += 1
     return n
 
 
-def _unheard(first: Segment) -> bool:
+def _is_unheard(first: Segment) -> bool:
     """Whether a motion's first segment makes no step: how long it lasts nobody can tell."""
     return first.add == 0 and not any(first.steps)
 
 
-def later(first: Segment, pause: float, clock: int) -> Segment | None:
+def delay_segment(first: Segment, pause: float, clock: int) -> Segment | None:
     """The first segment of a motion, `pause` seconds longer for one in front of it; None where that would be felt."""
     interval = first.interval + math.ceil(pause * clock / first.ticks)
     fits = interval <= _INTERVAL and first.ticks * interval < _UNHEARD_MOST * clock
-    return replace(first, interval=interval) if fits and _unheard(first) else None
+    return replace(first, interval=interval) if fits and _is_unheard(first) else None
 
 
-def _start(session: Session, todo: Sequence[Segment], room: int, clock: int, least: float) -> tuple[float, list[int]]:
+def _plan_start(
+    session: Session, segments: Sequence[Segment], room: int, clock: int, least: float
+) -> tuple[float, list[int]]:
     """How long the arm stands before a motion from rest, and the segments of its first frames: it begins soonest so."""
     ways = list[tuple[float, float, list[int]]]()
-    unheard = seconds_of(todo[:1], clock) if _unheard(todo[0]) else 0.0
+    unheard = seconds_of(segments[:1], clock) if _is_unheard(segments[0]) else 0.0
     for sizes in [(_BATCH[0] - 1,)] if session.line.noisy else _STARTING:
-        frames = _first_frames(todo, sizes, room, clock, paused=not unheard)
-        pause = lead(session, frames, least, unheard)
+        frames = _first_frames(segments, sizes, room, clock, paused=not unheard)
+        pause = lead_time(session, frames, least, unheard)
         ways.append((_queued_times(session, frames, unheard)[0] + pause, pause, list(sizes)))
     return min(ways)[1:]
 
 
 def _first_frames(
-    todo: Sequence[Segment], sizes: Sequence[int], room: int, clock: int, *, paused: bool
+    segments: Sequence[Segment], sizes: Sequence[int], room: int, clock: int, *, paused: bool
 ) -> list[tuple[float, int, int]]:
     """The first frames of a motion from rest, behind a pause or not: seconds, segments and bytes of each."""
-    frames, at = list[tuple[float, int, int]](), 0
-    while at < len(todo):
+    frames, first = list[tuple[float, int, int]](), 0
+    while first < len(segments):
         most = sizes[len(frames)] if len(frames) < len(sizes) else _BATCH[1]
-        n = max(1, _fit(todo[at:], most, room))
-        part, more = todo[at : at + n], paused and at == 0
+        n = max(1, _fitting_count(segments[first:], most, room))
+        part, more = segments[first : first + n], paused and first == 0
         size = motion_size(len(part[0].rates), part) + 6 + more * 17
         frames.append((seconds_of(part, clock), n + more, size))
-        at += n
+        first += n
     return frames

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.motion_start import unbelievable
+from armkin.board.backend.motion_start import why_impossible
 from armkin.board.backend.position_record import Record
 from armkin.errors import LinkError
 
@@ -42,8 +42,8 @@ class Place:
 
     def counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors; they mean nothing while the position is lost."""
-        found = self._steps if self._session.report is None else self._machine(self._session.report)
-        return tuple(int(n) for n in found - self.offset)
+        machine_steps = self._steps if self._session.report is None else self._machine_steps(self._session.report)
+        return tuple(int(n) for n in machine_steps - self.offset)
 
     def read(self) -> None:
         """Read where the arm stands: known if all that GRBL keeps is what armkin left there."""
@@ -55,14 +55,14 @@ class Place:
         if max(axis.index for axis in self._axes) >= len(status.position):
             letter = self._axes[-1].letter
             raise LinkError(f"GRBL has {len(status.position)} axes; {self._arm.name} needs {letter}, too")
-        motion = self._ask()
+        motion = self._read_offsets()
         why, left = self.record.differs(self._offsets_left), self.record.note
         if status.state == "Alarm":
             why = "GRBL is in an alarm"
         elif why is None and left is not None:
             self.offset = np.asarray(left.offset, dtype=np.int64)
             counts = self.counts()
-            why = self.record.moved_text(counts) or unbelievable(self._arm, counts)
+            why = self.record.moved_text(counts) or why_impossible(self._arm, counts)
             if why is None and left.plan is not None and list(counts) != left.counts and motion != "G1":
                 why = "GRBL was reset in a motion, or another program has spoken to it there"
         self.loss_reason = why or ""
@@ -70,22 +70,22 @@ class Place:
     def vouch(self, counts: NDArray[np.int64]) -> None:
         """Take somebody's word that the motors stand at these counts: set the mark, and record what GRBL keeps."""
         self._session.ask("G21G54G49")
-        steps = self._machine(self._session.sure_status())
+        steps = self._machine_steps(self._session.sure_status())
         mark = MARK + random.randrange(MARK)
-        self._ask()
+        self._read_offsets()
         values = zip(steps, self._axes, np.asarray(self._offsets_left["G54"], dtype=float), strict=True)
         words = [f"{axis.letter}{n / axis.steps - g54 - mark:.5f}" for n, axis, g54 in values]
         self._session.ask(f"G92{''.join(words)}")
-        self._ask()
+        self._read_offsets()
         if (
             any(abs(float(value) - mark) > 0.01 for value in self._offsets_left["G92"])
             or self._offsets_left["system"] != "G54"
         ):
             raise LinkError("GRBL did not take the mark that tells its resets: was a line damaged on its way?")
-        self.offset, self.loss_reason = steps - counts, unbelievable(self._arm, counts.tolist()) or ""
+        self.offset, self.loss_reason = steps - counts, why_impossible(self._arm, counts.tolist()) or ""
         self.record.write_position(self._offsets_left, counts.tolist(), self.offset.tolist())
 
-    def arrived(self) -> None:
+    def record_arrival(self) -> None:
         """Record that the arm rests where it was read."""
         self.record.write_position(self._offsets_left, self.counts(), self.offset.tolist())
 
@@ -95,7 +95,7 @@ class Place:
         reason: the position was lost already.
         """
         if not reason:
-            self._ask()
+            self._read_offsets()
             left = self.record.note
             if left is None or any(left.marks.get(name) != self._offsets_left[name] for name in _LASTING):
                 reason = "another program has set an offset while the arm moved"
@@ -109,20 +109,20 @@ class Place:
         self.loss_reason = reason
         self.record.forget()
 
-    def _ask(self) -> str:
+    def _read_offsets(self) -> str:
         """Read what GRBL keeps that moves targets, of the arm's axes; returns the motion mode in force."""
         offsets, words = self._session.stable_offsets()
         ours = [axis.index for axis in self._axes]
-        found: Kept = {
+        own_offsets: Kept = {
             name: list(values) if name == "TLO" else [values[k] for k in ours if k < len(values)]
             for name, values in offsets.items()
         }
         systems = (word for word in words if word.partition(".")[0] in _LASTING)
         scaled = (word for word in words if word.startswith("G51"))
-        self._offsets_left = {**found, "system": next(systems, "none"), "scale": next(scaled, "G50")}
+        self._offsets_left = {**own_offsets, "system": next(systems, "none"), "scale": next(scaled, "G50")}
         return words[0]
 
-    def _machine(self, report: Report) -> NDArray[np.int64]:
+    def _machine_steps(self, report: Report) -> NDArray[np.int64]:
         """GRBL's machine position in steps, as it was reported."""
         if report.position is not None:
             values = [report.position[axis.index] * axis.steps for axis in self._axes]

@@ -67,8 +67,12 @@ class GrblMachine(StepperArm):
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
         status = self.session.status()
-        said = {"firmware": f"GRBL {self.session.version}", "state": status.state.lower(), "inputs": status.pins}
-        return {**said, **super().report()}
+        firmware_status = {
+            "firmware": f"GRBL {self.session.version}",
+            "state": status.state.lower(),
+            "inputs": status.pins,
+        }
+        return {**firmware_status, **super().report()}
 
     # Getting ready
 
@@ -98,7 +102,7 @@ class GrblMachine(StepperArm):
         """Read where the arm stands. Raises LinkError if settings or state forbid a motion."""
         report = self.session.status()
         self.session.demand_rest(report)
-        serious = _serious(self)
+        serious = _serious_differences(self)
         if serious:
             more = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
             raise LinkError(f"GRBL's settings do not fit {self.arm.name}: {serious[0]}{more}; armkin setup writes them")
@@ -123,19 +127,19 @@ class GrblMachine(StepperArm):
 
         def tick() -> bool:
             report(self.port.now() - began)
-            watch.heed(self.session.fresh(), self.port.now() - began)
+            watch.heed(self.session.fresh_report(), self.port.now() - began)
             return self._stop()
 
         # the dwell is answered when all before it has been carried out
         if not self.session.stream(
-            chain(trajectory_to_gcode.lines(job, self.axes, self._place.offset), ["G4P0.01"]), tick
+            chain(trajectory_to_gcode.gcode_lines(job, self.axes, self._place.offset), ["G4P0.01"]), tick
         ):
             return False
         if self.session.status().state in ("Run", "Jog"):
             raise LinkError("the arm moves on after its plan: another program drives it")
         self._read()
         if not self.loss_reason and self.counts() == tuple(job.end.tolist()):
-            self._place.arrived()
+            self._place.record_arrival()
         return True
 
     def _begin(self, job: Job, *, position_read: bool) -> None:
@@ -188,7 +192,11 @@ class GrblMachine(StepperArm):
 
         Raises LinkError, before anything moves, if GRBL's settings have it look at the other end.
         """
-        wrong = [one for one in self.wrong() if one.number in settings.HOMING and one.actual is not None]
+        wrong = [
+            difference
+            for difference in self.wrong()
+            if difference.number in settings.HOMING and difference.actual is not None
+        ]
         if wrong:
             raise LinkError(f"GRBL would not home as {self.arm.name} needs: {wrong[0]}; armkin setup writes it")
         self._place.forget("its homing was interrupted")
@@ -204,14 +212,14 @@ class GrblMachine(StepperArm):
         self._place.read()
 
 
-def _serious(machine: GrblMachine) -> list[settings.Difference]:
+def _serious_differences(machine: GrblMachine) -> list[settings.Difference]:
     """Serious differences of the settings, read again after a reset or a while: others may have changed them.
 
     $$ has no checksum: two readings must find them.
     """
-    session, now = machine.session, machine.port.now()
-    for _ in range(2 if session.was_reset or now > machine.settings_time + _FRESH else 0):
-        machine.settings, machine.settings_time = session.settings(), now
+    session, present = machine.session, machine.port.now()
+    for _ in range(2 if session.was_reset or present > machine.settings_time + _FRESH else 0):
+        machine.settings, machine.settings_time = session.settings(), present
         if not any(difference.serious for difference in machine.wrong()):
             break
     return [difference for difference in machine.wrong() if difference.serious]

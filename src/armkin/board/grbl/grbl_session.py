@@ -147,32 +147,34 @@ class Session:
                 return self.report
         raise LinkError(f"GRBL on {self.port.name} does not answer any more: is the cable plugged in?")
 
-    def fresh(self) -> Report | None:
+    def fresh_report(self) -> Report | None:
         """A status report that has come since this was asked last."""
-        found, self._unseen = self._unseen, None
-        return found
+        report, self._unseen = self._unseen, None
+        return report
 
     def sure_status(self) -> Report:
         """A status report that three in a row agree on: none has a checksum. In motion they cannot: the last one."""
-        return _agreed(self.status, self.port.name, lambda report: report.state in ("Run", "Jog", "Home"))
+        return _agreeing_reading(self.status, self.port.name, lambda report: report.state in ("Run", "Jog", "Home"))
 
     def stable_offsets(self) -> tuple[dict[str, tuple[float, ...]], tuple[str, ...]]:
         """Offsets by name (G54 to G59, G92, TLO) and the words of ``$G``: each as three readings in a row agree on."""
-        seen: dict[str, tuple[Any, int]] = {}  # what was read last, and how often in a row
+        readings: dict[str, tuple[Any, int]] = {}  # what was read last, and how often in a row
         for _ in range(_READINGS):
-            found: dict[str, Any] = dict(pair for line in self.ask("$#") if (pair := replies.offset(line)) is not None)
-            words = [words for line in self.ask("$G") if (words := replies.modes(line))]
-            found |= {"$G": tuple(words[-1])} if words else {}
-            for name, value in found.items():
-                last, count = seen.get(name, (None, 0))
-                seen[name] = value, count + 1 if value == last else 1
-            if all(seen.get(name, (None, 0))[1] >= 3 for name in _KEPT):
-                return {name: seen[name][0] for name in _KEPT[1:]}, seen["$G"][0]
+            reading: dict[str, Any] = dict(
+                pair for line in self.ask("$#") if (pair := replies.parse_offset(line)) is not None
+            )
+            words = [words for line in self.ask("$G") if (words := replies.parse_modes(line))]
+            reading |= {"$G": tuple(words[-1])} if words else {}
+            for name, value in reading.items():
+                last, count = readings.get(name, (None, 0))
+                readings[name] = value, count + 1 if value == last else 1
+            if all(readings.get(name, (None, 0))[1] >= 3 for name in _KEPT):
+                return {name: readings[name][0] for name in _KEPT[1:]}, readings["$G"][0]
         raise LinkError(_UNCLEAR.format(port=self.port.name))
 
     def settings(self) -> dict[int, float]:
         """The answer to ``$$``: number -> value."""
-        return dict(pair for line in self.ask("$$") if (pair := replies.setting(line)) is not None)
+        return dict(pair for line in self.ask("$$") if (pair := replies.parse_setting(line)) is not None)
 
     def stream(self, work: Iterable[str], tick: Callable[[], bool]) -> bool:
         """Send lines as fast as GRBL takes them, until all are answered; False if `tick` wanted a stop.
@@ -187,26 +189,26 @@ class Session:
 
     def _drain(self, most: int, tick: Callable[[], bool]) -> bool:
         """Wait until at most so many bytes have no answer; False if `tick` wanted a stop."""
-        quiet = asked = self.port.now()
+        quiet = time_asked = self.port.now()
         while (waiting := sum(size for size, _ in self._sent)) > most:
             if tick():
                 return False
             self._not_reset()
-            before, now = self._heard, self.port.now()
-            if now > asked + _POLL:
-                asked = now
+            before, present = self._heard, self.port.now()
+            if present > time_asked + _POLL:
+                time_asked = present
                 self.port.write(replies.STATUS)
             self._pump(0.01)
             if self._heard != before:
                 quiet = self.port.now()
             state = "" if self.report is None else self.report.state
-            if self.port.now() > quiet + (_HELD if state in ("Hold", "Door") else _SILENCE) + self._dwells():
-                where = f"GRBL on {self.port.name}, in state {state or '?'},"
-                raise LinkError(f"{where} has left {waiting} bytes without an answer")
+            if self.port.now() > quiet + (_HELD if state in ("Hold", "Door") else _SILENCE) + self._dwell_seconds():
+                state_text = f"GRBL on {self.port.name}, in state {state or '?'},"
+                raise LinkError(f"{state_text} has left {waiting} bytes without an answer")
         self._not_reset()
         return True
 
-    def _dwells(self) -> float:
+    def _dwell_seconds(self) -> float:
         """Seconds that lines without an answer may stand still for."""
         return sum(float(line[3:]) for _, line in self._sent if line.startswith("G4P"))
 
@@ -228,9 +230,9 @@ class Session:
         self.port.write(command)
 
     def _send(self, line: str) -> None:
-        data = line.encode("ascii") + b"\n"
-        self._sent.append((len(data), line))
-        self.port.write(data)
+        raw = line.encode("ascii") + b"\n"
+        self._sent.append((len(raw), line))
+        self.port.write(raw)
 
     def _wait(self, finished: Callable[[], bool], seconds: float) -> bool:
         end = self.port.now() + seconds
@@ -242,10 +244,10 @@ class Session:
 
     def _pump(self, timeout: float) -> None:
         self._text += self.port.read(timeout).decode("ascii", "replace")
-        *whole, self._text = self._text.split("\n")
+        *lines, self._text = self._text.split("\n")
         if len(self._text) > _LONGEST:
             raise LinkError(f"{self.port.name} does not answer as GRBL does: {_LONGEST} characters without a line end")
-        for line in whole:
+        for line in lines:
             self._hear(line.strip("\r "))
 
     def _hear(self, line: str) -> None:
@@ -254,18 +256,18 @@ class Session:
             if self._sent:
                 self._sent.popleft()
         elif match := re.fullmatch(r"error:(\d{1,3})", line):
-            what = self._sent.popleft()[1] if self._sent else ""
+            refused = self._sent.popleft()[1] if self._sent else ""
             number = int(match[1])
-            raise GrblError(f"GRBL refused {what!r}: {replies.error(number)} (error {number})", error=number)
+            raise GrblError(f"GRBL refused {refused!r}: {replies.error_text(number)} (error {number})", error=number)
         elif match := re.fullmatch(r"ALARM:(\d{1,3})", line):
             number = int(match[1])
             self._sent.clear()
-            raise GrblError(f"GRBL stopped: {replies.alarm(number)} (alarm {number})", alarm=number)
+            raise GrblError(f"GRBL stopped: {replies.alarm_text(number)} (alarm {number})", alarm=number)
         elif line.lower().startswith("grbl "):
             self.was_reset = True
             self._sent.clear()
-        elif (found := replies.report(line)) is not None:
-            self._take_report(found)
+        elif (report := replies.parse_report(line)) is not None:
+            self._take_report(report)
         elif line:
             self._other_lines.append(line)
             del self._other_lines[:-400]
@@ -279,7 +281,7 @@ class Session:
         self._heard += report.state in ("Run", "Jog", "Home")  # else it only repeats itself
 
 
-def _agreed(read: Callable[[], T], port: str, accepts: Callable[[T], bool]) -> T:
+def _agreeing_reading(read: Callable[[], T], port: str, accepts: Callable[[T], bool]) -> T:
     """What three readings in a row agree on, or one that is enough. Raises LinkError if none do.
 
     Three: two may lose the same digit, as -1000.000 and -1000.000 without one of its first zeros.

@@ -21,18 +21,18 @@ def axes_of(arm: Arm) -> list[Axis]:
     Raises UsageError, naming the motor, for what GRBL cannot drive: servos, more than six motors, an axis that is
     none of its letters or is used twice, a step too fine for the three decimals of its reports.
     """
-    found: list[Axis] = []
+    axes: list[Axis] = []
     for k, motor, name, steps, speed, accel in steppers(arm, "GRBL", LETTERS):
         if steps > COARSE:
             raise UsageError(
                 f"{arm.path or arm.name}: motor {name} makes {steps:.4g} steps a unit; GRBL reports positions with "
                 f"three decimals, enough for {COARSE:g} steps a unit at most"
             )
-        found.append(Axis(motor.axis, name, steps, motor.invert, speed, accel, _upward(arm, k)))
-    return found
+        axes.append(Axis(motor.axis, name, steps, motor.invert, speed, accel, _is_upward(arm, k)))
+    return axes
 
 
-def _upward(arm: Arm, motor: int) -> bool | None:
+def _is_upward(arm: Arm, motor: int) -> bool | None:
     """Whether a motor's counts are greatest at its joint's switch; None: no switch, or it turns several joints."""
     turned = np.flatnonzero(arm.motor_gain[motor])
     homing = arm.homing[turned[0]] if len(turned) == 1 else None

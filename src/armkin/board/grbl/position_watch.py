@@ -34,7 +34,7 @@ class Watch:
 
     def __init__(self, job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> None:
         self._axes, self._offset = axes, offset
-        self._times, self._points = _path(job)
+        self._times, self._points = _path_samples(job)
         self._points_passed = 0  # of the points, which the arm has passed
         self._doubts = 0
         self._plan_time = 0.0  # [s] of the plan that were done
@@ -57,16 +57,18 @@ class Watch:
         if report.position is None or report.state not in ("Run", "Idle"):
             return None
         steps = np.array([report.position[axis.index] * axis.steps for axis in self._axes])
-        found = self._plan_times(steps - self._offset)
-        wrong = "it has left its path" if found is None else None
-        if found is not None and found[0] > elapsed + AHEAD:
+        plan_times = self._plan_times(steps - self._offset)
+        wrong = "it has left its path" if plan_times is None else None
+        if plan_times is not None and plan_times[0] > elapsed + AHEAD:
             wrong = "it is faster than planned"
         self._doubts = self._doubts + 1 if wrong else 0
         if self._doubts >= 2:  # a report has no checksum either
             return wrong
-        return None if wrong or found is None or report.state == "Idle" else self._creeps(*found, elapsed)
+        return (
+            None if wrong or plan_times is None or report.state == "Idle" else self._creep_fault(*plan_times, elapsed)
+        )
 
-    def _creeps(self, first: float, last: float, elapsed: float) -> str | None:
+    def _creep_fault(self, first: float, last: float, elapsed: float) -> str | None:
         if last >= min(self._plan_time + CREEP[0], float(self._times[-1])):
             self._plan_time, self._progress_time, self._pause = last, elapsed, 0.0
         self._pause = max(self._pause, last - first)
@@ -92,13 +94,13 @@ class Watch:
         return ends[0], ends[1]
 
 
-def _path(job: Job) -> tuple[Array, Array]:
+def _path_samples(job: Job) -> tuple[Array, Array]:
     """Times (T,) [s] and the counts of every motor then (T, motors): the lines that GRBL is sent, in pieces."""
     arm = job.trajectory.arm
     times, points = [np.zeros(1)], [np.asarray(job.start, dtype=float)[None]]
     for stretch, began in zip(job.trajectory.stretches, job.trajectory.begins, strict=False):
         t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE)), 1) + 1)[1:]
-        at = stretch.evaluate(t)
+        sampled = stretch.evaluate(t)
         times.append(began + t)
-        points.append(places(arm, at) if isinstance(stretch, Straight) else pulses(arm, at).astype(float))
+        points.append(places(arm, sampled) if isinstance(stretch, Straight) else pulses(arm, sampled).astype(float))
     return np.concatenate(times), np.concatenate(points)

@@ -58,88 +58,88 @@ class Report:
     )  # [%] that feeds are overridden by, which one report in some tells
 
 
-def report(line: str) -> Report | None:
+def parse_report(line: str) -> Report | None:
     """A status report, or None if the line is none or damaged.
 
-    >>> report("<Hold:0|MPos:1.000,-2.500,0.000|Bf:15,128|Pn:X>").position
+    >>> parse_report("<Hold:0|MPos:1.000,-2.500,0.000|Bf:15,128|Pn:X>").position
     (1.0, -2.5, 0.0)
     """
     if not (line.startswith("<") and line.endswith(">")):
         return None
     head, *fields = line[1:-1].split("|")
     state, _, detail = head.partition(":")
-    found: dict[str, str] = dict(field.partition(":")[::2] for field in fields)
+    field_of: dict[str, str] = dict(field.partition(":")[::2] for field in fields)
     try:
-        position = _values(found["MPos"]) if "MPos" in found else None
-        free = [int(value) for value in _values(found["Bf"])] if "Bf" in found else None
+        position = _parse_values(field_of["MPos"]) if "MPos" in field_of else None
+        free = [int(value) for value in _parse_values(field_of["Bf"])] if "Bf" in field_of else None
         room = (free[0], free[1]) if free else None
-        feed = int(_values(found["Ov"])[0]) if "Ov" in found else None
-        return Report(state, int(_value(detail or "0")), position, room, found.get("Pn", ""), feed)
+        feed = int(_parse_values(field_of["Ov"])[0]) if "Ov" in field_of else None
+        return Report(state, int(_parse_value(detail or "0")), position, room, field_of.get("Pn", ""), feed)
     except (ValueError, IndexError):
         return None
 
 
-def setting(line: str) -> tuple[int, float] | None:
+def parse_setting(line: str) -> tuple[int, float] | None:
     """A line of ``$$``: number and value.
 
-    >>> setting("$100=44.444")
+    >>> parse_setting("$100=44.444")
     (100, 44.444)
     """
     match = re.fullmatch(rf"\$(\d{{1,3}})=({_NUMBER})(?:\s.*)?", line)
     return (int(match[1]), float(match[2])) if match else None
 
 
-def offset(line: str) -> tuple[str, tuple[float, ...]] | None:
+def parse_offset(line: str) -> tuple[str, tuple[float, ...]] | None:
     """A line of ``$#``: name and values.
 
-    >>> offset("[G92:1000.000,0.000,0.000]")
+    >>> parse_offset("[G92:1000.000,0.000,0.000]")
     ('G92', (1000.0, 0.0, 0.0))
     """
     match = re.fullmatch(r"\[(G5[4-9]|G92|TLO):([-\d.,]+)(?::[-\d.]+)?\]", line)
     if match is None:
         return None
     try:
-        return match[1], _values(match[2])
+        return match[1], _parse_values(match[2])
     except ValueError:
         return None
 
 
-def modes(line: str) -> list[str]:
+def parse_modes(line: str) -> list[str]:
     """The words of the answer to ``$G``; none in other lines.
 
-    >>> modes("[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]")[1]
+    >>> parse_modes("[GC:G0 G54 G17 G21 G90 G94 M5 M9 T0 F0 S0]")[1]
     'G54'
     """
     return line[4:-1].split() if line.startswith("[GC:") and line.endswith("]") else []
 
 
-def spindle(line: str) -> float | None:
+def parse_spindle(line: str) -> float | None:
     """The S word in force, of the answer to ``$G``; None while the spindle is off or in other lines.
 
-    >>> spindle("[GC:G0 G54 G17 G21 G90 G94 M3 M9 T0 F0 S120]")
+    >>> parse_spindle("[GC:G0 G54 G17 G21 G90 G94 M3 M9 T0 F0 S120]")
     120.0
     """
-    words = modes(line)
+    words = parse_modes(line)
     speeds = [word[1:] for word in words if re.fullmatch(f"S{_NUMBER}", word)]
     return float(speeds[0]) if "M3" in words and speeds else None
 
 
-def _value(text: str) -> float:
+def _parse_value(text: str) -> float:
     """A number as GRBL prints it. Raises ValueError for others, such as nan, 1e400 or 1_0."""
     if not re.fullmatch(_NUMBER, text):
         raise ValueError(text)
     return float(text)
 
 
-def _values(text: str) -> tuple[float, ...]:
-    return tuple(_value(part) for part in text.split(","))
+def _parse_values(text: str) -> tuple[float, ...]:
+    return tuple(_parse_value(part) for part in text.split(","))
 
 
-def alarm(number: int) -> str:
+def alarm_text(number: int) -> str:
     """What an alarm means."""
     return ALARMS.get(number, f"alarm {number}")
 
 
-def error(number: int) -> str:
+def error_text(number: int) -> str:
     """What an error means."""
     return ERRORS.get(number, f"error {number}")

@@ -44,8 +44,8 @@ class Difference:
 
     def __str__(self) -> str:
         """For people, and as the line that mends it."""
-        found = "is not there" if self.actual is None else f"is {self.actual:g}"
-        return f"${self.number} ({self.meaning}) {found}: the robot file wants ${self.number}={self.expected:g}"
+        actual_text = "is not there" if self.actual is None else f"is {self.actual:g}"
+        return f"${self.number} ({self.meaning}) {actual_text}: the robot file wants ${self.number}={self.expected:g}"
 
     def line(self) -> str:
         """The line that mends it; grblHAL takes no 255.000 where it wants a whole number."""
@@ -54,7 +54,7 @@ class Difference:
 
 def expected_settings(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, tuple[str, float]]:
     """GRBL's settings for an arm: number -> what it is, value; hal: of grblHAL."""
-    found: dict[int, tuple[str, float]] = {
+    expected: dict[int, tuple[str, float]] = {
         1: ("keep the motors on at rest", 255),
         3: ("inverted directions", sum(1 << axis.index for axis in axes if axis.invert)),
         10: ("report the machine position and the buffer", 3),
@@ -63,17 +63,17 @@ def expected_settings(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, t
         32: ("laser mode", 0),
     }
     if all(axis.upward is not None for axis in axes):
-        found[22] = ("homing", 1)
-        found[23] = ("homing downwards", sum(1 << axis.index for axis in axes if not axis.upward))
+        expected[22] = ("homing", 1)
+        expected[23] = ("homing downwards", sum(1 << axis.index for axis in axes if not axis.upward))
     if hal:
-        found[G92_VOLATILE] = ("forget G92 with the power, as GRBL does", 1)
+        expected[G92_VOLATILE] = ("forget G92 with the power, as GRBL does", 1)
     for axis in axes:
-        found[100 + axis.index] = (f"{axis.name}: steps a unit", round(axis.steps, 3))
+        expected[100 + axis.index] = (f"{axis.name}: steps a unit", round(axis.steps, 3))
     for axis in axes:
-        found[110 + axis.index] = (f"{axis.name}: greatest speed, units/min", _floor(60 * axis.max_speed))
+        expected[110 + axis.index] = (f"{axis.name}: greatest speed, units/min", _floor_decimals(60 * axis.max_speed))
     for axis in axes:
-        found[120 + axis.index] = (f"{axis.name}: acceleration, units/s2", _floor(axis.max_accel))
-    return found
+        expected[120 + axis.index] = (f"{axis.name}: acceleration, units/s2", _floor_decimals(axis.max_accel))
+    return expected
 
 
 def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool = False) -> list[Difference]:
@@ -81,19 +81,21 @@ def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool 
 
     A greatest speed or acceleration below the robot file's is not serious: GRBL is slower than planned, no more.
     """
-    result = []
-    for number, (what, value) in expected_settings(axes, hal=hal or G92_VOLATILE in actual).items():
-        there, bits = actual.get(number), _bits(number, axes)
-        if there is not None and bits is not None:
-            value = int(there) & ~bits | int(value) & bits  # the other bits are not ours
-        if there is not None and _is_equal(number, there, value):
+    differing = []
+    for number, (meaning, value) in expected_settings(axes, hal=hal or G92_VOLATILE in actual).items():
+        actual_value, bits = actual.get(number), _own_bits(number, axes)
+        if actual_value is not None and bits is not None:
+            value = int(actual_value) & ~bits | int(value) & bits  # the other bits are not ours
+        if actual_value is not None and _is_equal(number, actual_value, value):
             continue
-        slower = number // 10 in (11, 12) and there is not None and there < value
-        result.append(Difference(number, what, there, value, serious=not slower and number not in (1, *HOMING)))
-    return result
+        slower = number // 10 in (11, 12) and actual_value is not None and actual_value < value
+        differing.append(
+            Difference(number, meaning, actual_value, value, serious=not slower and number not in (1, *HOMING))
+        )
+    return differing
 
 
-def _bits(number: int, axes: Sequence[Axis]) -> int | None:
+def _own_bits(number: int, axes: Sequence[Axis]) -> int | None:
     """The bits of a setting that are armkin's; None: all of it is, or it has none."""
     if number in (3, 23):
         return sum(1 << axis.index for axis in axes)
@@ -106,5 +108,5 @@ def _is_equal(number: int, actual: float, value: float) -> bool:
     return math.isclose(actual, value, rel_tol=0, abs_tol=0.0006)
 
 
-def _floor(value: float) -> float:
+def _floor_decimals(value: float) -> float:
     return math.floor(value * 1000) / 1000

@@ -23,7 +23,7 @@ class Spindle:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        answer = (replies.spindle(line) for line in session.ask("$G"))
+        answer = (replies.parse_spindle(line) for line in session.ask("$G"))
         self.value = next((s for s in answer if s is not None), None)  # the S word in force; None: off, or not known
 
     def grip(self, gripper: Gripper, value: float, settings: Mapping[int, float]) -> float:
@@ -33,8 +33,10 @@ class Spindle:
         """
         for number, wrong in ((30, settings.get(30, value) < value), (32, settings.get(32, 0.0) != 0)):
             if wrong:
-                what = f"${number} is {settings[number]:g}"
-                raise LinkError(f"GRBL does not give out S {value:g}: {what} ($30: its greatest S, $32: laser mode)")
+                setting_text = f"${number} is {settings[number]:g}"
+                raise LinkError(
+                    f"GRBL does not give out S {value:g}: {setting_text} ($30: its greatest S, $32: laser mode)"
+                )
         speed = gripper.max_speed
         seconds = GRIPPING if speed is None else abs(gripper.closed - gripper.open) / speed
         self._session.ask(f"M3S{value:.3f}", patience=seconds + 5.0)

@@ -24,34 +24,34 @@ SLOWEST = 0.01  # [units/min] of a feed: GRBL refuses 0
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
     """A trajectory from counts `start` (motors,) on, for GRBL, whose own planner may take longer."""
-    return Job(trajectory, start, sum(len(_times(stretch)) for stretch in trajectory.stretches))
+    return Job(trajectory, start, sum(len(_piece_times(stretch)) for stretch in trajectory.stretches))
 
 
-def lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> Iterator[str]:
+def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> Iterator[str]:
     """G-code, a line a piece; offset: GRBL's machine steps less the arm's counts."""
-    arm, at = job.trajectory.arm, np.asarray(job.start, dtype=np.int64)
+    arm, position = job.trajectory.arm, np.asarray(job.start, dtype=np.int64)
     steps = np.array([axis.steps for axis in axes])
     for stretch in job.trajectory.stretches:
         before = idle = 0.0
-        for t in _times(stretch):
+        for t in _piece_times(stretch):
             goal = np.asarray(pulses(arm, stretch.evaluate(np.array([t]))[0]), dtype=np.int64)
-            way = float(np.linalg.norm((goal - at) / steps))
+            way = float(np.linalg.norm((goal - position) / steps))
             if way > 0.0:
                 speed = way * stretch.law.peak if isinstance(stretch, Straight) else way / (t - before)
                 words = "".join(
                     f"{axis.letter}{value:.5f}"
-                    for axis, value, moves in zip(axes, (goal + offset) / steps, goal != at, strict=True)
+                    for axis, value, moves in zip(axes, (goal + offset) / steps, goal != position, strict=True)
                     if moves
                 )
                 yield f"{HEAD}G53G1{words}F{max(60 * speed, SLOWEST):.3f}"
             else:
                 idle += t - before
-            at, before = goal, t
+            position, before = goal, t
         if idle > 0.0 and idle == stretch.duration:  # a pause: elsewhere a piece without a step is too short to matter
             yield f"G4P{idle:.3f}"
 
 
-def _times(stretch: Stretch) -> Array:
+def _piece_times(stretch: Stretch) -> Array:
     """Ends of a stretch's pieces [s]: one for a straight line, whose speed GRBL shapes as the plan does."""
     count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / PIECE)), 1)
     return np.asarray(np.linspace(0.0, stretch.duration, count + 1)[1:])

@@ -48,7 +48,7 @@ class ServoBusBoard(Board):
         from armkin.board.sim.sim_servo_bus import Servo, ServoBus
 
         home = pulses(self.arm, self.arm.home).tolist()
-        servos = [Servo(number, at) for number, at in zip(servo_ids(self.arm), home, strict=True)]
+        servos = [Servo(number, count) for number, count in zip(servo_ids(self.arm), home, strict=True)]
         gripper = self.arm.gripper
         if gripper is not None and gripper.id is not None:
             servos.append(Servo(gripper.id))
@@ -68,8 +68,8 @@ class ServoBusBoard(Board):
     def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
         """Move the gripper, and tell where it comes to rest."""
         target = self.grip_value(value)
-        at = servo_gripper.grip(self.machine.bus, self.gripper(), target, self.stop)
-        return Gripped(at, target, "deg", measured=True)
+        position = servo_gripper.move_gripper(self.machine.bus, self.gripper(), target, self.stop)
+        return Gripped(position, target, "deg", measured=True)
 
     def relax(self) -> None:
         """Switch the servos off."""
@@ -77,7 +77,7 @@ class ServoBusBoard(Board):
 
     def zero(self, gripper: float | None) -> tuple[list[int], tuple[int, int] | None]:
         """The servos' counts; and the gripper's, and its `zero` if it stands at a value."""
-        jaw = None if gripper is None else servo_gripper.zero(self.machine.bus, self.gripper(), gripper)
+        jaw = None if gripper is None else servo_gripper.gripper_zero(self.machine.bus, self.gripper(), gripper)
         return list(self.machine.counts()), jaw
 
     def calibration(self, path: str, pose: Array | None) -> ServoCalibration:

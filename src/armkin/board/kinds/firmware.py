@@ -13,7 +13,7 @@ from armkin.board.backend.board import Board, Gripped, LostSteps
 from armkin.board.firmware import gripping, homing, jogging, resume_after_hold
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
-from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut, plan
+from armkin.board.firmware.segments.trajectory_to_counts import Cut, cut_trajectory, plan_moves
 from armkin.board.firmware.wire import find_boards
 from armkin.board.firmware.wire.session import Session
 from armkin.board.ports import BAUD, SIM, SerialPort
@@ -80,11 +80,11 @@ class FirmwareBoard(Board):
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,), refused if the board is too slow for it."""
-        return cut(trajectory, start, **self._figures)
+        return cut_trajectory(trajectory, start, **self._figures)
 
     def plan(self, start: Sequence[int], targets: Array, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        return plan(self.arm, start, targets, speed=speed, **self._figures)
+        return plan_moves(self.arm, start, targets, speed=speed, **self._figures)
 
     def simulated(self) -> Port:
         """A board in this process; its switches are where the robot file says."""
@@ -92,7 +92,7 @@ class FirmwareBoard(Board):
 
     def open(self, name: str, baud: int | None = None, *, reset: bool = True) -> Port:
         """The port of that name; `sim`: a board of this kind in this process."""
-        levels = homing.switches(self.arm, self.configuration)
+        levels = homing.switch_levels(self.arm, self.configuration)
         return open_port(name, board=self.configuration.board, baud=baud or self.baud, switches=levels, reset=reset)
 
     def attach(self, port: Port, stop: Callable[[], bool]) -> FirmwareMachine:
@@ -103,7 +103,7 @@ class FirmwareBoard(Board):
 
     def likely(self) -> list[str]:
         """Names of the ports that look like an Arduino: most are reset by that, an arm that stands keeps its place."""
-        return list(find_boards.likely())
+        return list(find_boards.likely_ports())
 
     def replies(self, link: Port, stop: Callable[[], bool]) -> bool:
         """Whether a board of this kind replies. Raises LinkError if none does."""
@@ -136,28 +136,28 @@ class FirmwareBoard(Board):
         """The parts to be carried out or, of a resumed motion, what is left of them."""
         with resume_after_hold.under_way(
             self.machine, [part for part in parts if isinstance(part, Cut)], note
-        ) as found:
-            yield found
+        ) as what_is_left:
+            yield what_is_left
 
     def recall(self) -> resume_after_hold.Note:
         """The note of the motion that was held on this board."""
-        return resume_after_hold.recall(self.machine)
+        return resume_after_hold.recall_note(self.machine)
 
     def ready_to_jog(self, joint: int, rate: float) -> float:
         """Have the motors on; while the position is lost a joint moves at an eighth of its max_speed at most."""
-        jogging.prepare(self.machine)
+        jogging.prepare_jog(self.machine)
         top = float(self.arm.max_speed[joint]) / jogging.SLOW
         allowed = float(np.clip(rate, -top, top)) if self.machine.position() == "lost" else rate
-        jogging.rates(self.machine, joint, self._shown(joint, allowed))
+        jogging.count_rates(self.machine, joint, self._in_shown_units(joint, allowed))
         return allowed
 
     def jog(self, joint: int, rate: float, seconds: float, goes_on: Callable[[], bool] | None = None) -> None:
         """Move one joint [rad/s | mm/s] for a time; the board stops it at its limits, if it knows where it stands."""
-        rates = jogging.rates(self.machine, joint, self._shown(joint, rate))
+        rates = jogging.count_rates(self.machine, joint, self._in_shown_units(joint, rate))
         free = jogging.free_seconds(self.machine, joint, rates)
-        jogging.jog(self.machine, rates, min(seconds, free), goes_on or (lambda: True))
+        jogging.jog_axes(self.machine, rates, min(seconds, free), goes_on or (lambda: True))
 
-    def _shown(self, joint: int, rate: float) -> float:
+    def _in_shown_units(self, joint: int, rate: float) -> float:
         return rate if self.arm.prismatic[joint] else rate / units.DEGREE
 
     # Homing
@@ -175,11 +175,11 @@ class FirmwareBoard(Board):
     ) -> list[LostSteps]:
         """Home joints, one after another. Raises HomingIncompleteError if others are still lost."""
         arm = self.arm
-        steps = homing.home(self.machine, joints, announce, rest_at_home=rest_at_home)
+        steps = homing.home_joints(self.machine, joints, announce, rest_at_home=rest_at_home)
         if lost := homing.lost_joints(self.machine):
-            done = [name for name in arm.joint_names if name not in lost]
+            homed = [name for name in arm.joint_names if name not in lost]
             raise HomingIncompleteError(
-                f"homed {', '.join(done) or 'nothing'}; the position of {', '.join(lost)} is still lost",
+                f"homed {', '.join(homed) or 'nothing'}; the position of {', '.join(lost)} is still lost",
                 advice="home these joints, too, or home(..., rest_at_home=True) if they stand in their home pose",
                 joints=lost,
                 homing=all(arm.homing[arm.joint_names.index(name)] for name in lost),
@@ -189,28 +189,28 @@ class FirmwareBoard(Board):
 
     # The gripper
 
-    def _grip(self) -> Grip:
+    def _gripper_counts(self) -> Grip:
         return gripping.gripper_of(self.arm.name, self.configuration)
 
     def grip_value(self, value: str | float) -> float:
         """Where the gripper is to go, in its drive's units. Raises UsageError for what it cannot reach."""
-        grip = self._grip()
+        grip = self._gripper_counts()
         return grip.value(gripping.count_of(grip, value))
 
     def grip_known(self) -> bool:
         """Whether the board knows where the gripper stands; a simulated one begins open."""
-        return self.machine.port.simulated or gripping.gripper_known(self.machine, self._grip())
+        return self.machine.port.simulated or gripping.gripper_known(self.machine, self._gripper_counts())
 
     def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
         """Move the gripper; assume: where a lost one stands, a servo jumps there first."""
-        grip = self._grip()
+        grip = self._gripper_counts()
         target = gripping.count_of(grip, value)
-        gripping.prepare(self.machine, grip, None if assume is None else gripping.count_of(grip, assume))
-        at = gripping.grip(self.machine, grip, target)
+        gripping.prepare_gripper(self.machine, grip, None if assume is None else gripping.count_of(grip, assume))
+        position = gripping.move_gripper(self.machine, grip, target)
         drive = self.arm.gripper
         assert drive is not None
         units_of = "deg" if drive.lead is None else "mm", "us" if drive.kind == "servo" else "steps"
-        return Gripped(grip.value(at), grip.value(target), units_of[0], at, units_of[1])
+        return Gripped(grip.value(position), grip.value(target), units_of[0], position, units_of[1])
 
 
 BOARD = FirmwareBoard

@@ -80,8 +80,8 @@ class GrblBoard(Board):
     ) -> None:
         """Home all axes by GRBL's cycle, $H."""
         self.check_home(joints, rest_at_home=rest_at_home)
-        at = units.joints_in(self.arm, [homing.at for homing in self.arm.homing if homing is not None])
-        self.machine.home(pulses(self.arm, at).tolist())
+        switch_values = units.joints_in(self.arm, [homing.at for homing in self.arm.homing if homing is not None])
+        self.machine.home(pulses(self.arm, switch_values).tolist())
 
     def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
         """Move the gripper, and tell what was sent: GRBL measures nothing."""

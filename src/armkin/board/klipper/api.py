@@ -38,13 +38,13 @@ class Api:
                 self._waiting.discard(number)
                 raise LinkError(f"Klipper on {self._port.name} did not answer {method} within {patience:g} s")
             self.pump(0.02)
-        return self._result(number)
+        return self._take_result(number)
 
     def query(self, **objects: list[str]) -> dict[str, dict[str, Any]]:
         """Fields of printer objects: object -> field -> value. An object that is not there has none."""
         status = self.ask("objects/query", {"objects": objects}).get("status")
-        found = status if isinstance(status, dict) else {}
-        return {name: fields if isinstance(fields := found.get(name), dict) else {} for name in objects}
+        fields_of = status if isinstance(status, dict) else {}
+        return {name: fields if isinstance(fields := fields_of.get(name), dict) else {} for name in objects}
 
     def run(self, script: str, patience: float = _ANSWER) -> None:
         """Run lines of G-code, and wait until they are done."""
@@ -58,35 +58,35 @@ class Api:
         self._port.write(json.dumps(request).encode() + END)
         return self._last
 
-    def waiting(self) -> int:
+    def count_waiting(self) -> int:
         """Requests without an answer. Raises KlipperError for those that were refused since."""
         for number in list(self._answers):
-            self._result(number)
+            self._take_result(number)
         return len(self._waiting)
 
     def pump(self, timeout: float) -> None:
         """Read what has come, or comes in so many seconds."""
         self._text += self._port.read(timeout)
-        *whole, self._text = self._text.split(END)
+        *messages, self._text = self._text.split(END)
         if len(self._text) > _LONGEST:
             raise LinkError(f"{self._port.name} does not answer as Klipper's API server does")
-        for part in whole:
+        for part in messages:
             try:
-                found = json.loads(part)
+                answer = json.loads(part)
             except (ValueError, RecursionError):
-                found = None
-            if not isinstance(found, dict):
+                answer = None
+            if not isinstance(answer, dict):
                 raise LinkError(f"{self._port.name} does not answer as Klipper's API server does")
-            number = found.get("id")
+            number = answer.get("id")
             if isinstance(number, int) and number in self._waiting:
                 self._waiting.discard(number)
-                self._answers[number] = found
+                self._answers[number] = answer
 
-    def _result(self, number: int) -> dict[str, Any]:
-        found = self._answers.pop(number)
-        if "error" in found:
-            error = found["error"]
-            said = error.get("message", error) if isinstance(error, dict) else error
-            raise KlipperError(f"Klipper: {str(said).splitlines()[0] if str(said) else 'an error'}")
-        result = found.get("result")
-        return result if isinstance(result, dict) else {}
+    def _take_result(self, number: int) -> dict[str, Any]:
+        answer = self._answers.pop(number)
+        if "error" in answer:
+            error = answer["error"]
+            message = error.get("message", error) if isinstance(error, dict) else error
+            raise KlipperError(f"Klipper: {str(message).splitlines()[0] if str(message) else 'an error'}")
+        fields = answer.get("result")
+        return fields if isinstance(fields, dict) else {}

@@ -63,18 +63,18 @@ class Difference:
 
     def __str__(self) -> str:
         """For people."""
-        found = "is not there" if self.actual is None else f"is {self.actual}"
-        return f"{self.setting} {found}: the robot file wants {self.expected}"
+        actual_text = "is not there" if self.actual is None else f"is {self.actual}"
+        return f"{self.setting} {actual_text}: the robot file wants {self.expected}"
 
 
 def axes_of(arm: Arm) -> list[Axis]:
     """One axis a motor, in the arm's order. Raises UsageError, naming the motor, for what Klipper cannot drive so."""
     home = arm.motor_gain @ arm.home  # [counts] of the motors at the home pose, if 0 is where all joint values are 0
-    found = []
+    axes = []
     for k, motor, name, steps, *rates in steppers(arm, "Klipper", LETTERS):
         full, micro = motor.full_steps or 0, motor.microsteps or 0
-        found.append(Axis(motor.axis, name, steps, float(home[k] / steps), full, micro, motor.invert, *rates))
-    return found
+        axes.append(Axis(motor.axis, name, steps, float(home[k] / steps), full, micro, motor.invert, *rates))
+    return axes
 
 
 def printer_cfg(axes: Sequence[Axis]) -> str:
@@ -109,14 +109,16 @@ def printer_cfg(axes: Sequence[Axis]) -> str:
 
 def settings_of(axes: Sequence[Axis]) -> dict[str, dict[str, Any]]:
     """Those sections as Klipper tells them: section -> option -> value."""
-    found: dict[str, dict[str, Any]] = {"printer": {"kinematics": "none", "max_velocity": RATE, "max_accel": MAX_ACCEL}}
+    sections: dict[str, dict[str, Any]] = {
+        "printer": {"kinematics": "none", "max_velocity": RATE, "max_accel": MAX_ACCEL}
+    }
     for axis in axes:
-        found[f"manual_stepper {axis.section}"] = {
+        sections[f"manual_stepper {axis.section}"] = {
             "rotation_distance": axis.turn,
             "full_steps_per_rotation": axis.full_steps,
             "microsteps": axis.microsteps,
         }
-    return found
+    return sections
 
 
 def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[Difference]:
@@ -140,14 +142,14 @@ def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[Differe
         if not isinstance(section, Mapping):
             wrong.append(Difference(name, None, f"one for motor {axis.name}"))
             continue
-        steps = _steps(section)
+        steps = _steps_per_unit(section)
         if steps is None or not math.isclose(steps, axis.steps, rel_tol=1e-9):
-            said = None if steps is None else f"{steps:.9g}"
-            wrong.append(Difference(f"{name} steps a unit", said, f"{axis.steps:.9g}"))
+            steps_text = None if steps is None else f"{steps:.9g}"
+            wrong.append(Difference(f"{name} steps a unit", steps_text, f"{axis.steps:.9g}"))
     return wrong
 
 
-def _steps(section: Mapping[str, Any]) -> float | None:
+def _steps_per_unit(section: Mapping[str, Any]) -> float | None:
     """Steps a unit of a section, None if it does not tell."""
     try:
         ratio = math.prod(float(a) / float(b) for a, b in section.get("gear_ratio") or ())

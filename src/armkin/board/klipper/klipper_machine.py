@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.motion_start import unbelievable
+from armkin.board.backend.motion_start import why_impossible
 from armkin.board.backend.position_record import Record
 from armkin.board.backend.sent_positions import Job, braking_time
 from armkin.board.backend.stepper_arm import StepperArm
@@ -37,7 +37,7 @@ _REST = 30.0  # [s] until what was sent must be done
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
     """A trajectory from counts `start` (motors,) on, for Klipper."""
-    return Job(trajectory, start, trajectory_to_g1_lines.segments(trajectory))
+    return Job(trajectory, start, trajectory_to_g1_lines.line_count(trajectory))
 
 
 class KlipperMachine(StepperArm):
@@ -54,9 +54,9 @@ class KlipperMachine(StepperArm):
         self.arm, self.port, self._stop = arm, port, stop
         self.axes = axes_of(arm)
         self.api = Api(port)
-        told = self.api.ask("info")
-        self.version, self.state = str(told.get("software_version", "")), str(told.get("state", ""))
-        self._message = str(told.get("state_message", "")).partition("\n")[0]
+        info = self.api.ask("info")
+        self.version, self.state = str(info.get("software_version", "")), str(info.get("state", ""))
+        self._message = str(info.get("state_message", "")).partition("\n")[0]
         self._loss_reason, self._counts = "it was not read", np.zeros(len(self.axes), dtype=np.int64)
         self._record, self._marks = Record(port, arm), dict[str, str]()
         self.settings: dict[str, Any] = {}
@@ -102,7 +102,7 @@ class KlipperMachine(StepperArm):
             limits = f"LIMIT_VELOCITY={axis.max_speed * 1.001:.6f} LIMIT_ACCEL={axis.max_accel:.6f}"
             corner = f"INSTANTANEOUS_CORNER_VELOCITY={axis.corner:.6f}"
             self.api.run(f"{begin} GCODE_AXIS=\n{place}\n{begin} GCODE_AXIS={axis.letter} {limits} {corner}")
-        if self._ask() or self.counts() != tuple(counts):
+        if self._read_state() or self.counts() != tuple(counts):
             raise LinkError("Klipper did not take the arm's position: is it older than November 2025? Update it")
         self._record.write_position(self._marks, counts, [0] * len(counts))
         self._read()
@@ -115,11 +115,11 @@ class KlipperMachine(StepperArm):
 
     def _carry_out(self, job: Job, report: Callable[[float], None]) -> bool:
         """Send a job's lines in their time, to the end of all that Klipper holds."""
-        whole = self._follow(job, report)
+        is_complete = self._follow(job, report)
         self._settle()
         if not self.loss_reason:
             self._record.write_position(self._marks, self.counts(), [0] * len(self.axes))
-        return whole and not self._stop()
+        return is_complete and not self._stop()
 
     def hold(self) -> None:
         """Wait until what was sent is done: Klipper takes nothing of it back."""
@@ -135,20 +135,22 @@ class KlipperMachine(StepperArm):
         while chunk := [line for _, line in zip(range(_CHUNK), source, strict=False)]:
             self.api.send("gcode/script", {"script": "\n".join(chunk)})
             ahead = began + lines.sent - _SPARE - ramp
-            while self.api.waiting() > _PENDING or (not stopping and self.port.now() < ahead):
+            while self.api.count_waiting() > _PENDING or (not stopping and self.port.now() < ahead):
                 if not stopping and self._stop():
                     stopping = True
                     lines.brake(ramp)
                 self.api.pump(0.01)
                 report(min(self.port.now() - began, job.duration))
                 if self.port.now() - began > lines.sent + _REST:
-                    raise LinkError(f"Klipper on {self.port.name} has left {self.api.waiting()} requests unanswered")
+                    raise LinkError(
+                        f"Klipper on {self.port.name} has left {self.api.count_waiting()} requests unanswered"
+                    )
         return not stopping
 
     def _settle(self) -> None:
         """Wait until all that Klipper holds is done, and read where the arm stands."""
         self.api.run("M400", _REST)
-        self.api.waiting()
+        self.api.count_waiting()
         self._read()
 
     def _explain(self, error: LinkError) -> LinkError:
@@ -165,44 +167,46 @@ class KlipperMachine(StepperArm):
 
     def _read(self) -> None:
         """Read where the arm stands: known while that is where armkin left it."""
-        why = self._ask() or self._record.differs(self._marks)
-        self._loss_reason = why or self._record.moved_text(self.counts()) or unbelievable(self.arm, self.counts()) or ""
+        why = self._read_state() or self._record.differs(self._marks)
+        self._loss_reason = (
+            why or self._record.moved_text(self.counts()) or why_impossible(self.arm, self.counts()) or ""
+        )
 
-    def _ask(self) -> str:
+    def _read_state(self) -> str:
         """Read Klipper's state, its configuration and its places; returns why these mean nothing, in words."""
-        found = self.api.query(
+        objects = self.api.query(
             webhooks=["state", "state_message"],
             configfile=["settings"],
             toolhead=["position"],
             gcode_move=["axis_map"],
             stepper_enable=["steppers"],
         )
-        self.state = str(found["webhooks"].get("state", self.state))
-        self._message = str(found["webhooks"].get("state_message", self._message)).partition("\n")[0]
-        self.settings = _dict(found["configfile"].get("settings"))
-        letters = _dict(found["gcode_move"].get("axis_map"))
-        values = _places(found["toolhead"].get("position"), letters, self.axes)
-        on = _dict(found["stepper_enable"].get("steppers"))
-        off = [axis.section for axis in self.axes if on.get(f"manual_stepper {axis.section}") is not True]
+        self.state = str(objects["webhooks"].get("state", self.state))
+        self._message = str(objects["webhooks"].get("state_message", self._message)).partition("\n")[0]
+        self.settings = _as_dict(objects["configfile"].get("settings"))
+        letters = _as_dict(objects["gcode_move"].get("axis_map"))
+        values = _axis_places(objects["toolhead"].get("position"), letters, self.axes)
+        enabled = _as_dict(objects["stepper_enable"].get("steppers"))
+        disabled = [axis.section for axis in self.axes if enabled.get(f"manual_stepper {axis.section}") is not True]
         if self.state != "ready":
             return f"Klipper is in state {self.state}: {self._message}"
         if values is None:
             return "Klipper does not tell the axes' places: it was restarted, or nobody has said where the arm stands"
-        if off:
-            return f"motors are off: {', '.join(off)}"
+        if disabled:
+            return f"motors are off: {', '.join(disabled)}"
         self._marks = {f"axis {axis.letter}": f"number {letters[axis.letter]}" for axis in self.axes}
         steps = [(value - axis.at_home) * axis.steps for value, axis in zip(values, self.axes, strict=True)]
         self._counts = np.rint(steps).astype(np.int64)
         return ""
 
 
-def _dict(value: object) -> dict[str, Any]:
+def _as_dict(value: object) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _places(position: object, places: dict[str, Any], axes: Sequence[Axis]) -> list[float] | None:
+def _axis_places(position: object, places: dict[str, Any], axes: Sequence[Axis]) -> list[float] | None:
     """Where the axes stand in a coordinate, by the places of their letters in it; None if it does not tell all."""
-    found = []
+    values = []
     for axis in axes:
         k = places.get(axis.letter)
         if not isinstance(position, list) or not isinstance(k, int) or not 0 <= k < len(position):
@@ -210,5 +214,5 @@ def _places(position: object, places: dict[str, Any], axes: Sequence[Axis]) -> l
         value = position[k]
         if not isinstance(value, int | float) or not abs(value) < _FARTHEST:
             return None
-        found.append(float(value))
-    return found
+        values.append(float(value))
+    return values

@@ -27,9 +27,9 @@ _ROWS = 256  # lines that are worked out at once
 _SHORT = 1e-4  # [s] of a piece that joins the next one: X has five decimals
 
 
-def segments(trajectory: Trajectory) -> int:
+def line_count(trajectory: Trajectory) -> int:
     """Lines that a trajectory is sent in."""
-    return len(_times(trajectory))
+    return len(_piece_times(trajectory))
 
 
 class Lines:
@@ -48,46 +48,48 @@ class Lines:
         self._slower = PIECE / max(seconds, PIECE)
 
     def __iter__(self) -> Iterator[str]:
-        times, t = _times(self._job.trajectory), 0.0
+        times, t = _piece_times(self._job.trajectory), 0.0
         for begin in range(0, len(times), _ROWS):
-            some = times[begin : begin + _ROWS]
-            for now, values in zip(some.tolist(), self._units(some), strict=True):
+            chunk = times[begin : begin + _ROWS]
+            for time, values in zip(chunk.tolist(), self._values_at(chunk), strict=True):
                 if self._slower is not None:
                     break
-                t = now
-                yield self._line(t, self._rest_position(t) if t == self._job.duration else values)
+                t = time
+                yield self._line_to(t, self._rest_position(t) if t == self._job.duration else values)
         pace = 1.0
         while self._slower is not None and t < self._job.duration and pace > 0.0:
             pace = max(0.0, pace - self._slower)
             t = min(self._job.duration, t + PIECE * pace)
             rests = t == self._job.duration or pace == 0.0
-            yield self._line(self.sent + PIECE, self._rest_position(t) if rests else self._units(np.array([t]))[0])
+            yield self._line_to(
+                self.sent + PIECE, self._rest_position(t) if rests else self._values_at(np.array([t]))[0]
+            )
 
-    def _units(self, t: Array) -> list[list[float]]:
+    def _values_at(self, t: Array) -> list[list[float]]:
         """Where the axes are at times (T,) of the plan: T rows of axes, in Klipper's units."""
-        return self._scaled(places(self._job.trajectory.arm, self._job.trajectory.q(t)))
+        return self._to_units(places(self._job.trajectory.arm, self._job.trajectory.q(t)))
 
     def _rest_position(self, t: float) -> list[float]:
         """Where the axes come to rest at a time of the plan: on whole steps."""
-        return self._scaled(pulses(self._job.trajectory.arm, self._job.trajectory.q([t])))[0]
+        return self._to_units(pulses(self._job.trajectory.arm, self._job.trajectory.q([t])))[0]
 
-    def _scaled(self, counts: Array | NDArray[np.int64]) -> list[list[float]]:
+    def _to_units(self, counts: Array | NDArray[np.int64]) -> list[list[float]]:
         steps, home = (np.array([getattr(axis, name) for axis in self._axes]) for name in ("steps", "at_home"))
         values: list[list[float]] = (home + counts / steps).tolist()
         return values
 
-    def _line(self, x: float, values: Sequence[float]) -> str:
+    def _line_to(self, x: float, values: Sequence[float]) -> str:
         """The line to these places, which X reaches at second x."""
         self.sent = x
         words = " ".join(f"{axis.letter}{value:.6f}" for axis, value in zip(self._axes, values, strict=True))
         return f"G1 X{RATE * x:.5f} {words} F{60 * RATE:g}"
 
 
-def _times(trajectory: Trajectory) -> Array:
+def _piece_times(trajectory: Trajectory) -> Array:
     """Ends of the pieces [s]: every stretch in equal ones of PIECE at most."""
-    found = [np.zeros(0)]
+    ends = [np.zeros(0)]
     for stretch, began in zip(trajectory.stretches, trajectory.begins, strict=False):
         count = max(int(np.ceil(stretch.duration / PIECE)), 1)
-        found.append(began + np.linspace(0.0, stretch.duration, count + 1)[1:])
-    times = np.concatenate(found)
+        ends.append(began + np.linspace(0.0, stretch.duration, count + 1)[1:])
+    times = np.concatenate(ends)
     return np.asarray(times[np.append(np.diff(times) > _SHORT, np.ones(len(times[:1]), dtype=bool))])

@@ -13,7 +13,7 @@ socket_port.py  the Unix socket of a program on this computer
 from armkin.board.ports.boot_loader import leave_boot_loader
 from armkin.board.ports.logged_port import LOG, with_log
 from armkin.board.ports.port import BAUD, SIM, Port
-from armkin.board.ports.port_lock import ask_to_stop, holder, holder_rate, note_path, record_path
+from armkin.board.ports.port_lock import ask_to_stop, holder_pid, holder_rate, note_path, record_path
 from armkin.board.ports.port_notes import read_note, remove_note, write_note
 from armkin.board.ports.serial_port import Found, SerialPort, list_ports
 from armkin.board.ports.socket_port import SocketPort, is_socket
@@ -27,7 +27,7 @@ __all__ = [
     "SerialPort",
     "SocketPort",
     "ask_to_stop",
-    "holder",
+    "holder_pid",
     "holder_rate",
     "is_socket",
     "leave_boot_loader",

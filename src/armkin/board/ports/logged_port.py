@@ -23,10 +23,10 @@ class Traced:
 
     def read(self, timeout: float) -> bytes:
         """What has come, or comes within `timeout` seconds."""
-        data = self.inner.read(timeout)
-        if data:
-            LOG.debug("%.6f %s < %r", self.inner.now(), self.name, data)
-        return data
+        received = self.inner.read(timeout)
+        if received:
+            LOG.debug("%.6f %s < %r", self.inner.now(), self.name, received)
+        return received
 
     def now(self) -> float:
         """Seconds on the clock."""

@@ -36,24 +36,24 @@ class Lock:
         self._lock: BaseFileLock | None = None
         if "://" in name:
             return
-        lock = _acquired(name)
+        lock = _try_lock(name)
         if lock is None:
             holder = _read_pid(name)
             message = f"port {name} is in use by armkin (process {holder})"
             raise PortInUseError(message, advice="wait for it", port=name, process=holder)
         self._lock = lock
-        self._pid = _path(name, "pid")
+        self._pid = _lock_path(name, "pid")
         with suppress(OSError):
             os.unlink(self._pid)  # whatever stands there, and be it a link to somewhere else
         with suppress(OSError), open(self._pid, "x", encoding="ascii") as file:
-            file.write(f"{os.getpid()} {_born(os.getpid())} {rate}")
+            file.write(f"{os.getpid()} {_start_ticks(os.getpid())} {rate}")
         if not _signals:
-            self._request = _path(name, "stop")
+            self._request = _lock_path(name, "stop")
             with suppress(OSError):
                 os.unlink(self._request)  # it was meant for who had the port before
-            threading.Thread(target=self._listen, daemon=True).start()
+            threading.Thread(target=self._forward_stop, daemon=True).start()
 
-    def _listen(self) -> None:
+    def _forward_stop(self) -> None:
         """Raise in this process the signal that others cannot send to it."""
         while self._lock is not None:
             with suppress(OSError):
@@ -71,12 +71,12 @@ class Lock:
             self._lock = None
 
 
-def holder(name: str) -> int | None:
+def holder_pid(name: str) -> int | None:
     """Process that holds a port for armkin; None if none does."""
     if "://" in name or name == SIM:
         return None
     try:
-        lock = _acquired(name)
+        lock = _try_lock(name)
     except OSError:
         return None
     if lock is None:
@@ -88,7 +88,7 @@ def holder(name: str) -> int | None:
 def ask_to_stop(name: str, process: int) -> None:
     """Ask the process that holds a port to stop its arm and to give the port back. Raises OSError."""
     if sys.platform == "win32" or not _signals:
-        with open(_path(name, "stop"), "w", encoding="ascii"):
+        with open(_lock_path(name, "stop"), "w", encoding="ascii"):
             return
     os.kill(process, signal.SIGTERM)
     os.kill(process, signal.SIGCONT)  # a suspended one hears it only when it goes on
@@ -102,19 +102,19 @@ def holder_rate(name: str) -> int | None:
 
 def note_path(name: str) -> str:
     """The file beside a port's lock that notes the motion under way."""
-    return _path(name, "motion")
+    return _lock_path(name, "motion")
 
 
 def record_path(name: str) -> str:
     """The file beside a port's lock that records what was last left on the board behind it."""
-    return _path(name, "board")
+    return _lock_path(name, "board")
 
 
-def _acquired(name: str) -> BaseFileLock | None:
+def _try_lock(name: str) -> BaseFileLock | None:
     """The lock of a port, or None if another has it. (flock on POSIX, msvcrt.locking on Windows.)"""
     from filelock import FileLock, Timeout
 
-    lock = FileLock(_path(name, "lock"))
+    lock = FileLock(_lock_path(name, "lock"))
     try:
         lock.acquire(timeout=0)
     except Timeout:
@@ -122,7 +122,7 @@ def _acquired(name: str) -> BaseFileLock | None:
     return lock
 
 
-def _path(name: str, end: str) -> str:
+def _lock_path(name: str, end: str) -> str:
     real = name if "://" in name else os.path.realpath(name)
     key = hashlib.sha256(real.encode("utf-8", "surrogateescape")).hexdigest()[:16]
     return f"{of_port(key)}.{end}"
@@ -131,19 +131,19 @@ def _path(name: str, end: str) -> str:
 def _read_pid(name: str) -> int | None:
     """The process that wrote the file beside a lock, if it still is that process: by its number and its birth."""
     number, born, _ = (*_pid_file(name), "", "", "")[:3]
-    return int(number) if number.isdigit() and born == _born(int(number)) else None
+    return int(number) if number.isdigit() and born == _start_ticks(int(number)) else None
 
 
 def _pid_file(name: str) -> list[str]:
     """Words of the file beside a lock: a process, its birth, its rate; [] if there is none."""
     try:
-        with open(_path(name, "pid"), encoding="ascii") as file:
+        with open(_lock_path(name, "pid"), encoding="ascii") as file:
             return file.read(60).split(" ")
     except (OSError, ValueError):
         return []
 
 
-def _born(process: int) -> str:
+def _start_ticks(process: int) -> str:
     """When a process was started, in ticks since this boot (Linux); elsewhere the lock alone is asked."""
     try:
         with open(f"/proc/{process}/stat", "rb") as file:

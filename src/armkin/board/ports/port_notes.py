@@ -9,15 +9,15 @@ from contextlib import suppress
 from typing import Any
 
 
-def write_note(path: str, data: Mapping[str, Any]) -> None:
+def write_note(path: str, note: Mapping[str, Any]) -> None:
     """Replace a note as a whole; a full disk costs the note, not the motion."""
-    new = f"{path}.{os.getpid()}"
+    draft = f"{path}.{os.getpid()}"
     with suppress(OSError):
-        remove_note(new)
-        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        remove_note(draft)
+        handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with os.fdopen(handle, "w", encoding="ascii") as file:
-            json.dump(data, file)
-        os.replace(new, path)  # a link of that name is replaced, not followed
+            json.dump(note, file)
+        os.replace(draft, path)  # a link of that name is replaced, not followed
 
 
 def read_note(path: str, most: int) -> dict[str, Any] | None:
@@ -27,10 +27,10 @@ def read_note(path: str, most: int) -> dict[str, Any] | None:
         with os.fdopen(handle, encoding="ascii") as file:
             if hasattr(os, "getuid") and os.fstat(file.fileno()).st_uid != os.getuid():
                 return None
-            told = json.loads(file.read(most))
+            note = json.loads(file.read(most))
     except (OSError, ValueError, RecursionError):
         return None
-    return told if isinstance(told, dict) else None
+    return note if isinstance(note, dict) else None
 
 
 def remove_note(path: str) -> None:

@@ -12,27 +12,27 @@ _LONGEST = 4096  # bytes of a file's name
 
 def write_scene(port: str, scene: str) -> None:
     """Note the scene's file."""
-    path = _path(port)
+    path = _scene_note_path(port)
     with suppress(OSError):
         os.unlink(path)  # whatever stands there, and be it a link to somewhere else
     with open(path, "x", encoding="utf-8") as file:
         file.write(os.path.abspath(scene))
 
 
-def last(port: str) -> str:
+def last_scene(port: str) -> str:
     """The file that was noted last; empty if there is none."""
     try:
-        with open(_path(port), encoding="utf-8") as file:
+        with open(_scene_note_path(port), encoding="utf-8") as file:
             return file.read(_LONGEST)
     except (OSError, ValueError):
         return ""
 
 
-def forget(port: str) -> None:
+def forget_scene(port: str) -> None:
     """Forget it."""
     with suppress(OSError):
-        os.unlink(_path(port))
+        os.unlink(_scene_note_path(port))
 
 
-def _path(port: str) -> str:
+def _scene_note_path(port: str) -> str:
     return f"{note_path(port)}.scene"

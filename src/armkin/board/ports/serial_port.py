@@ -52,18 +52,18 @@ class SerialPort:
         """What has come, or comes within `timeout` seconds."""
         end = time.monotonic() + timeout
         while True:
-            data: bytes = self._guard(self._read_some)
-            if data or time.monotonic() >= end:
-                return data
+            received: bytes = self._guard(self._read_some)
+            if received or time.monotonic() >= end:
+                return received
 
     def _read_some(self) -> bytes:
-        data: bytes = self._serial.read(1)
-        while 0 < len(data) < _MOST and (waiting := self._serial.in_waiting):
+        received: bytes = self._serial.read(1)
+        while 0 < len(received) < _MOST and (waiting := self._serial.in_waiting):
             more: bytes = self._serial.read(min(waiting, _MOST))
             if not more:
                 break
-            data += more
-        return data
+            received += more
+        return received
 
     def now(self) -> float:
         """Seconds of the monotonic clock."""
@@ -100,12 +100,12 @@ class SerialPort:
             return action()
         except (serial.SerialException, OSError, TypeError) as error:  # TypeError: closed while reading
             raise LinkError(
-                f"port {self.name} is gone ({_reason(error)}): is the cable plugged in?\n"
+                f"port {self.name} is gone ({_error_reason(error)}): is the cable plugged in?\n"
                 "a board that takes its power from the cable has lost its position: armkin status tells"
             ) from None
 
 
-def check(name: str) -> None:
+def check_port(name: str) -> None:
     """Raise LinkError if there is no port of that name; one that is there is not opened, and not reset."""
     import serial
 
@@ -114,9 +114,9 @@ def check(name: str) -> None:
         if "://" in name:
             serial.serial_for_url(name, do_not_open=True)
         elif os.name == "posix":
-            found = os.stat(name)
-            memory = sys.platform == "linux" and os.major(found.st_rdev) == 1  # /dev/null and its kin
-            if not stat.S_ISCHR(found.st_mode) or memory:
+            status = os.stat(name)
+            memory = sys.platform == "linux" and os.major(status.st_rdev) == 1  # /dev/null and its kin
+            if not stat.S_ISCHR(status.st_mode) or memory:
                 raise OSError(errno.ENOTTY, os.strerror(errno.ENOTTY))
             if not os.access(name, os.R_OK | os.W_OK):
                 raise OSError(errno.EACCES, os.strerror(errno.EACCES))
@@ -185,12 +185,12 @@ def _no_url(name: str, error: Exception) -> str:
 
 
 def _cannot_open(name: str, error: Exception) -> str:
-    reason = _reason(error)
+    reason = _error_reason(error)
     stated = re.search(r"(?:Errno |\()(\d+)", reason)  # pyserial keeps some numbers in its text alone
     number = getattr(error, "errno", None) or (int(stated[1]) if stated else None)
     if number == errno.ENOENT or "FileNotFound" in reason:
-        found = ", ".join(port.device for port in list_ports())
-        return f"there is no port {name}; armkin ports lists them ({found or 'none is plugged in'}), or use sim"
+        ports_text = ", ".join(port.device for port in list_ports())
+        return f"there is no port {name}; armkin ports lists them ({ports_text or 'none is plugged in'}), or use sim"
     if number == errno.EACCES or "PermissionError" in reason:
         return f"port {name}: permission denied; on Linux add yourself to the group dialout, then log in again"
     if "exclusively lock" in reason or number in (errno.EAGAIN, errno.EBUSY):
@@ -202,7 +202,7 @@ def _cannot_open(name: str, error: Exception) -> str:
     return f"port {name} cannot be opened: {reason}"
 
 
-def _reason(error: Exception) -> str:
+def _error_reason(error: Exception) -> str:
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return str(text).splitlines()[0]
 
@@ -247,11 +247,11 @@ def list_ports() -> list[Found]:
     """Serial ports, those that look like an Arduino first."""
     from serial.tools import list_ports as tools
 
-    found = []
+    ports = []
     for port in tools.comports():
         looks = _LOOKS.get((port.vid or 0, port.pid or 0), "")
         if port.vid is None and looks == "" and port.description in ("n/a", None, port.name):
             continue  # a mainboard's empty ttyS
         adapter = _ADAPTERS.get((port.vid or 0, port.pid or 0), "")
-        found.append(Found(port.device, port.description or "", port.hwid or "", looks, adapter))
-    return sorted(found, key=lambda f: (not f.board, f.device))
+        ports.append(Found(port.device, port.description or "", port.hwid or "", looks, adapter))
+    return sorted(ports, key=lambda f: (not f.board, f.device))

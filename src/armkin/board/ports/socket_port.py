@@ -51,12 +51,12 @@ class SocketPort:
             ready, _, _ = select.select([self._socket], [], [], max(timeout, 0.0))
             if not ready:
                 return b""
-            data = self._socket.recv(65_536)
+            received = self._socket.recv(65_536)
         except (OSError, ValueError) as error:
             raise LinkError(f"{self.name} is gone ({error}): does Klipper still run?") from None
-        if not data:
+        if not received:
             raise LinkError(f"{self.name} was closed at the other end: does Klipper still run?")
-        return data
+        return received
 
     def now(self) -> float:
         """Seconds of the monotonic clock."""
@@ -72,6 +72,6 @@ def _open_error(name: str, error: OSError) -> str:
     if isinstance(error, FileNotFoundError):
         return f"there is no socket {name}: klippy.py is started with -a {name}"
     if isinstance(error, ConnectionRefusedError):
-        what = "nobody listens there: does Klipper run?" if is_socket(name) else "it is no socket"
-        return f"port {name}: {what}"
+        cause = "nobody listens there: does Klipper run?" if is_socket(name) else "it is no socket"
+        return f"port {name}: {cause}"
     return f"port {name} cannot be opened: {error.strerror or error}"

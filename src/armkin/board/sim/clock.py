@@ -24,8 +24,8 @@ class SimulatedTime(ABC):
         end = self._now + timeout
         while not self._out and self._now < end:
             self.advance(self.step)
-        data, self._out = bytes(self._out), bytearray()
-        return data
+        answered, self._out = bytes(self._out), bytearray()
+        return answered
 
     def now(self) -> float:
         """Simulated seconds."""

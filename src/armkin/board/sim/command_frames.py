@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from armkin.board.firmware.wire.protocol import Error, State, Type
 from armkin.board.sim.digital_inputs import Inputs
 from armkin.board.sim.frame_fields import RefusedError, axes_of
-from armkin.board.sim.frame_fields import batch as read_batch
+from armkin.board.sim.frame_fields import read_batch as read_batch
 from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.motion_frame_checks import Batches
 from armkin.board.sim.sim_homing import Search
@@ -29,7 +29,7 @@ class Commands:
             Type.COMMIT: self._commit,
             Type.ENABLE: self._enable,
             Type.SET_POSITION: self._set_position,
-            Type.MOTION: self._motion,
+            Type.MOTION: self._queue_motion,
             Type.HOME: self._home,
             Type.JOG: self._jog,
         }
@@ -40,7 +40,7 @@ class Commands:
             raise RefusedError(Error.TYPE)
         self._handlers[Type(payload[0])](payload)
 
-    def _needs(self, *states: State, config: bool = True, abort: bool = False) -> None:
+    def _require_state(self, *states: State, config: bool = True, abort: bool = False) -> None:
         if config and not self._setup.crc:
             raise RefusedError(Error.CONFIG_NONE)
         if abort and self._inputs.aborted():
@@ -56,14 +56,14 @@ class Commands:
     def _configure(self, payload: bytes) -> None:
         if len(payload) < 5:
             raise RefusedError(Error.LENGTH)
-        self._needs(State.IDLE, config=False)
+        self._require_state(State.IDLE, config=False)
         self._setup.write(struct.unpack_from("<H", payload, 2)[0], payload[4:])
         self._motors.axes.known = 0
 
     def _commit(self, payload: bytes) -> None:
         if len(payload) != 8:
             raise RefusedError(Error.LENGTH)
-        self._needs(State.IDLE, config=False)
+        self._require_state(State.IDLE, config=False)
         self._setup.commit(*struct.unpack_from("<HI", payload, 2))
 
     def _enable(self, payload: bytes) -> None:
@@ -71,7 +71,7 @@ class Commands:
             raise RefusedError(Error.LENGTH)
         if payload[2] > 3:
             raise RefusedError(Error.VALUE)
-        self._needs(State.IDLE)
+        self._require_state(State.IDLE)
         self._setup.drivers, self._setup.pulses = bool(payload[2] & 1), bool(payload[2] & 2)
         if not self._setup.drivers:
             self._motors.axes.known &= self._board.servo_mask
@@ -86,7 +86,7 @@ class Commands:
             raise RefusedError(Error.LENGTH)
         if self._inputs.power_cut():
             raise RefusedError(Error.POWER)
-        self._needs(State.IDLE)
+        self._require_state(State.IDLE)
         counts = dict(zip(axes, struct.unpack_from(f"<{len(axes)}i", payload, 4), strict=True))
         for i, count in counts.items():
             if not self._setup.used(i) or abs(count) > 2**30:
@@ -99,12 +99,12 @@ class Commands:
         self._motors.place(counts)
         self._setup.retained = False
 
-    def _motion(self, payload: bytes) -> None:
+    def _queue_motion(self, payload: bytes) -> None:
         batch, queue = read_batch(payload), self._motors.queue
-        self._needs(*_RUNNING, abort=True)
+        self._require_state(*_RUNNING, abort=True)
         counts = queue.plan_counts()
         for axis, start in zip(batch.axes, batch.start, strict=True):
-            self._ready(axis)
+            self._check_axis_ready(axis)
             if counts[axis] != start:
                 raise RefusedError(Error.START, axis)
         if len(batch.segments) > queue.free:
@@ -117,7 +117,7 @@ class Commands:
             raise RefusedError(Error.LIMIT_SWITCH, switch)
         self._motors.append(segments, batch.at_rest, batch.brake)
 
-    def _ready(self, axis: int) -> None:
+    def _check_axis_ready(self, axis: int) -> None:
         """Raise unless an axis is used, known and has its drivers or pulses on."""
         if not self._setup.used(axis):
             raise RefusedError(Error.VALUE, axis)
@@ -126,7 +126,7 @@ class Commands:
         if not self._setup.powered(axis):
             raise RefusedError(Error.DISABLED, axis)
 
-    def _rates(self, rate: Sequence[int], *, jogging: bool) -> None:
+    def _check_rates(self, rate: Sequence[int], *, jogging: bool) -> None:
         """Raise unless axes may move at these rates without a plan."""
         moving = [i for i, r in enumerate(rate) if r]
         slow = jogging and not all(self._axis_known(i) for i in moving)
@@ -147,19 +147,19 @@ class Commands:
         n = len(self._board.axes)
         if len(payload) != 15 + 4 * n:
             raise RefusedError(Error.LENGTH)
-        self._needs(State.IDLE, abort=True)
+        self._require_state(State.IDLE, abort=True)
         switch, flags, slow, backoff, travel, time, *rate = struct.unpack_from(f"<BBBIIH{n}i", payload, 2)
         far = backoff > 2**30 or travel > 2**30
         if not any(rate) or switch >= len(self._board.switches) or flags > 1 or not slow or not backoff or far:
             raise RefusedError(Error.VALUE)
-        self._rates(rate, jogging=False)
+        self._check_rates(rate, jogging=False)
         self._motors.home(Search(switch, bool(flags), slow / 256, backoff, travel, time / 10, rate))
 
     def _jog(self, payload: bytes) -> None:
         n = len(self._board.axes)
         if len(payload) != 2 + 4 * n:
             raise RefusedError(Error.LENGTH)
-        self._needs(State.IDLE, State.JOGGING, abort=True)
+        self._require_state(State.IDLE, State.JOGGING, abort=True)
         rate = list(struct.unpack_from(f"<{n}i", payload, 2))
-        self._rates(rate, jogging=True)
+        self._check_rates(rate, jogging=True)
         self._motors.jog(rate)

@@ -16,20 +16,20 @@ class Rows:
         self._image = image
         self._nearest = [row_value(row, counts) for row in image.rows] if counts else []
 
-    def check(self, counts: list[int], known: int) -> None:
+    def check(self, counts: list[int], known_axes: int) -> None:
         """Raise RefusedError if a segment that ends at `counts` takes a joint out of its limits."""
         for r, row in enumerate(self._image.rows):
             after, slack = row_value(row, counts), sum(map(abs, row.weight))
             low, high = min(row.lower, self._nearest[r] - slack), max(row.upper, self._nearest[r] + slack)
             outside = (after < row.lower and after < low) or (after > row.upper and after > high)
-            if outside and all(known >> i & 1 for i, w in enumerate(row.weight) if w):
+            if outside and all(known_axes >> i & 1 for i, w in enumerate(row.weight) if w):
                 raise RefusedError(Error.LIMIT_JOINT, r)
             nearer = after > self._nearest[r] if after < row.lower else after <= row.upper or after < self._nearest[r]
             if nearer:
                 self._nearest[r] = after
 
 
-def toward(guard: GuardImage, rates: Sequence[float]) -> bool:
+def leads_to_switch(guard: GuardImage, rates: Sequence[float]) -> bool:
     """Whether axes that move at these rates lead on into a switch."""
     parts = [w * r for w, r in zip(guard.weight, rates, strict=True)]
     return sum(parts) > max(map(abs, parts)) / 16

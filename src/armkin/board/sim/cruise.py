@@ -49,16 +49,20 @@ class Cruise:
 
     def clear(self) -> bool:
         """Whether the arm, were it to brake after the next millisecond, would stay within its limits."""
-        image, base, known = self.axes.image, self.axes.base, self.axes.known
+        image, base, known_axes = self.axes.image, self.axes.base, self.axes.known
         share = min(self.share + self.slope * _TICK, 1.0)
         ahead = share * _TICK + share * share / (2 * self.slope) + share * _TICK
-        there = [b + round(r * ahead + (r > 0) - (r < 0)) for b, r in zip(base, self.rate, strict=True)]
+        stop_counts = [b + round(r * ahead + (r > 0) - (r < 0)) for b, r in zip(base, self.rate, strict=True)]
         for i, axis in enumerate(image.axes):
-            if self.rate[i] and known >> i & 1 and not limit_rule_holds(axis.lower, axis.upper, base[i], there[i]):
+            if (
+                self.rate[i]
+                and known_axes >> i & 1
+                and not limit_rule_holds(axis.lower, axis.upper, base[i], stop_counts[i])
+            ):
                 return False
         for row in image.rows:
-            if all(known >> i & 1 for i, w in enumerate(row.weight) if w) and not limit_rule_holds(
-                row.lower, row.upper, row_value(row, base), row_value(row, there)
+            if all(known_axes >> i & 1 for i, w in enumerate(row.weight) if w) and not limit_rule_holds(
+                row.lower, row.upper, row_value(row, base), row_value(row, stop_counts)
             ):
                 return False
         return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from armkin.board.sim.coupled_limits import toward
+from armkin.board.sim.coupled_limits import leads_to_switch
 from armkin.board.sim.host_settings import Setup
 
 
@@ -34,7 +34,7 @@ class Inputs:
         if not self._setup.crc:
             return None
         for n, guard in enumerate(self._setup.image.guards):
-            if any(guard.weight) and self.level(n) == guard.closed and toward(guard, rates):
+            if any(guard.weight) and self.level(n) == guard.closed and leads_to_switch(guard, rates):
                 return n
         return None
 

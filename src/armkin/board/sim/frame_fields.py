@@ -31,7 +31,7 @@ class Batch:
     brake: float  # share of the accelerations that a hold takes
 
 
-def batch(payload: bytes) -> Batch:
+def read_batch(payload: bytes) -> Batch:
     """A MOTION frame's fields; its length must follow from them exactly."""
     if len(payload) < 6:
         raise RefusedError(Error.LENGTH)
@@ -44,7 +44,7 @@ def batch(payload: bytes) -> Batch:
     if n == 0 or gentle >= protocol.GENTLE_PARTS or len(payload) != 6 + 8 * k + n * size:
         raise RefusedError(Error.LENGTH)
     ends = struct.unpack_from(f"<{2 * k}i", payload, 6)
-    pieces = (payload[at : at + size] for at in range(6 + 8 * k, len(payload), size))
+    pieces = (payload[offset : offset + size] for offset in range(6 + 8 * k, len(payload), size))
     segments = [protocol.read_segment(piece, axes, wide=wide) for piece in pieces]
     return Batch(
         axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END), 1 - gentle / protocol.GENTLE_PARTS

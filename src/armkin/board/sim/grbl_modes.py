@@ -85,22 +85,22 @@ class Modes:
 
     def parameters(self) -> list[str]:
         """The answer to ``$#``."""
-        rows = [f"[{name}:{_listed(values)}]" for name, values in self.offsets.items()]
-        tool = _listed(self.tool) if self.hal else f"{self.tool[-1 if self.axes < 3 else 2]:.3f}"
-        return [*rows, f"[G92:{_listed(self.g92)}]", f"[TLO:{tool}]", f"[PRB:{_listed([0.0] * self.axes)}:0]"]
+        rows = [f"[{name}:{_join_values(values)}]" for name, values in self.offsets.items()]
+        tool = _join_values(self.tool) if self.hal else f"{self.tool[-1 if self.axes < 3 else 2]:.3f}"
+        return [*rows, f"[G92:{_join_values(self.g92)}]", f"[TLO:{tool}]", f"[PRB:{_join_values([0.0] * self.axes)}:0]"]
 
     # Lines
 
     def read(self, line: str) -> Words | int:
         """A line's words, or the number of its error."""
-        codes, values, spindle, at = list[float](), dict[str, float](), None, 0
-        while at < len(line):
-            letter, match = line[at], _NUMBER.match(line, at + 1)
+        codes, values, spindle, index = list[float](), dict[str, float](), None, 0
+        while index < len(line):
+            letter, match = line[index], _NUMBER.match(line, index + 1)
             if not "A" <= letter <= "Z":
                 return 1
             if match is None:
                 return 2
-            value, at = float(match[0]), match.end()
+            value, index = float(match[0]), match.end()
             if letter == "G":
                 codes.append(value)
             elif letter == "M":
@@ -111,25 +111,25 @@ class Modes:
                 return 25
             else:
                 values[letter] = value
-        return self._fitting(codes, values) or Words(frozenset(codes), spindle, values)
+        return self._fit_error(codes, values) or Words(frozenset(codes), spindle, values)
 
-    def _fitting(self, codes: Sequence[float], values: dict[str, float]) -> int:
+    def _fit_error(self, codes: Sequence[float], values: dict[str, float]) -> int:
         """The error of words that do not fit together, 0 if they do."""
-        asked = set(codes)
-        if asked - _KNOWN:
+        codes_given = set(codes)
+        if codes_given - _KNOWN:
             return 20
         if any(sum(code in group for code in codes) > 1 for group in _GROUPS):
             return 21
-        given = any(letter in values for letter in LETTERS[: self.axes])
-        if {92.0, 43.1} & asked and not given:
+        moves_axes = any(letter in values for letter in LETTERS[: self.axes])
+        if {92.0, 43.1} & codes_given and not moves_axes:
             return 26
-        if ({4.0, 10.0} & asked and "P" not in values) or (
-            10.0 in asked and not (given and values.get("L") in (2.0, 20.0))
+        if ({4.0, 10.0} & codes_given and "P" not in values) or (
+            10.0 in codes_given and not (moves_axes and values.get("L") in (2.0, 20.0))
         ):
             return 28
-        return self._unmovable(asked, values) if given and not asked & _USES_AXES else 0
+        return self._move_error(codes_given, values) if moves_axes and not codes_given & _USES_AXES else 0
 
-    def _unmovable(self, codes: set[float], values: dict[str, float]) -> int:
+    def _move_error(self, codes: set[float], values: dict[str, float]) -> int:
         """The error of axis words that are a move, 0 if it can be made."""
         motion = next(iter(codes & _MOTION), self.motion)
         if motion == 80.0:
@@ -140,17 +140,17 @@ class Modes:
     def obey(self, words: Words, position: Sequence[float]) -> list[float] | None:
         """Take over a line's modes and offsets; where it moves to, in machine units, from `position`; None: nowhere."""
         for code in sorted(words.codes):
-            self._mode(code)
+            self._set_mode(code)
         values, unit = words.values, self.unit
         if "F" in values or self.inverse:
             self.feed = values.get("F", 0.0) * (1.0 if self.inverse else unit)
-        given = {k: values[letter] * unit for k, letter in enumerate(LETTERS[: self.axes]) if letter in values}
+        axis_values = {k: values[letter] * unit for k, letter in enumerate(LETTERS[: self.axes]) if letter in values}
         if words.codes & _OFFSETS:
-            self._offset(words, given, position)
+            self._set_offset(words, axis_values, position)
         elif 28.0 in words.codes:
             return list(self.offsets["G28"])
-        elif given and self.motion != 80.0:
-            return self._goal(given, position, absolute=53.0 in words.codes)
+        elif axis_values and self.motion != 80.0:
+            return self._goal(axis_values, position, absolute=53.0 in words.codes)
         return None
 
     def _goal(self, axes: dict[int, float], position: Sequence[float], *, absolute: bool) -> list[float]:
@@ -158,7 +158,7 @@ class Modes:
         zero = [0.0] * self.axes if absolute else position if self.relative else self.work()
         return [axes[k] + zero[k] if k in axes else position[k] for k in range(self.axes)]
 
-    def _offset(self, words: Words, axes: dict[int, float], position: Sequence[float]) -> None:
+    def _set_offset(self, words: Words, axes: dict[int, float], position: Sequence[float]) -> None:
         """G92, G92.1, G10 and G43.1."""
         if 92.1 in words.codes:
             self.g92 = [0.0] * self.axes
@@ -166,11 +166,11 @@ class Modes:
             base = [a + b for a, b in zip(self.offsets[self.system], self.tool, strict=True)]
             self.g92 = [position[k] - base[k] - axes[k] if k in axes else v for k, v in enumerate(self.g92)]
         elif 10.0 in words.codes:
-            self._write(words.values, axes, position)
+            self._store_offset(words.values, axes, position)
         else:
             self.tool = [axes.get(k, v) for k, v in enumerate(self.tool)]
 
-    def _mode(self, code: float) -> None:
+    def _set_mode(self, code: float) -> None:
         if code in _MOTION:
             self.motion = code
         elif code in (17.0, 18.0, 19.0):
@@ -186,7 +186,7 @@ class Modes:
         elif code == 49.0:
             self.tool = [0.0] * self.axes
 
-    def _write(self, values: dict[str, float], axes: dict[int, float], position: Sequence[float]) -> None:
+    def _store_offset(self, values: dict[str, float], axes: dict[int, float], position: Sequence[float]) -> None:
         """G10: an offset that outlives resets and power."""
         number = int(values["P"])
         rows = self.offsets[self.system if number == 0 else SYSTEMS[number - 1]]
@@ -194,5 +194,5 @@ class Modes:
             rows[k] = value if values["L"] == 2.0 else position[k] - self.g92[k] - self.tool[k] - value
 
 
-def _listed(values: Sequence[float]) -> str:
+def _join_values(values: Sequence[float]) -> str:
     return ",".join(f"{value:.3f}" for value in values)

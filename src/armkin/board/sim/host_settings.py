@@ -33,23 +33,23 @@ class Setup:
             self.crc = zlib.crc32(image)
         self.drivers, self.retained = drivers, True
 
-    def packed(self) -> bytes:
+    def packed_image(self) -> bytes:
         """The configuration's bytes, none if there is no configuration."""
         return self.image.pack() if self.crc else b""
 
-    def write(self, offset: int, data: bytes) -> None:
+    def write(self, offset: int, piece: bytes) -> None:
         """Write bytes of the next configuration: from now on there is none, and everything is off."""
-        if offset + len(data) > len(self._bytes):
+        if offset + len(piece) > len(self._bytes):
             raise RefusedError(Error.VALUE)
-        self._bytes[offset : offset + len(data)] = data
+        self._bytes[offset : offset + len(piece)] = piece
         self.crc = 0
         self.drivers = self.pulses = self.retained = False
 
     def commit(self, length: int, crc: int) -> None:
         """Put the bytes in force, if every field of theirs is in its range."""
-        data = bytes(self._bytes[:length])
-        image = Image.unpack(data, len(self.board.switches))
-        if image is None or len(data) != length or zlib.crc32(data) != crc or not image_valid(image, self.board):
+        raw = bytes(self._bytes[:length])
+        image = Image.unpack(raw, len(self.board.switches))
+        if image is None or len(raw) != length or zlib.crc32(raw) != crc or not image_valid(image, self.board):
             raise RefusedError(Error.CONFIG_BAD)
         self.image, self.crc = image, crc
 

@@ -25,10 +25,12 @@ class Batches:
         self._velocity = Velocity(self._setup.board, self._setup.image)
         self._rows = Rows(self._setup.image, self._queue.plan_counts())
 
-    def check(self, batch: Batch, known: int) -> list[Segment]:
+    def check(self, batch: Batch, known_axes: int) -> list[Segment]:
         """The batch's segments with a rate for every axis; RefusedError if one of them must not run."""
         plan, speed = list(self._queue.plan), self._velocity.copy()
-        segments = [self._segment(i, s, batch.axes, plan, speed, known) for i, s in enumerate(batch.segments)]
+        segments = [
+            self._check_segment(i, s, batch.axes, plan, speed, known_axes) for i, s in enumerate(batch.segments)
+        ]
         ends = dict(zip(batch.axes, batch.end, strict=True))
         for axis in range(len(plan)):
             if batch.at_rest:
@@ -38,24 +40,24 @@ class Batches:
         self._velocity = Velocity(self._setup.board, self._setup.image) if batch.at_rest else speed
         return segments
 
-    def _segment(
-        self, number: int, s: Segment, axes: list[int], plan: list[int], speed: Velocity, known: int
+    def _check_segment(
+        self, number: int, s: Segment, axes: list[int], plan: list[int], speed: Velocity, known_axes: int
     ) -> Segment:
         """A batch's segment with a rate for every axis; moves `plan` to its end."""
         if not times_valid(s, self._setup.board.min_interval):
             raise RefusedError(Error.INTERVAL, number)
         rates, before = [0] * len(plan), [p >> 23 for p in plan]
-        given = dict(zip(axes, s.rates, strict=True))
+        rate_of = dict(zip(axes, s.rates, strict=True))
         speed.begin(s)
         for axis in range(len(plan)):
-            rate = given.get(axis, 0)
+            rate = rate_of.get(axis, 0)
             if rate == -STEP:
                 raise RefusedError(Error.STEPS, axis)
             speed.check(axis, rate)
             rates[axis] = rate
             plan[axis] += s.ticks * rate
             image, after = self._setup.image.axes[axis], plan[axis] >> 23
-            if axis in given and not limit_rule_holds(image.lower, image.upper, before[axis], after):
+            if axis in rate_of and not limit_rule_holds(image.lower, image.upper, before[axis], after):
                 raise RefusedError(Error.LIMIT, axis)
-        self._rows.check([p >> 23 for p in plan], known)
+        self._rows.check([p >> 23 for p in plan], known_axes)
         return replace(s, rates=tuple(rates))

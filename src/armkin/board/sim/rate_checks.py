@@ -36,7 +36,7 @@ class Pace(NamedTuple):
     windows: int = 0  # of a longer one: 2^-8 of 50 ms; else 0
 
 
-def _quarter(start: int, end: int, windows: int) -> int:
+def _quarter_velocity(start: int, end: int, windows: int) -> int:
     """A quarter of the velocity in a segment's middle; of a longer one than 50 ms, 25 ms from its end `start`."""
     half = start >> 1
     change = (end >> 1) - half
@@ -58,10 +58,10 @@ class Velocity:
 
     def copy(self) -> Velocity:
         """The same, to go on from."""
-        other = Velocity(self.board, self.image)
-        other._last_ends, other._excess = list(self._last_ends), list(self._excess)
-        other._last_pace, other._pace = self._last_pace, self._pace
-        return other
+        twin = Velocity(self.board, self.image)
+        twin._last_ends, twin._excess = list(self._last_ends), list(self._excess)
+        twin._last_pace, twin._pace = self._last_pace, self._pace
+        return twin
 
     def begin(self, s: Segment) -> None:
         """Take up a segment, whose intervals have been checked."""
@@ -107,8 +107,8 @@ class Velocity:
         if between == _UNCHECKED << 16 or not (was or rate):
             self._excess[axis] = (0, 0)
             return
-        whole = 4 * ((1 << self._bits) // self.board.min_interval)
-        slack = whole + ((abs(left) + abs(last)) >> 2 * self._bits - 37)
+        four_intervals = 4 * ((1 << self._bits) // self.board.min_interval)
+        slack = four_intervals + ((abs(left) + abs(last)) >> 2 * self._bits - 37)
         change = abs(last - first)
         if pace.windows:
             bends = pace.windows < _ALL and change >> 8 > self._budget(axis, pace.windows)
@@ -116,7 +116,7 @@ class Velocity:
             bends = change > self._budget(axis, pace.time) + slack
         if bends or abs(first - left) > between + slack:
             raise RefusedError(Error.ACCEL, axis)
-        more = _quarter(first, last, pace.windows) - _quarter(left, start, before.windows)
+        more = _quarter_velocity(first, last, pace.windows) - _quarter_velocity(left, start, before.windows)
         excess = (0, 0) if before.windows else self._excess[axis]
         up, down = (max(0, e + m - (between >> 2)) for e, m in zip(excess, (more, -more), strict=True))
         self._excess[axis] = up, down

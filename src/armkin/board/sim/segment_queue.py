@@ -103,34 +103,36 @@ class Queue:
         self._cycles_run += seconds * self.clock
         while self._queue and self._cycles_run >= self._queue[0].times[-1]:
             speed = self.stop_time()
-            done = self._queue.popleft()
-            self._units -= done.segment.units()
-            places = [f + done.segment.ticks * r for f, r in zip(self._fraction, done.segment.rates, strict=True)]
+            finished = self._queue.popleft()
+            self._units -= finished.segment.units()
+            places = [
+                f + finished.segment.ticks * r for f, r in zip(self._fraction, finished.segment.rates, strict=True)
+            ]
             self.axes.settle([p >> 23 for p in places])
-            self._fraction = [HALF if done.end else p % STEP for p in places]
-            rest = self._cycles_run - done.times[-1]
+            self._fraction = [HALF if finished.end else p % STEP for p in places]
+            cycles_left = self._cycles_run - finished.times[-1]
             self.begin()
-            self._cycles_run = rest
+            self._cycles_run = cycles_left
             if not self._queue:
-                if not done.end and speed > _TOO_FAST:
-                    self.axes.lose(done.segment.rates)
-                return done
+                if not finished.end and speed > _TOO_FAST:
+                    self.axes.lose(finished.segment.rates)
+                return finished
         return None
 
     def stop_time(self) -> float:
         """u of PROTOCOL.md, section 7: the time that the arm needs to stop from its present speed."""
         if not self._queue or not self._queue[0].times:
             return 0.0
-        now = self._queue[0]
-        tick = min(bisect_right(now.times, self._cycles_run), len(now.times) - 1)
-        interval = now.times[tick] - (now.times[tick - 1] if tick else 0)
+        running = self._queue[0]
+        tick = min(bisect_right(running.times, self._cycles_run), len(running.times) - 1)
+        interval = running.times[tick] - (running.times[tick - 1] if tick else 0)
         rate = self.clock / (STEP * interval)
-        limits = zip(now.segment.rates, self.axes.image.axes, strict=True)
+        limits = zip(running.segment.rates, self.axes.image.axes, strict=True)
         return max((abs(n) * rate / axis.max_accel for n, axis in limits if n), default=0.0)
 
     def dry(self, u: float, *, holding: bool = False) -> bool:
         """Whether what is left is just enough for a stop that takes u seconds, and does not end at rest."""
         if not self._queue or self._queue[-1].end or (u < _SLOW and not holding):
             return False
-        rest = self._units * 256 - self._cycles_run
-        return rest / self.clock < u + u / 32 + 0.002
+        cycles_left = self._units * 256 - self._cycles_run
+        return cycles_left / self.clock < u + u / 32 + 0.002

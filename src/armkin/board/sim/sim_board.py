@@ -52,16 +52,16 @@ class SimBoard:
         """Net steps of every axis since power-on."""
         return self.motors.net()
 
-    def receive(self, data: bytes) -> None:
+    def receive(self, received: bytes) -> None:
         """Bytes from the host."""
-        for payload in self._splitter.feed(data):
-            self._frame(payload)
+        for payload in self._splitter.feed(received):
+            self._receive_frame(payload)
 
     def take(self) -> bytes:
         """Bytes for the host since the last call."""
-        out = bytes(self._out)
+        sent = bytes(self._out)
         self._out.clear()
-        return out
+        return sent
 
     def advance(self, seconds: float) -> None:
         """Let time pass."""
@@ -72,7 +72,7 @@ class SimBoard:
             if self.inputs.power_cut():
                 self.motors.axes.known = 0
             if self.motors.state in (State.MOVING, State.HOMING) and self._silent >= _SILENCE:
-                self._end(Error.SILENCE)
+                self._end_session(Error.SILENCE)
             if self.motors.state != State.IDLE:
                 self._watch()
             self.motors.advance(step)
@@ -82,8 +82,10 @@ class SimBoard:
         motors, setup = self.motors, self.setup
         still = motors.state == State.IDLE
         motors.cut()
-        known, counts = motors.axes.known & ~self.board.servo_mask, motors.axes.base
-        retained = _RetainedState(setup.packed(), setup.drivers, known, counts) if still and not power else None
+        known_axes, counts = motors.axes.known & ~self.board.servo_mask, motors.axes.base
+        retained = (
+            _RetainedState(setup.packed_image(), setup.drivers, known_axes, counts) if still and not power else None
+        )
         self._boots = 0 if power else self._boots
         self._power_up(0 if self.hidden_cause else 1 if power else 2, motors.axes.net, retained)
 
@@ -93,7 +95,7 @@ class SimBoard:
         self._digest = 0
         self._cause, self._boots, self._silent = cause, self._boots + 1, 0.0
         self.setup.reset()
-        self.motors = Motors(self.setup, self.inputs.level, self._end)
+        self.motors = Motors(self.setup, self.inputs.level, self._end_session)
         self.motors.axes.net = list(net)
         if retained is not None:
             self.setup.retain(retained.image, retained.drivers)
@@ -104,15 +106,15 @@ class SimBoard:
     def _watch(self) -> None:
         """End the session if an input says so."""
         if self.inputs.aborted():
-            self._end(Error.ABORT)
+            self._end_session(Error.ABORT)
         if self.inputs.power_cut():
-            self._end(Error.POWER)
+            self._end_session(Error.POWER)
         if self.motors.state != State.HOMING:
             switch = self.inputs.switch_ahead(self.motors.velocity())
             if switch is not None:
-                self._end(Error.LIMIT_SWITCH, switch)
+                self._end_session(Error.LIMIT_SWITCH, switch)
 
-    def _end(self, error: Error, detail: int = 0) -> None:
+    def _end_session(self, error: Error, detail: int = 0) -> None:
         """End the session; the first cause stays."""
         if not self._error:
             self._error, self._detail = error, detail
@@ -120,21 +122,21 @@ class SimBoard:
 
     # Frames
 
-    def _frame(self, payload: bytes) -> None:
+    def _receive_frame(self, payload: bytes) -> None:
         kind, size = payload[0], len(payload)
         if 0x10 <= kind < 0x80:
             self._silent = 0.0
             self._in_sequence(payload)
         elif kind == Type.HELLO and size == 7:
             self._silent = 0.0
-            self._hello(*struct.unpack("<xBBI", payload))
+            self._answer_hello(*struct.unpack("<xBBI", payload))
         elif kind == Type.STATUS_QUERY and size == 3:
             self._silent = 0.0
-            self._status(payload[1], payload[2])
+            self._send_status(payload[1], payload[2])
         elif kind == Type.HOLD and size == 2:
             self._silent = 0.0
-            self._end(Error.HELD)
-            self._ack()
+            self._end_session(Error.HELD)
+            self._send_ack()
 
     def _in_sequence(self, payload: bytes) -> None:
         if not self._error and payload[1] == self._next:
@@ -142,24 +144,24 @@ class SimBoard:
                 self._commands.execute(payload)
                 self._next = (self._next + 1) & 255
             except RefusedError as refused:
-                self._end(refused.error, refused.detail)
-        self._ack()
+                self._end_session(refused.error, refused.detail)
+        self._send_ack()
 
     def _send(self, payload: bytes) -> None:
-        self._out += protocol.wire(payload)
+        self._out += protocol.encode_frame(payload)
 
-    def _ack(self) -> None:
+    def _send_ack(self) -> None:
         m = self.motors
         ack = protocol.Ack(
             self._next, self._error, self._detail, m.state, m.queue.free, m.queue.milliseconds(), self._digest
         )
         self._send(protocol.pack_ack(ack))
 
-    def _hello(self, tag: int, version: int, nonce: int) -> None:
+    def _answer_hello(self, tag: int, version: int, nonce: int) -> None:
         if version != protocol.VERSION:
-            self._end(Error.VERSION)
+            self._end_session(Error.VERSION)
         elif nonce != self._nonce:
-            self._end(Error.HELD)
+            self._end_session(Error.HELD)
             self._error, self._detail, self._next, self._nonce = Error.OK, 0, 0, nonce
             self._digest = nonce & 0xFFFF
             self._splitter.bad = 0
@@ -181,9 +183,9 @@ class SimBoard:
             (Flag.LATCH, self.motors.homing.latched),
             (Flag.POWER_CUT, self.inputs.power_cut()),
         )
-        return sum(flag for flag, on in pairs if on)
+        return sum(flag for flag, is_set in pairs if is_set)
 
-    def _status(self, tag: int, page: int) -> None:
+    def _send_status(self, tag: int, page: int) -> None:
         m = self.motors
         page = int(page == 1)
         switches = sum(self.inputs.level(i) << i for i in range(len(self.board.switches)))

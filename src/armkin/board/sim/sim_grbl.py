@@ -64,9 +64,9 @@ class _Line:
     def take(self, char: str) -> str | None:
         """One more character; the line, if that ends it."""
         if char in "\r\n":
-            whole = self.text if self.text or char == "\n" else None
+            line = self.text if self.text or char == "\n" else None
             self.text = self.comment = ""
-            return whole
+            return line
         if self.comment:
             self.comment = "" if char == ")" and self.comment == "(" else self.comment
         elif char in "(;":
@@ -124,8 +124,8 @@ class Grbl(SimulatedTime):
         self._now += seconds
         if self.dead:
             return
-        self._run(seconds)
-        while not self._holding and self._take():
+        self._run_blocks(seconds)
+        while not self._holding and self._take_line():
             pass
 
     def alarm(self, number: int) -> None:
@@ -145,13 +145,13 @@ class Grbl(SimulatedTime):
             self._rx.append(byte)
 
     def _soft_reset(self) -> None:
-        if moving := not self._standing():
+        if moving := not self._is_standing():
             self.alarm(3)
         self.boot(power=False)
         self.state = "Alarm" if moving else "Idle"
 
     def _tell_state(self) -> None:
-        self._send(self._report())
+        self._send(self._report_line())
 
     def _hold(self) -> None:
         self._holding = self._holding or self.state != "Alarm"
@@ -171,10 +171,10 @@ class Grbl(SimulatedTime):
 
     # Motion
 
-    def _standing(self) -> bool:
+    def _is_standing(self) -> bool:
         return not self._blocks or (self._holding and self._blocks[0].rate == 0.0)
 
-    def _run(self, seconds: float) -> None:
+    def _run_blocks(self, seconds: float) -> None:
         if not self._blocks or (self._holding and not self._blocks[0].line):
             return
         block = self._blocks[0]
@@ -185,36 +185,36 @@ class Grbl(SimulatedTime):
                 self._send("ok")
             return
         share = block.advance(seconds, self.override, self._holding)
-        here = [round(a + share * (b - a)) for a, b in zip(block.start, block.end, strict=True)]
-        if here != self.steps:
-            self.steps = here
-            self.history.append((self._now, tuple(here)))
+        steps = [round(a + share * (b - a)) for a, b in zip(block.start, block.end, strict=True)]
+        if steps != self.steps:
+            self.steps = steps
+            self.history.append((self._now, tuple(steps)))
             for k, switch in self.ends.items():
-                if self.settings[21] and here[k] == switch and self.state != "Home":
+                if self.settings[21] and steps[k] == switch and self.state != "Home":
                     self.alarm(1)
                     return
         if block.distance_done >= block.length:
             self.steps = list(block.end)
             self._blocks.popleft()
 
-    def _state(self) -> str:
+    def _state_text(self) -> str:
         if self.state != "Idle" or not (self._holding or any(block.line for block in self._blocks)):
             return self.state
-        held = "Hold:0" if self._standing() else "Hold:1"
+        held = "Hold:0" if self._is_standing() else "Hold:1"
         return held if self._holding else "Jog" if self._blocks[0].jog else "Run"
 
-    def _report(self) -> str:
-        place, shift, bits = _machine(self.settings, self.steps), self.modes.work(), int(self.settings[10])
+    def _report_line(self) -> str:
+        place, shift, bits = _machine_position(self.settings, self.steps), self.modes.work(), int(self.settings[10])
         if not bits & 1:
             place = [a - b for a, b in zip(place, shift, strict=True)]
-        text = f"<{self._state()}|{'MPos' if bits & 1 else 'WPos'}:{_three(place)}"
+        text = f"<{self._state_text()}|{'MPos' if bits & 1 else 'WPos'}:{_three_decimals(place)}"
         text += f"|Bf:{BLOCKS - len(self._blocks)},{RX_BUFFER - len(self._rx)}" * (bits >> 1 & 1) + "|FS:0,0"
         turn, self._reports = self._reports % _SEEN, self._reports + 1
-        return f"{text}{f'|Ov:{self.override},100,100' * (turn == 0)}{f'|WCO:{_three(shift)}' * (turn == 1)}>"
+        return f"{text}{f'|Ov:{self.override},100,100' * (turn == 0)}{f'|WCO:{_three_decimals(shift)}' * (turn == 1)}>"
 
     # Lines
 
-    def _take(self) -> bool:
+    def _take_line(self) -> bool:
         """Go on with the line that is being put together, or carry out a whole one; False: nothing to do now."""
         if self._whole is not None:
             return self._carry_out(self._whole)
@@ -234,37 +234,39 @@ class Grbl(SimulatedTime):
         return True
 
     def _obey(self, line: str) -> None:
-        error = 11 if len(line) >= _LINE and not self.hal else self._system(line[1:]) if line[:1] == "$" else -2
+        error = (
+            11 if len(line) >= _LINE and not self.hal else self._run_system_command(line[1:]) if line[:1] == "$" else -2
+        )
         if error == -2:
-            error = 9 if line and self.state == "Alarm" else self._code(line)
+            error = 9 if line and self.state == "Alarm" else self._run_gcode(line)
         if error >= 0:
             self._send("ok" if error == 0 else f"error:{error}")
 
-    def _system(self, line: str) -> int:
+    def _run_system_command(self, line: str) -> int:
         """Carry out what follows a $; the number of its error, 0 for none, -1 where an alarm was the answer."""
         if line == "X":
             self.state = "Idle"
             return 0
         if line.startswith("J="):
-            return 9 if self.state != "Idle" else self._code(line[2:], jog=True)
+            return 9 if self.state != "Idle" else self._run_gcode(line[2:], jog=True)
         if self._blocks and line != "G":
             return 8  # the rest is for a machine at rest
         if match := re.fullmatch(r"(\d+)=(-?\d+\.?\d*)", line):
-            return self._set(int(match[1]), match[2])
+            return self._set_setting(int(match[1]), match[2])
         if line == "H":
             return self._home()
-        said = {
+        answers = {
             "G": [self.modes.parser_state(self.spindle)],
             "$": [f"${n}={value:.3f}".rstrip("0").rstrip(".") for n, value in sorted(self.settings.items())],
-            "I": _version(self.hal),
+            "I": _version_lines(self.hal),
             "#": self.modes.parameters(),
         }
-        if line not in said:
+        if line not in answers:
             return 3
-        self._send("\r\n".join(said[line]))
+        self._send("\r\n".join(answers[line]))
         return 0
 
-    def _set(self, number: int, text: str) -> int:
+    def _set_setting(self, number: int, text: str) -> int:
         if number not in self.settings:
             return 3
         if self.hal and number in _WHOLE and not text.lstrip("-").isdigit():
@@ -286,14 +288,14 @@ class Grbl(SimulatedTime):
         self.state = "Idle"
         return 0
 
-    def _code(self, line: str, *, jog: bool = False) -> int:
+    def _run_gcode(self, line: str, *, jog: bool = False) -> int:
         words = self.modes.read(line)
         if isinstance(words, int):
             return words
-        here = next((list(block.end) for block in reversed(self._blocks) if block.line), list(self.steps))
+        position = next((list(block.end) for block in reversed(self._blocks) if block.line), list(self.steps))
         if jog:
-            return self._jog(words, here)
-        goal = self.modes.obey(words, _machine(self.settings, here))
+            return self._jog(words, position)
+        goal = self.modes.obey(words, _machine_position(self.settings, position))
         if words.spindle is not None:
             s = min(words.values.get("S", 0.0), self.settings[30])
             self.spindle = s if words.spindle in (3.0, 4.0) else None
@@ -301,31 +303,33 @@ class Grbl(SimulatedTime):
             self._blocks.append(Block((), (), words.values["P"], 0, 0, 0, line=False))
             return -1
         if goal is not None:
-            self._plan(here, goal)
+            self._plan_block(position, goal)
         return 0
 
     def _jog(self, words: Words, position: list[int]) -> int:
         if "F" not in words.values:
             return 22
         modes = self.modes
-        kept = modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse
-        goal = modes.obey(Words(words.codes | {1.0, 94.0}, None, words.values), _machine(self.settings, position))
+        saved = modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse
+        goal = modes.obey(
+            Words(words.codes | {1.0, 94.0}, None, words.values), _machine_position(self.settings, position)
+        )
         feed = modes.feed
-        modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse = kept
+        modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse = saved
         if goal is not None:
-            self._plan(position, goal, feed)
+            self._plan_block(position, goal, feed)
         return 0
 
-    def _plan(self, start: Sequence[int], goal: Sequence[float], jog: float | None = None) -> None:
+    def _plan_block(self, start: Sequence[int], goal: Sequence[float], jog: float | None = None) -> None:
         rapid = jog is None and self.modes.motion == 0.0
         feed = math.inf if rapid else self.modes.feed if jog is None else jog
-        block = _block(self.settings, start, goal, feed / 60, jog is not None)
+        block = _block_to(self.settings, start, goal, feed / 60, jog is not None)
         if block is not None:
             block.feed *= block.length if self.modes.inverse and not rapid else 1.0
             self._blocks.append(block)
 
 
-def _block(
+def _block_to(
     settings: Mapping[int, float], start: Sequence[int], goal: Sequence[float], feed: float, jog: bool
 ) -> Block | None:
     """A block to a goal in units; None: nothing to do."""
@@ -341,17 +345,17 @@ def _block(
     return Block(tuple(start), tuple(end), length, feed, most, accel, jog)
 
 
-def _version(hal: bool) -> list[str]:
+def _version_lines(hal: bool) -> list[str]:
     """The answer to ``$I``."""
     version = "[VER:1.1f.20260817:]" if hal else "[VER:1.1h.20190825:]"
     return [version, f"[OPT:V,{BLOCKS},{RX_BUFFER}]", *["[FIRMWARE:grblHAL]"] * hal]
 
 
-def _machine(settings: Mapping[int, float], steps: Sequence[int]) -> list[float]:
+def _machine_position(settings: Mapping[int, float], steps: Sequence[int]) -> list[float]:
     return [n / settings[100 + k] for k, n in enumerate(steps)]
 
 
-def _three(values: Sequence[float]) -> str:
+def _three_decimals(values: Sequence[float]) -> str:
     return ",".join(f"{value:.3f}" for value in values)
 
 

@@ -44,23 +44,25 @@ class Homing:
     def _phases(self, s: Search) -> Iterator[None]:
         """Off the switch, fast to its edge, back, slowly to its edge."""
         back = [-r for r in s.rate]
-        if self._pressed(s) and not (yield from self._edge(s, back, s.slow, False, 2 * s.backoff, Error.SWITCH)):
+        if self._is_pressed(s) and not (
+            yield from self._find_edge(s, back, s.slow, False, 2 * s.backoff, Error.SWITCH)
+        ):
             return
-        if not (yield from self._edge(s, s.rate, 1.0, True, s.travel, Error.TRAVEL)):
+        if not (yield from self._find_edge(s, s.rate, 1.0, True, s.travel, Error.TRAVEL)):
             return
-        if not (yield from self._slide(back, 1.0, lambda: self._backed(s), 2**31, Error.SWITCH)):
+        if not (yield from self._slide(back, 1.0, lambda: self._is_backed_off(s), 2**31, Error.SWITCH)):
             return
-        if self._pressed(s):
+        if self._is_pressed(s):
             self._fault(Error.SWITCH)
-        elif (yield from self._edge(s, s.rate, s.slow, True, 2 * s.backoff, Error.SWITCH)):
+        elif (yield from self._find_edge(s, s.rate, s.slow, True, 2 * s.backoff, Error.SWITCH)):
             self.latched = True
 
-    def _edge(
+    def _find_edge(
         self, s: Search, vector: list[int], share: float, pressed: bool, limit: int, error: Error
     ) -> Generator[None, None, bool]:
         """Slide until the switch is steadily pressed, or released."""
         self._switch_time = -1.0
-        return self._slide(vector, share, lambda: self._steady(s, pressed), limit, error)
+        return self._slide(vector, share, lambda: self._is_steady(s, pressed), limit, error)
 
     def _slide(
         self, vector: list[int], share: float, finished: Callable[[], bool], limit: int, error: Error
@@ -83,22 +85,22 @@ class Homing:
         yield  # a millisecond at rest between two motions
         return True
 
-    def _pressed(self, s: Search) -> bool:
+    def _is_pressed(self, s: Search) -> bool:
         return self._level(s.switch) == s.closed
 
-    def _steady(self, s: Search, pressed: bool) -> bool:
+    def _is_steady(self, s: Search, pressed: bool) -> bool:
         """Whether the switch has had a level for long enough; latches the counts at which it took it."""
-        now = self._cruise.now
-        if self._pressed(s) != pressed:
+        present = self._cruise.now
+        if self._is_pressed(s) != pressed:
             self._switch_time = -1.0
         elif self._switch_time < 0:
-            self._switch_time, self._switch_counts = now, list(self._cruise.axes.base)
-        steady = self._switch_time >= 0 and now - self._switch_time >= _DEBOUNCE
+            self._switch_time, self._switch_counts = present, list(self._cruise.axes.base)
+        steady = self._switch_time >= 0 and present - self._switch_time >= _DEBOUNCE
         if steady:
             self.latch = self._switch_counts
         return steady
 
-    def _backed(self, s: Search) -> bool:
+    def _is_backed_off(self, s: Search) -> bool:
         """Whether braking now ends at the back-off before the edge."""
         leader = max(range(len(s.rate)), key=lambda i: abs(s.rate[i]))
         if self._cruise.far == 0:

@@ -81,8 +81,8 @@ class Klipper(SimulatedTime):
     def write(self, data: bytes) -> None:
         """Send bytes."""
         self._heard += b"" if self.dead else data
-        *whole, self._heard = self._heard.split(END)
-        for part in whole:
+        *messages, self._heard = self._heard.split(END)
+        for part in messages:
             with suppress(ValueError):  # Klipper logs what is no request, and goes on
                 self._requests.append(json.loads(part))
 
@@ -96,7 +96,7 @@ class Klipper(SimulatedTime):
         self._now += seconds
         if self.dead:
             return
-        self._run(seconds)
+        self._run_moves(seconds)
         while self._requests and self._serve(self._requests[0]):
             self._requests.popleft()
 
@@ -109,56 +109,58 @@ class Klipper(SimulatedTime):
 
     def _serve(self, request: dict[str, Any]) -> bool:
         """Answer a request; False while it has to wait."""
-        methods = {"gcode/script": self._script, "objects/query": self._query, "info": self._info}
+        methods = {"gcode/script": self._run_script, "objects/query": self._query_objects, "info": self._info_json}
         try:
             if request["method"] not in methods:
                 raise Refused("webhooks: No registered callback")
-            result = methods[request["method"]](request.get("params", {}))
+            answer = methods[request["method"]](request.get("params", {}))
         except Refused as error:
             self._lines = None
             self._send({"id": request["id"], "error": {"error": "CommandError", "message": str(error)}})
             return True
-        if result is None:
+        if answer is None:
             return False
-        self._send({"id": request["id"], "result": result})
+        self._send({"id": request["id"], "result": answer})
         return True
 
-    def _script(self, params: dict[str, Any]) -> dict[str, Any] | None:
+    def _run_script(self, params: dict[str, Any]) -> dict[str, Any] | None:
         """Run a script as far as its lines have room; None while one has to wait."""
         if self._lines is None:
             self._lines = deque(params["script"].splitlines())
         while self._lines:
             if self.state != "ready":
                 raise Refused("Printer is shutdown" if self.state == "shutdown" else "Printer is not ready")
-            if not self._room(self._lines[0]):
+            if not self._has_room(self._lines[0]):
                 return None
             self._obey(self._lines.popleft())
         self._lines = None
         return {}
 
-    def _query(self, params: dict[str, Any]) -> dict[str, Any]:
-        status = self._status()
+    def _query_objects(self, params: dict[str, Any]) -> dict[str, Any]:
+        status = self._status_json()
         return {"eventtime": self._now, "status": {name: status.get(name, {}) for name in params["objects"]}}
 
-    def _info(self, params: dict[str, Any]) -> dict[str, Any]:
+    def _info_json(self, params: dict[str, Any]) -> dict[str, Any]:
         return {"state": self.state, "state_message": f"Printer is {self.state}", "software_version": "sim"}
 
     def _send(self, message: dict[str, Any]) -> None:
         self._out += json.dumps(message).encode() + END
 
-    def _status(self) -> dict[str, Any]:
+    def _status_json(self) -> dict[str, Any]:
         letters = {self.steppers[name].letter: 4 + k for k, name in enumerate(self.axes)}
         return {
             "webhooks": {"state": self.state, "state_message": f"Printer is {self.state}"},
             "configfile": {"settings": self.settings},
             "toolhead": {"position": [self.x, 0.0, 0.0, 0.0, *(self.steppers[name].place for name in self.axes)]},
             "gcode_move": {"axis_map": {"X": 0, "Y": 1, "Z": 2, "E": 3, **letters}},
-            "stepper_enable": {"steppers": {f"manual_stepper {n}": one.enabled for n, one in self.steppers.items()}},
+            "stepper_enable": {
+                "steppers": {f"manual_stepper {n}": stepper.enabled for n, stepper in self.steppers.items()}
+            },
         }
 
     # G-code
 
-    def _room(self, line: str) -> bool:
+    def _has_room(self, line: str) -> bool:
         """Whether a line can be run now: M400 waits for the queue, a move for room in it."""
         if line.startswith(("M400", "MANUAL_STEPPER", "M84")):
             return not self._moves
@@ -171,37 +173,37 @@ class Klipper(SimulatedTime):
         _COMMANDS[head](self, words)
 
     def _manual_stepper(self, words: list[str]) -> None:
-        given = {key: value for key, _, value in (word.partition("=") for word in words)}
-        name = given.get("STEPPER", "")
+        options = {key: value for key, _, value in (word.partition("=") for word in words)}
+        name = options.get("STEPPER", "")
         if name not in self.steppers:
-            raise Refused(f"The value '{given.get('STEPPER')}' is not valid for STEPPER")
-        one = self.steppers[name]
-        if "GCODE_AXIS" in given:
-            self._register(name, given)
+            raise Refused(f"The value '{options.get('STEPPER')}' is not valid for STEPPER")
+        stepper = self.steppers[name]
+        if "GCODE_AXIS" in options:
+            self._register_axis(name, options)
             return
-        if one.letter:
+        if stepper.letter:
             raise Refused("Must unregister from gcode axis first")
-        if "ENABLE" in given:
-            one.enabled = given["ENABLE"] == "1"
-        if "SET_POSITION" in given:
-            one.place = self.at[name] = float(given["SET_POSITION"])
+        if "ENABLE" in options:
+            stepper.enabled = options["ENABLE"] == "1"
+        if "SET_POSITION" in options:
+            stepper.place = self.at[name] = float(options["SET_POSITION"])
 
-    def _register(self, name: str, given: dict[str, str]) -> None:
+    def _register_axis(self, name: str, options: dict[str, str]) -> None:
         """A stepper as a G-code axis by its letter; without a letter: no longer."""
-        letter, one = given["GCODE_AXIS"], self.steppers[name]
+        letter, stepper = options["GCODE_AXIS"], self.steppers[name]
         if not letter:
-            self.axes = [other for other in self.axes if other != name]
-            one.letter = ""
+            self.axes = [axis for axis in self.axes if axis != name]
+            stepper.letter = ""
             return
-        if one.letter:
+        if stepper.letter:
             raise Refused("Must unregister axis first")
         if not re.fullmatch("[A-Z]", letter) or letter in "XYZEFN":
             raise Refused("Not a valid GCODE_AXIS")
-        if letter in (self.steppers[other].letter for other in self.axes):
+        if letter in (self.steppers[axis].letter for axis in self.axes):
             raise Refused(f"Axis '{letter}' already registered")
-        one.letter = letter
-        one.velocity = float(given.get("LIMIT_VELOCITY", 999_999.9))
-        one.corner = float(given.get("INSTANTANEOUS_CORNER_VELOCITY", 1.0))
+        stepper.letter = letter
+        stepper.velocity = float(options.get("LIMIT_VELOCITY", 999_999.9))
+        stepper.corner = float(options.get("INSTANTANEOUS_CORNER_VELOCITY", 1.0))
         self.axes.append(name)
 
     def _zero_x(self, words: list[str]) -> None:
@@ -210,8 +212,8 @@ class Klipper(SimulatedTime):
         self.x_base = self.x
 
     def _motors_off(self, words: list[str]) -> None:
-        for one in self.steppers.values():
-            one.enabled = False
+        for stepper in self.steppers.values():
+            stepper.enabled = False
 
     def _use_absolute(self, words: list[str]) -> None:
         self.relative = False
@@ -231,7 +233,7 @@ class Klipper(SimulatedTime):
     def _move(self, words: dict[str, float]) -> None:
         self.feed = words.pop("F") * self.factor if "F" in words else self.feed
         start = {"X": self.x, **{name: self.steppers[name].place for name in self.axes}}
-        end = self._end(start, words)
+        end = self._end_places(start, words)
         way = {key: end[key] - start[key] for key in end}
         along = abs(way["X"]) or max(map(abs, way.values()))
         if along < 1e-9:
@@ -248,7 +250,7 @@ class Klipper(SimulatedTime):
             self.steppers[name].place = end[name]
             self.steppers[name].enabled = True
 
-    def _end(self, start: dict[str, float], words: dict[str, float]) -> dict[str, float]:
+    def _end_places(self, start: dict[str, float], words: dict[str, float]) -> dict[str, float]:
         """The places behind a line, by axis."""
         letters = {self.steppers[name].letter: name for name in self.axes}
         if unknown := words.keys() - letters.keys() - {"X"}:
@@ -257,7 +259,7 @@ class Klipper(SimulatedTime):
         base = start if self.relative else {"X": self.x_base}
         return start | {name: base.get(name, 0.0) + value for name, value in goals.items()}
 
-    def _run(self, seconds: float) -> None:
+    def _run_moves(self, seconds: float) -> None:
         while self._moves and seconds > 0.0:
             move = self._moves[0]
             part = min(seconds, move.seconds - move.seconds_done)

@@ -33,10 +33,10 @@ class SimPort:
     def read(self, timeout: float) -> bytes:
         """What the board has said, or says within `timeout` seconds of its time."""
         end = self._now + timeout
-        while not (data := self.board.take()) and self._now < end:
+        while not (received := self.board.take()) and self._now < end:
             self.board.advance(0.001)
             self._now += 0.001
-        return data
+        return received
 
     def now(self) -> float:
         """Seconds on the board's clock."""
@@ -67,9 +67,9 @@ class Paced:
             clock = time.monotonic()
             self._due = min(self._due + clock - self._clock, self.port.now() + _LATE)
             self._clock = clock
-            data = self.port.read(max(self._due - self.port.now(), 0.0))
-            if data or self.port.now() >= end:
-                return data
+            received = self.port.read(max(self._due - self.port.now(), 0.0))
+            if received or self.port.now() >= end:
+                return received
             time.sleep(0.001)
 
     def now(self) -> float:

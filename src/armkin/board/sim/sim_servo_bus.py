@@ -70,11 +70,11 @@ class Servo:
         self.set(MOVING, int(self.get(TORQUE) == 1 and self.position != self.get(GOAL_POSITION)))
         self.set(LOAD, 120 if self.speed else 30)
 
-    def write(self, address: int, data: bytes) -> None:
+    def write(self, address: int, values: bytes) -> None:
         """Write registers."""
-        if address + len(data) > len(self.memory):
+        if address + len(values) > len(self.memory):
             return  # registers that are not there are ignored
-        self.memory[address : address + len(data)] = data
+        self.memory[address : address + len(values)] = values
         self.advance(0.0)
 
 
@@ -107,8 +107,8 @@ class ServoBus(SimulatedTime):
         if self._now - self._heard > PAUSE:
             self._splitter.clear()
         self._heard = self._now
-        for question in self._splitter.feed(self._spoilt(data)):
-            self._obey(question.id, question.errors, question.data)
+        for question in self._splitter.feed(self._spoil(data)):
+            self._obey_instruction(question.id, question.errors, question.data)
 
     def advance(self, seconds: float) -> None:
         """Let simulated time pass."""
@@ -118,38 +118,38 @@ class ServoBus(SimulatedTime):
         if any(servo.speed for servo in self.servos.values()):
             self.log.append((self._now, {number: servo.position for number, servo in self.servos.items()}))
 
-    def _obey(self, number: int, kind: int, data: bytes) -> None:
+    def _obey_instruction(self, number: int, kind: int, parameters: bytes) -> None:
         if number == ALL:
-            self._obey_all(kind, data)
+            self._obey_all(kind, parameters)
         elif number in self.servos:
             servo = self.servos[number]
             if kind == Instruction.PING:
-                self._answer(servo)
-            elif kind == Instruction.READ and len(data) == 2:
-                self._answer(servo, *data)
-            elif kind == Instruction.WRITE and data:
-                servo.write(data[0], data[1:])
-                self._answer(servo)
+                self._send_answer(servo)
+            elif kind == Instruction.READ and len(parameters) == 2:
+                self._send_answer(servo, *parameters)
+            elif kind == Instruction.WRITE and parameters:
+                servo.write(parameters[0], parameters[1:])
+                self._send_answer(servo)
 
-    def _obey_all(self, kind: int, data: bytes) -> None:
-        if kind == Instruction.SYNC_READ and len(data) >= 2:
-            for number in data[2:]:
+    def _obey_all(self, kind: int, parameters: bytes) -> None:
+        if kind == Instruction.SYNC_READ and len(parameters) >= 2:
+            for number in parameters[2:]:
                 if number in self.servos:
-                    self._answer(self.servos[number], data[0], data[1])
-        elif kind == Instruction.SYNC_WRITE and len(data) >= 2:
-            size = data[1] + 1
-            for begin in range(2, len(data) - size + 1, size):
-                if data[begin] in self.servos:
-                    self.servos[data[begin]].write(data[0], data[begin + 1 : begin + size])
+                    self._send_answer(self.servos[number], parameters[0], parameters[1])
+        elif kind == Instruction.SYNC_WRITE and len(parameters) >= 2:
+            size = parameters[1] + 1
+            for begin in range(2, len(parameters) - size + 1, size):
+                if parameters[begin] in self.servos:
+                    self.servos[parameters[begin]].write(parameters[0], parameters[begin + 1 : begin + size])
 
-    def _answer(self, servo: Servo, address: int = 0, size: int = 0) -> None:
+    def _send_answer(self, servo: Servo, address: int = 0, size: int = 0) -> None:
         answer = packet(servo.number, servo.errors, bytes(servo.memory[address : address + size]))
-        self._out += self._spoilt(answer)
+        self._out += self._spoil(answer)
 
-    def _spoilt(self, data: bytes) -> bytes:
+    def _spoil(self, packet_bytes: bytes) -> bytes:
         if self._random.random() < self._noise.lost:
             return b""
         if self._random.random() < self._noise.damaged:
-            k = self._random.randrange(len(data))
-            return data[:k] + bytes([data[k] ^ 1 << self._random.randrange(8)]) + data[k + 1 :]
-        return data
+            k = self._random.randrange(len(packet_bytes))
+            return packet_bytes[:k] + bytes([packet_bytes[k] ^ 1 << self._random.randrange(8)]) + packet_bytes[k + 1 :]
+        return packet_bytes

@@ -129,8 +129,8 @@ def _js(arm: Arm, task: str | None, out: str | None) -> None:
 
 
 def _html(arm: Arm, task: str | None, path: str | None, meshes: str | None, out: str | None) -> None:
-    from armkin.teach.one_file import html
-    from armkin.teach.urdf_meshes import meshes as read_meshes
+    from armkin.teach.one_file import arm_html
+    from armkin.teach.urdf_meshes import meshes_json as read_meshes
 
     plan = None
     if path is not None:
@@ -141,7 +141,7 @@ def _html(arm: Arm, task: str | None, path: str | None, meshes: str | None, out:
         path_file.check_robot(file, arm.name, arm.path)
         plan = planned(arm, file)
     with _without_lock("JavaScript"):
-        text = html(arm, task, plan, None if meshes is None else read_meshes(arm, meshes))
+        text = arm_html(arm, task, plan, None if meshes is None else read_meshes(arm, meshes))
     with output.destination(out) as write:
         write(text)
 

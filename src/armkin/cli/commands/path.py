@@ -222,12 +222,12 @@ def _carried_out(
             plan = _planned(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)
             path_run.check_gripper(plan, board)
             path_run.check_pauses(plan, sys.stdin.isatty())
-            laid = path_run.parts(plan, began, board.lay)
+            laid = path_run.lay_parts(plan, began, board.lay)
             _files(plan, out, plot)
         if plan.approach is not None and held is None:
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
         with board.under_way(laid, held) as (left, first, note), board_link.progress(left, note) as tell:
-            path_run.follow(board, plan, left, tell, first, ask=_until_enter)
+            path_run.follow_plan(board, plan, left, tell, first, ask=_until_enter)
         found = {**_answer(plan, laid), "port": machine.port.name, **where_arm_stands(machine)}
         if held is not None:
             found.pop("approach", None)  # where it began, that motion is over
@@ -306,7 +306,7 @@ def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | Non
         return None
     if rehearsal:
         path_run.check_gripper(plan, board)
-    return path_run.parts(plan, pulses(plan.arm, (plan.approach or plan.motion).start).tolist(), board.lay)
+    return path_run.lay_parts(plan, pulses(plan.arm, (plan.approach or plan.motion).start).tolist(), board.lay)
 
 
 def _answer(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:

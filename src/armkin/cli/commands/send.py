@@ -193,7 +193,7 @@ def _move(
         began = machine.counts() if held is None else held.start
         if isinstance(goals, Stream):
             with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
-                machine.run(planner.noted(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
+                machine.run(planner.sum_up(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
         else:
             with planning():
                 plans = _all_plans(planner, goals, began)  # every refusal before anything moves
@@ -244,7 +244,7 @@ def _carry_out(planner: Planner, plans: Sequence[Planned], held: Any) -> None:
     """Move through the plans, or through what is left of them since they were held."""
     board = planner.board
     with board.under_way(plans, held) as (left, _, note), board_link.progress(left, note) as tell:
-        board.machine.run(planner.noted(left), tell)
+        board.machine.run(planner.sum_up(left), tell)
 
 
 def _accelerated(arm: Arm, text: str | None) -> Arm:

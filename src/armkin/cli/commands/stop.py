@@ -28,13 +28,13 @@ def stop(
     Works from another terminal: the armkin that holds the port is told to stop. This is no emergency stop:
     for that, cut the motors' power.
     """
-    from armkin.board.ports import SIM, SerialPort, holder, holder_rate, is_socket
+    from armkin.board.ports import SIM, SerialPort, holder_pid, holder_rate, is_socket
 
     baud = baud or board_link.BAUD
     port = _port(port, baud, not no_reset)
     if port == SIM:
         raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")
-    process = holder(port)
+    process = holder_pid(port)
     if process is not None:
         others = holder_rate(port) not in (None, baud)  # a board of others: it was stopped by the process that moved it
         _end(process, port)
@@ -63,12 +63,12 @@ def stop(
 
 def _port(port: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
-    from armkin.board.firmware.wire.find_boards import answering_ports, likely
-    from armkin.board.ports import holder
+    from armkin.board.firmware.wire.find_boards import answering_ports, likely_ports
+    from armkin.board.ports import holder_pid
     from armkin.board.stop_signals import stoppable
 
     if port is None:
-        held = [name for name in likely() if holder(name) is not None]
+        held = [name for name in likely_ports() if holder_pid(name) is not None]
         if len(held) == 1:
             return held[0]
         with stoppable() as stop:
@@ -79,14 +79,14 @@ def _port(port: str | None, baud: int, reset: bool) -> str:
 def _end(process: int, port: str) -> None:
     import time
 
-    from armkin.board.ports import ask_to_stop, holder
+    from armkin.board.ports import ask_to_stop, holder_pid
 
     try:
         ask_to_stop(port, process)
     except OSError as error:
         raise LinkError(f"process {process} holds {port} and cannot be told to stop: {error.strerror}") from None
     end = time.monotonic() + _PATIENCE
-    while holder(port) == process:
+    while holder_pid(port) == process:
         if time.monotonic() > end:
             raise LinkError(f"process {process} does not let go of {port}: cut the motors' power if the arm moves")
         time.sleep(0.05)

@@ -36,13 +36,13 @@ def teach(
 
     from armkin.teach.actions import Actions
     from armkin.teach.server import Server
-    from armkin.teach.urdf_meshes import meshes as read_meshes
+    from armkin.teach.urdf_meshes import meshes_json as read_meshes
 
     arm = keep_outs.moving(robot, scene)
     if port is not None and port != SIM:
-        from armkin.board.ports.serial_port import check
+        from armkin.board.ports.serial_port import check_port
 
-        check(port)
+        check_port(port)
         keep_outs.check_port(port, arm, no_scene)
     actions = Actions(arm, port, baud, None if meshes is None else read_meshes(arm, meshes))
     try:

@@ -117,12 +117,12 @@ class Cutter:
         most = max(map(abs, left), default=0) / STEP  # steps of the fastest motor
         exact = seconds * self.clock + self.late
         if unheard:
-            ticks = self._ticks(exact, most)
+            ticks = self._tick_count(exact, most)
             segment = Segment(ticks, round(exact / ticks), 0, tuple(round(x / ticks / COARSE) * COARSE for x in left))
         elif abs(change) < _STEADY:
-            segment = self._steady(exact, left, most, drift)
+            segment = self._steady_segment(exact, left, most, drift)
         else:
-            segment = self._ramp(exact, left, most, change)
+            segment = self._ramp_segment(exact, left, most, change)
         least = self.min_interval + (self.min_interval // 4 if segment.quick else 0)  # as the board wants it
         short = least - min(segment.interval, segment.last_interval)
         if short > 0:
@@ -132,25 +132,27 @@ class Cutter:
         self.late = min(exact - cycles_of(segment), float(segment.ticks))
         return segment
 
-    def _steady(self, exact: float, remainders: Sequence[int], most: float, drift: float) -> Segment:
+    def _steady_segment(self, exact: float, remainders: Sequence[int], most: float, drift: float) -> Segment:
         """One speed for `exact` cycles; remainders: (motors,) 2^-23 step, most: the fastest's steps."""
-        ticks = self._ticks(exact, most)
-        if ticks > _SLOW * most or _drift(ticks, remainders) > drift:
+        ticks = self._tick_count(exact, most)
+        if ticks > _SLOW * most or _rounding_drift(ticks, remainders) > drift:
             ticks = _exact_ticks(ticks, remainders)
         interval, add = round(exact / ticks), 0
         if ticks > 1 and exact > _EVEN * self.clock:
             interval, add = _evenly_spread(exact, ticks)
-        return Segment(ticks, interval, add, _rates(remainders, ticks))
+        return Segment(ticks, interval, add, _rounded_rates(remainders, ticks))
 
-    def _ramp(self, exact: float, remainders: Sequence[int], most: float, change: float) -> Segment:
+    def _ramp_segment(self, exact: float, remainders: Sequence[int], most: float, change: float) -> Segment:
         """A piece whose speed changes evenly, see `piece`: as many ticks as the board makes, as `bend` has 16 bits."""
         fast = (1 + abs(change) / 2) * self.min_interval
         shortest = exact / (16 * change**2 * exact) ** (1 / 3)  # [cycles] of a tick, for the quick bend to have 16 bits
         ticks = int(exact / max(_TICK_QUICK * fast, min(_TICK_S * self.clock, shortest)))
-        quick = most <= ticks <= _QUICK[0] and ticks > 1 and abs(_parabola(exact, ticks, change, True)[2]) >= _QUICK[1]
+        quick = (
+            most <= ticks <= _QUICK[0] and ticks > 1 and abs(_fit_parabola(exact, ticks, change, True)[2]) >= _QUICK[1]
+        )
         if not quick:
             fewer, ticks = ticks, int(exact / max(_TICK * fast, _TICK_S * self.clock, exact / _MOST))
-            if ticks > 1 and most <= _QUICK[0] < fewer and abs(_parabola(exact, ticks, change, False)[2]) == _BEND:
+            if ticks > 1 and most <= _QUICK[0] < fewer and abs(_fit_parabola(exact, ticks, change, False)[2]) == _BEND:
                 quick, ticks = True, _QUICK[0]  # else it would end faster than the board loads the next one
         ticks = max(1, ticks, math.ceil(most), math.ceil(exact / _LONGEST))
         ratio = (2 + abs(change)) / (2 - abs(change))
@@ -160,31 +162,31 @@ class Cutter:
             ticks = max(round(over * most), math.ceil(most))
         elif ticks > _CHOICE:
             spread = range(ticks - min(ticks // _CHOICE, _CHOICES), ticks + 1)
-            ticks = min(spread, key=lambda t: _parabola(exact, t, change, quick)[3])
-        interval, add, bend, _ = _parabola(exact, ticks, change, quick)
-        segment = Segment(ticks, interval, add, _rates(remainders, ticks), bend, quick and bend != 0)
-        rest = exact - cycles_of(segment)  # every interval is cut to whole cycles
-        return replace(segment, interval=interval + round(rest / ticks))
+            ticks = min(spread, key=lambda t: _fit_parabola(exact, t, change, quick)[3])
+        interval, add, bend, _ = _fit_parabola(exact, ticks, change, quick)
+        segment = Segment(ticks, interval, add, _rounded_rates(remainders, ticks), bend, quick and bend != 0)
+        cycles_left = exact - cycles_of(segment)  # every interval is cut to whole cycles
+        return replace(segment, interval=interval + round(cycles_left / ticks))
 
-    def _ticks(self, cycles: float, steps: float) -> int:
+    def _tick_count(self, cycles: float, steps: float) -> int:
         """How many ticks a piece of one speed has: whole ones for each step of its fastest motor, if it makes many."""
         least = max(_TICK * self.min_interval, _TICK_S * self.clock)
-        each = cycles / steps if steps > 1e-9 else math.inf  # cycles a step
-        tick = max(least, min(each / _FINE, cycles / _FEWEST, _LONGEST / 2), cycles / _MOST)
-        over = int(each / tick) if each < math.inf else 0
+        step_cycles = cycles / steps if steps > 1e-9 else math.inf  # cycles a step
+        tick = max(least, min(step_cycles / _FINE, cycles / _FEWEST, _LONGEST / 2), cycles / _MOST)
+        over = int(step_cycles / tick) if step_cycles < math.inf else 0
         if 1 <= over <= _FINE:
             exact = over if over > _SLOW else 1 << over.bit_length() - 1  # a power of two: a rate without rounding
-            tick = each / (exact if each / exact <= _COARSEST * self.clock else over)
-        elif over == 0 and each < math.inf:
-            tick = each
+            tick = step_cycles / (exact if step_cycles / exact <= _COARSEST * self.clock else over)
+        elif over == 0 and step_cycles < math.inf:
+            tick = step_cycles
         return max(1, math.ceil(cycles / _LONGEST), round(cycles / tick))
 
 
-def _rates(remainders: Sequence[int], ticks: int) -> tuple[int, ...]:
+def _rounded_rates(remainders: Sequence[int], ticks: int) -> tuple[int, ...]:
     return tuple(nearest_rate(x / ticks) for x in remainders)
 
 
-def _drift(ticks: int, remainders: Sequence[int]) -> float:
+def _rounding_drift(ticks: int, remainders: Sequence[int]) -> float:
     """How far the rounding of rates leaves the motors from their places [steps]."""
     return max(abs(x - ticks * nearest_rate(x / ticks)) for x in remainders) / STEP
 
@@ -198,8 +200,8 @@ def _exact_ticks(ticks: int, remainders: Sequence[int]) -> int:
     near = np.arange(ticks - ticks // 32, ticks + ticks // 32 + 1)
     exact = np.abs(np.array(remainders, dtype=float))[:, None] / near
     rates = np.where(exact < FINE - 0.5, np.rint(exact), np.rint(exact / COARSE) * COARSE)
-    off = np.abs(exact - rates) * near
-    return int(near[off.max(axis=0).argmin()])
+    drift = np.abs(exact - rates) * near
+    return int(near[drift.max(axis=0).argmin()])
 
 
 def _evenly_spread(cycles: float, ticks: int) -> tuple[int, int]:
@@ -216,7 +218,7 @@ def _evenly_spread(cycles: float, ticks: int) -> tuple[int, int]:
     return interval, round((1 / (1 - part) if part < 0.5 else 3 / (2 - part)) * 65536 / ticks)
 
 
-def _parabola(exact: float, ticks: int, change: float, quick: bool) -> tuple[int, int, int, float]:
+def _fit_parabola(exact: float, ticks: int, change: float, quick: bool) -> tuple[int, int, int, float]:
     """Interval, `add` and `bend` of a segment whose speed changes evenly, see `Cutter.piece`.
 
     The interval is 1 / v(t). The parabola over the ticks that has its ends and its integral has its slope, too, to
@@ -228,25 +230,25 @@ def _parabola(exact: float, ticks: int, change: float, quick: bool) -> tuple[int
     slow = min(slow, mean + _MONOTONE * (mean - fast))
     a, b = (slow, fast) if change > 0 else (fast, slow)
     curve = 3 * (a + b) - 6 * mean
-    whole = (b - a) * (ticks - 1) / ticks  # from the first interval's middle to the last one's
+    span = (b - a) * (ticks - 1) / ticks  # from the first interval's middle to the last one's
     unit, block = (17, 1) if quick else (22, BLOCK)
     exact_bend = 2 * curve / ticks**2 * block * 2**unit
     bend = max(-_BEND, min(_BEND, round(exact_bend)))
-    add = (whole - bend * _bends(ticks, quick) / 2**unit) / max(ticks - 1, 1) * 65536
+    add = (span - bend * _bend_count(ticks, quick) / 2**unit) / max(ticks - 1, 1) * 65536
     if (bend and add * (add + bend * ((ticks - 1) // block) / 2 ** (unit - 16)) <= 0) or abs(add) < 0.5:
-        bend, add = 0, whole / max(ticks - 1, 1) * 65536
+        bend, add = 0, span / max(ticks - 1, 1) * 65536
     second = bend / 2**unit / block
     first = mean - (ticks - 1) * (add / 131072 + second * (ticks - 2) / 6) + 0.5  # each is cut to whole cycles
     cost = abs(first - round(first)) * 4 + abs(bend / exact_bend - 1) * 100
     return round(first), round(add), bend, cost
 
 
-def _bends(ticks: int, quick: bool) -> int:
+def _bend_count(ticks: int, quick: bool) -> int:
     """How often `bend` counts in a segment's last interval."""
     if quick:
         return (ticks - 1) * (ticks - 2) // 2
-    blocks, rest = divmod(max(0, ticks - 2 - (ticks - 1) % BLOCK), BLOCK)
-    return (BLOCK // 2 * blocks + rest) * (blocks + 1)
+    blocks, ticks_left = divmod(max(0, ticks - 2 - (ticks - 1) % BLOCK), BLOCK)
+    return (BLOCK // 2 * blocks + ticks_left) * (blocks + 1)
 
 
 def speed_change(begin: float, end: float) -> float:

@@ -53,40 +53,41 @@ class CurveSegments:
         before, span = np.zeros(len(self.start)), 0.0  # the speed at the end of the segment before, and its time
         for first in range(0, len(bounds) - 1, _BLOCK):
             t = bounds[first : first + _BLOCK + 1]
-            at = self._places(t)
+            counts = self._places_at(t)
             if first + _BLOCK >= len(bounds) - 1:
-                at[-1] = self.end
-            steps = np.diff(at, axis=0)
+                counts[-1] = self.end
+            steps = np.diff(counts, axis=0)
             # No motor faster than its greatest rate, whatever rounding says.
-            seconds = np.maximum(np.diff(t), (np.abs(steps) / self._fastest()).max(axis=1))
-            change = self._changes(t, steps).tolist()
+            seconds = np.maximum(np.diff(t), (np.abs(steps) / self._max_rates()).max(axis=1))
+            change = self._speed_changes(t, steps).tolist()
             mean = np.vstack([steps / seconds[:, None], np.zeros(len(self.start))])
             longer = np.maximum(seconds, np.append(seconds[1:], seconds[-1]))
             open_end = first + _BLOCK < len(bounds) - 1  # what follows this block is not known here
             for k in range(len(t) - 1):
-                one, before = self._smooth(
-                    cutter, float(seconds[k]), at[k + 1].tolist(), 0.0 if open_end and k + 2 == len(t) else change[k],
-                    before, max(float(seconds[k]), span), mean[k + 1], float(longer[k]),
+                segment, before = self._smooth_segment(
+                    cutter, float(seconds[k]), counts[k + 1].tolist(),
+                    0.0 if open_end and k + 2 == len(t) else change[k], before,
+                    max(float(seconds[k]), span), mean[k + 1], float(longer[k]),
                 )  # fmt: skip
                 span = float(seconds[k])
-                yield one
+                yield segment
 
-    def _places(self, t: Array) -> Array:
+    def _places_at(self, t: Array) -> Array:
         """Where the motors are at times t, fractions included: (T, motors).
 
         Both ends are whole counts; what rounding them has moved, half a step at most, is left behind as fast as
         _SETTLING of the motors' accelerations allow, so that in between nothing is off but the steps themselves.
         """
-        whole = self.stretch.duration
-        ends = places(self.arm, self.stretch.evaluate(np.array([0.0, whole])))
-        out = places(self.arm, self.stretch.evaluate(t))
-        for off, since in ((self.start - ends[0], t), (self.end - ends[1], whole - t)):
-            span = np.sqrt(6 * np.abs(off) / (_SETTLING * motor_accel(self.arm)))  # of f^2 (3 - 2 f)
-            f = np.clip(since[:, None] / np.clip(span, 1e-9, whole), 0.0, 1.0)
-            out = out + off * (1 - f * f * (3 - 2 * f))
-        return np.asarray(out)
+        duration = self.stretch.duration
+        ends = places(self.arm, self.stretch.evaluate(np.array([0.0, duration])))
+        counts = places(self.arm, self.stretch.evaluate(t))
+        for offset, since in ((self.start - ends[0], t), (self.end - ends[1], duration - t)):
+            span = np.sqrt(6 * np.abs(offset) / (_SETTLING * motor_accel(self.arm)))  # of f^2 (3 - 2 f)
+            f = np.clip(since[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)
+            counts = counts + offset * (1 - f * f * (3 - 2 * f))
+        return np.asarray(counts)
 
-    def _smooth(
+    def _smooth_segment(
         self, cutter: Cutter, seconds: float, counts: list[float], change: float, start_speed: Array, begin_time: float,
         end_speed: Array, end_time: float,
     ) -> tuple[Segment, Array]:  # fmt: skip
@@ -100,21 +101,21 @@ class CurveSegments:
         state = list(cutter.places), cutter.late
         for share in (1.0, 0.75, 0.5, 0.25, 0.0):
             cutter.places, cutter.late = list(state[0]), state[1]
-            one = cutter.piece(seconds, counts, change * share)
-            rate = np.array(one.rates) * (self.clock / STEP)
-            begin, end = rate / one.interval, rate / one.last_interval
+            segment = cutter.piece(seconds, counts, change * share)
+            rate = np.array(segment.rates) * (self.clock / STEP)
+            begin, end = rate / segment.interval, rate / segment.last_interval
             slow = (np.abs(begin - start_speed) <= most * begin_time).all() and (
                 np.abs(end - begin) <= most * seconds
             ).all()
             if share == 0.0 or (slow and (np.abs(end_speed - end) <= most * end_time).all()):
                 break
-        return one, end
+        return segment, end
 
-    def _fastest(self) -> Array:
+    def _max_rates(self) -> Array:
         """Greatest rate of every motor: (motors,) [counts/s]."""
         return np.asarray(np.abs(self.arm.motor_gain) @ self.arm.max_speed)
 
-    def _changes(self, t: Array, steps: Array) -> Array:
+    def _speed_changes(self, t: Array, steps: Array) -> Array:
         """How much the speed changes in every segment, see `Cutter.piece`: (segments,).
 
         As the speed along the way does, but so that no motor's speed jumps where two segments meet, nor changes in
@@ -129,7 +130,7 @@ class CurveSegments:
         ramp = change[:, None] * steps / h**2  # what the segment makes of each motor's acceleration
         size = np.maximum(np.abs(ramp), 1e-12)
         share = np.minimum((most / size).min(axis=1), 1.0)
-        spare = np.maximum(self._fastest() * h / np.maximum(np.abs(steps), 1e-12) - 1, 0.0).min(axis=1)
+        spare = np.maximum(self._max_rates() * h / np.maximum(np.abs(steps), 1e-12) - 1, 0.0).min(axis=1)
         share = np.minimum(share, 2 * spare / np.maximum(np.abs(change), 1e-12))
         for end in (self.stretch.evaluate(t[:-1] + 1e-9, 2) @ gain, self.stretch.evaluate(t[1:] - 1e-9, 2) @ gain):
             room = (np.maximum(most + end * np.sign(ramp), 0.0) / size).min(axis=1)
@@ -141,8 +142,8 @@ class CurveSegments:
 
     def bounds(self) -> Array:
         """Times where segments end, from 0 to the duration: (segments + 1,) [s]."""
-        whole = self.stretch.duration
-        t = np.linspace(0.0, whole, max(int(whole / _FINE), 16))
+        duration = self.stretch.duration
+        t = np.linspace(0.0, duration, max(int(duration / _FINE), 16))
         level = self._density(t)  # segments a second, then segments since the beginning
         level[1:] += level[:-1].copy()
         level[0] = 0.0
@@ -150,26 +151,26 @@ class CurveSegments:
         level[1:] *= np.diff(t)
         np.cumsum(level, out=level)
         number = max(int(level[-1]), 1)
-        out = np.interp(np.linspace(0.0, level[-1], number + 1), level, t)
-        out[-1] = whole
-        return np.asarray(out)
+        times = np.interp(np.linspace(0.0, level[-1], number + 1), level, t)
+        times[-1] = duration
+        return np.asarray(times)
 
     def _density(self, t: Array) -> Array:
         """How many segments a second are wanted at times t, which cover the stretch evenly: (T,)."""
-        whole, step = self.stretch.duration, float(t[1])
-        out, at = np.empty(len(t)), 0
+        duration, step = self.stretch.duration, float(t[1])
+        density, first = np.empty(len(t)), 0
         behind = np.zeros(0)  # times to a stop just before a part, as many as may reach into it
         for part in np.array_split(t, max(len(t) // _SAMPLES, 1)):
-            span, stop = self._spans(part)
-            span = np.minimum(span, _GROWTH * np.minimum(part, whole - part))
-            known = np.concatenate([behind, stop])
-            span = np.maximum(np.clip(span, _LEAST, _MOST), _reaching(known, step)[len(behind) :])
-            out[at : at + len(part)] = 1.0 / span
-            at += len(part)
-            behind = known[-int(known.max() / step) - 1 :]
-        return out
+            span, stop = self._span_limits(part)
+            span = np.minimum(span, _GROWTH * np.minimum(part, duration - part))
+            stop_times = np.concatenate([behind, stop])
+            span = np.maximum(np.clip(span, _LEAST, _MOST), _least_spans(stop_times, step)[len(behind) :])
+            density[first : first + len(part)] = 1.0 / span
+            first += len(part)
+            behind = stop_times[-int(stop_times.max() / step) - 1 :]
+        return density
 
-    def _spans(self, t: Array) -> tuple[Array, Array]:
+    def _span_limits(self, t: Array) -> tuple[Array, Array]:
         """At times t: how long a chord may be [s], and the time to a stop [s] of the motor that needs longest.
 
         A chord that may be longer than any segment, with joints that bear on the tip no more than the arm's reach
@@ -188,21 +189,21 @@ class CurveSegments:
         return span, stop
 
 
-def _reaching(stop: Array, step: float) -> Array:
+def _least_spans(stop: Array, step: float) -> Array:
     """Least span of segments so that `_QUEUED` of them always reach to a stop; samples `step` [s] apart.
 
     What moves now and needs u to a stop asks that of all segments within the next u.
     """
     need = stop / _QUEUED
-    out = need.copy()
+    least = need.copy()
     if float(need.max(initial=0.0)) <= _LEAST:  # no segment is shorter
-        return out
+        return least
     for d in range(1, min(int(stop.max(initial=0.0) / step) + 1, len(stop))):
-        out[d:] = np.maximum(out[d:], np.where(stop[:-d] >= d * step, need[:-d], 0.0))
-    return out
+        least[d:] = np.maximum(least[d:], np.where(stop[:-d] >= d * step, need[:-d], 0.0))
+    return least
 
 
-def rates(arm: Arm, stretch: Stretch) -> Array:
+def sampled_rates(arm: Arm, stretch: Stretch) -> Array:
     """Greatest rate of every motor: (motors,) [counts/s], sampled every 5 ms."""
     t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / _FINE), 16))
     parts = np.array_split(t, max(len(t) // _SAMPLES, 1))

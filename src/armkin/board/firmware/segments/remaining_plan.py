@@ -45,14 +45,14 @@ def left_of(
 
     counts: where it stands; lay: a trajectory from there as a plan for its board. None: it does not stand on that move.
     """
-    first, here = plans[0], np.array(counts, dtype=np.int64)
-    if move == 0 and (here == first.start).all():
+    first, standing = plans[0], np.array(counts, dtype=np.int64)
+    if move == 0 and (standing == first.start).all():
         return plans, Place(0, 0, 0.0, 0.0)
-    place = next((p for p in places_on([first], here) if p.stretch == move), None)
+    place = next((p for p in places_on([first], standing) if p.stretch == move), None)
     if place is None:
         return None
-    left = remaining_trajectory(first, place, joints(first.trajectory.arm, here))
-    return [lay(left, here), *plans[1:]], place
+    left = remaining_trajectory(first, place, joints(first.trajectory.arm, standing))
+    return [lay(left, standing), *plans[1:]], place
 
 
 def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
@@ -75,20 +75,20 @@ def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
                 way = b - a
                 share = float(np.clip((counts - a) @ way / max(way @ way, 1e-12), 0.0, 1.0))
                 if np.abs(a + share * way - counts).max(initial=0) <= _NEAR:
-                    at = _refined(part, k, t0 + share * (t1 - t0), counts)
-                    yield Place(p, k, at, begin + at)
+                    time = _refine_time(part, k, t0 + share * (t1 - t0), counts)
+                    yield Place(p, k, time, begin + time)
         before += part.duration
 
 
-def _refined(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
+def _refine_time(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
     """The time within a stretch when its motors are nearest to the counts (Gauss-Newton from a guess)."""
     arm, stretch = part.trajectory.arm, part.trajectory.stretches[number]
     t = guess
     for _ in range(8):
         when = np.array([t])
-        off = counts - places(arm, stretch.evaluate(when))[0]
+        distance = counts - places(arm, stretch.evaluate(when))[0]
         speed = stretch.evaluate(when, 1)[0] @ arm.motor_gain.T
         if speed @ speed < 1.0:  # slower than a step a second: at rest, or all but
             break
-        t = float(np.clip(t + np.clip(off @ speed / (speed @ speed), -0.02, 0.02), 0.0, stretch.duration))
+        t = float(np.clip(t + np.clip(distance @ speed / (speed @ speed), -0.02, 0.02), 0.0, stretch.duration))
     return t

@@ -93,19 +93,19 @@ class LineSegments:
 
     def __iter__(self) -> Iterator[Segment]:
         """The segments in order."""
-        law, span, steps = self.law, self.end - self.start, self._steps
+        law, span, steps = self.law, self.end - self.start, self._most_steps
         cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
         unheard = law.is_trapezoid
-        for times, ending in _on_steps(law, _bounds(law, steps, self.pieces), steps):
-            done, speed = law.evaluate(times) / law.length, law.evaluate(times, 1) / law.length
+        for times, ending in _on_steps(law, _segment_bounds(law, steps, self.pieces), steps):
+            share, speed = law.evaluate(times) / law.length, law.evaluate(times, 1) / law.length
             if ending:
-                done[-1] = 1.0
+                share[-1] = 1.0
             for k, (a, b) in enumerate(pairwise(times.tolist())):
                 change = speed_change(float(speed[k]), float(speed[k + 1]))
-                counts = (self.start + span * done[k + 1]).tolist()
-                drift = _SPARE * steps * float(done[k + 1] - done[k])
+                counts = (self.start + span * share[k + 1]).tolist()
+                drift = _SPARE * steps * float(share[k + 1] - share[k])
                 last = ending and k + 2 == len(times)
-                unheard = unheard and float(done[k + 1]) * steps < _NO_STEP
+                unheard = unheard and float(share[k + 1]) * steps < _NO_STEP
                 seconds = (b - a) * (UNHEARD if unheard else 1.0)
                 yield cutter.piece(seconds, counts, change, drift, None if last else _MAKE_UP, unheard)
                 unheard = False
@@ -113,20 +113,20 @@ class LineSegments:
             raise AssertionError("a line's rates do not lead to its end")
 
     @property
-    def _steps(self) -> int:
+    def _most_steps(self) -> int:
         return int(np.abs(self.end - self.start).max())
 
     def __len__(self) -> int:
-        return count(self.law, self._steps, self.pieces)
+        return segment_count(self.law, self._most_steps, self.pieces)
 
 
-def count(law: Profile, steps: int, pieces: Pieces = Pieces.FINE) -> int:
+def segment_count(law: Profile, steps: int, pieces: Pieces = Pieces.FINE) -> int:
     """How many segments a line with this law has; steps: of the motor that makes most."""
-    phases = _phases(law, steps, pieces)
+    phases = _law_phases(law, steps, pieces)
     return sum(parts if isinstance(parts, int) else len(parts) for _, _, parts in phases)
 
 
-def line(
+def straight_line(
     start: Sequence[int],
     end: Sequence[int],
     top: float,
@@ -139,7 +139,7 @@ def line(
     return line_segments(start, end, trapezoid(1.0, top, accel), clock=clock, min_interval=min_interval)
 
 
-def _most(law: Profile, pieces: Pieces) -> int:
+def _most_ramp_segments(law: Profile, pieces: Pieces) -> int:
     """Segments of a ramp at most; a move is short if its cruise is shorter than a ramp."""
     if pieces == Pieces.ROUGH:
         return _ROUGH
@@ -152,7 +152,7 @@ def _to_first_step(law: Profile, accel: float, steps: int) -> float:
     return _BEFORE_STEP / math.sqrt(abs(accel) * steps / law.length)
 
 
-def _phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[float, float, int | list[float]]]:
+def _law_phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[float, float, int | list[float]]]:
     """A law's phases: begin, end, and into how many segments they are cut evenly, or where else.
 
     steps: of the motor that makes most.
@@ -166,32 +166,36 @@ def _phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[float, f
         if t1 - t0 < 1e-9:
             continue
         if jerk == 0.0 and accel != 0.0:
-            yield t0, t1, _ramp(law, t0, t1, accel, steps, pieces)
+            yield t0, t1, _ramp_bounds(law, t0, t1, accel, steps, pieces)
             continue
         longest = _JERK if jerk else min(max(ramp / 8, _CRUISE[0]), _CRUISE[1])
         parts = math.ceil((t1 - t0) / longest)
-        each = (t1 - t0) / parts
-        if jerk or each < _SPLIT:
+        part_time = (t1 - t0) / parts
+        if jerk or part_time < _SPLIT:
             yield t0, t1, parts
             continue
         if parts > 1:
-            yield t0, t1 - each, parts - 1
-        yield t1 - each, t1, [t1 - each / 4, t1]  # a short end: what its rates' rounding leaves, the ramp makes up for
+            yield t0, t1 - part_time, parts - 1
+        yield (
+            t1 - part_time,
+            t1,
+            [t1 - part_time / 4, t1],
+        )  # a short end: what its rates' rounding leaves, the ramp makes up for
 
 
-def _bounds(law: Profile, steps: int, pieces: Pieces) -> Iterator[float]:
+def _segment_bounds(law: Profile, steps: int, pieces: Pieces) -> Iterator[float]:
     """When segments end, from 0 on."""
     yield 0.0
-    for t0, t1, parts in _phases(law, steps, pieces):
+    for t0, t1, parts in _law_phases(law, steps, pieces):
         yield from (t0 + (t1 - t0) * i / parts for i in range(1, parts + 1)) if isinstance(parts, int) else parts
 
 
-def _ramp(law: Profile, t0: float, t1: float, accel: float, steps: int, pieces: Pieces) -> list[float]:
+def _ramp_bounds(law: Profile, t0: float, t1: float, accel: float, steps: int, pieces: Pieces) -> list[float]:
     """Ends of segments of a phase of constant acceleration: speeds in geometric steps from the slow end."""
     v0, v1 = (float(v) for v in law.evaluate(np.array([t0, t1]), 1))
     if accel < 0:
         v1 = max(0.0, v0 + accel * (t1 - t0))
-    most, shortest = _most(law, pieces), _FIRST_ROUGH if pieces == Pieces.ROUGH else _FIRST
+    most, shortest = _most_ramp_segments(law, pieces), _FIRST_ROUGH if pieces == Pieces.ROUGH else _FIRST
     top = max(v0, v1) / abs(accel)  # [s] from rest at each speed
     first = max(min(v0, v1) / abs(accel), shortest, _to_first_step(law, accel, steps))
     first = min(max(first, top / _WIDEST**most), _FIRST_MOST)
@@ -218,22 +222,22 @@ def _on_steps(law: Profile, bounds: Iterable[float], steps: int) -> Iterator[tup
 
     In blocks, each of which begins with the last bound of the one before; the last one is told.
     """
-    rest = iter(bounds)
-    known: list[float] = []
+    bounds_left = iter(bounds)
+    pending: list[float] = []
     begin = 0.0
     while True:
-        more = list(islice(rest, _AT_ONCE))
-        known += more
-        times = np.array(known)
+        more = list(islice(bounds_left, _AT_ONCE))
+        pending += more
+        times = np.array(pending)
         if len(times) > 2:
-            at, speed = law.evaluate(times) / law.length * steps, law.evaluate(times, 1) / law.length * steps
-            near = np.minimum(np.diff(at)[:-1], np.diff(at)[1:])
-            whole = (np.rint(at) - at)[1:-1] / np.maximum(speed[1:-1], 1e-9)
-            times[1:-1] += np.where((near > 4) & (speed[1:-1] > 0), whole, 0.0)
+            position, speed = law.evaluate(times) / law.length * steps, law.evaluate(times, 1) / law.length * steps
+            near = np.minimum(np.diff(position)[:-1], np.diff(position)[1:])
+            shift = (np.rint(position) - position)[1:-1] / np.maximum(speed[1:-1], 1e-9)
+            times[1:-1] += np.where((near > 4) & (speed[1:-1] > 0), shift, 0.0)
         times[0] = begin
         if len(more) < _AT_ONCE:
             yield times, True
             return
         yield times[:-1], False  # what the last one is moved to depends on the next
         begin = float(times[-2])
-        known = known[-2:]
+        pending = pending[-2:]

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 
 from armkin.board.backend.motion_start import StartedTrajectory
 from armkin.board.firmware.segments.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
-from armkin.board.firmware.segments.curve_segments import CurveSegments, rates
-from armkin.board.firmware.segments.straight_lines import Pieces, count, line_segments
+from armkin.board.firmware.segments.curve_segments import CurveSegments, sampled_rates
+from armkin.board.firmware.segments.straight_lines import Pieces, line_segments, segment_count
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model import units
@@ -65,27 +65,27 @@ class Cut(StartedTrajectory):
     @cached_property
     def segments(self) -> int:
         """Number of device segments."""
-        number, at = 0, self.start
+        number, begin = 0, self.start
         for stretch, end in zip(self.trajectory.stretches, self.ends, strict=True):
-            if self._is_line(stretch, at, end):
-                number += count(stretch.law, int(np.abs(end - at).max()))
+            if self._is_line(stretch, begin, end):
+                number += segment_count(stretch.law, int(np.abs(end - begin).max()))
             else:
-                number += len(self._move(stretch, at, end, Pieces.FINE).segments)
-            at = end
+                number += len(self._move_of(stretch, begin, end, Pieces.FINE).segments)
+            begin = end
         return number
 
     def moves(self, pieces: Callable[[], Pieces] = lambda: Pieces.FINE) -> Iterator[Move]:
         """The moves, one a stretch, made as they are asked for; pieces: asked then, of lines."""
-        at = self.start
+        begin = self.start
         for stretch, end in zip(self.trajectory.stretches, self.ends, strict=True):
-            yield self._move(stretch, at, end, pieces())
-            at = end
+            yield self._move_of(stretch, begin, end, pieces())
+            begin = end
 
     @staticmethod
     def _is_line(stretch: Stretch, start: Counts, end: Counts) -> TypeGuard[Straight]:
         return isinstance(stretch, Straight) and stretch.law.is_trapezoid and bool((start != end).any())
 
-    def _move(self, stretch: Stretch, start: Counts, end: Counts, pieces: Pieces) -> Move:
+    def _move_of(self, stretch: Stretch, start: Counts, end: Counts, pieces: Pieces) -> Move:
         if self._is_line(stretch, start, end):
             a, b, clock, least = start.tolist(), end.tolist(), self.clock, self.min_interval
             return line_segments(a, b, stretch.law, clock=clock, min_interval=least, pieces=pieces)
@@ -95,7 +95,9 @@ class Cut(StartedTrajectory):
         return Move(start, end, parts if stretch.duration else (), cycles, curve=True, brake=brake_share(stretch))
 
 
-def cut(trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> Cut:
+def cut_trajectory(
+    trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_interval: int = MIN_INTERVAL
+) -> Cut:
     """A trajectory that starts at counts `start` (motors,), for a board of this clock and shortest interval.
 
     Raises RateError, naming joint and motor, if the board cannot make steps that fast.
@@ -108,16 +110,16 @@ def cut(trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_int
                 f"motor {motor_names(arm)[far]} would stand at {end[far]:,} counts; a board counts to {FARTHEST:,}"
             )
     top = np.zeros(len(first))
-    at, allowed = first, clock / min_interval
+    begin, allowed = first, clock / min_interval
     for stretch, end in zip(trajectory.stretches, ends, strict=True):
-        needed = _rates(arm, stretch, at, end)
+        needed = _greatest_rates(arm, stretch, begin, end)
         if needed.max(initial=0.0) > allowed:
             raise _too_fast(arm, stretch, needed, allowed)
-        top, at = np.maximum(top, needed), end
+        top, begin = np.maximum(top, needed), end
     return Cut(trajectory, first, np.array(ends, dtype=np.int64).reshape(-1, len(first)), top, clock, min_interval)
 
 
-def plan(
+def plan_moves(
     arm: Arm,
     start: ArrayLike,
     targets: ArrayLike,
@@ -129,11 +131,11 @@ def plan(
     """Moves from counts through joint targets, stopping at each, where the motors' steps put them.
 
     start: (motors,) counts; targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
-    Raises as `armkin.motion.joint_moves.plan_joint_moves` and `cut` do.
+    Raises as `armkin.motion.joint_moves.plan_joint_moves` and `cut_trajectory` do.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("robots/three_dof.yaml")
-    >>> p = plan(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]))
+    >>> p = plan_moves(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]))
     >>> p.end.tolist(), round(p.duration, 2)
     ([-1067, -10144, 5667], 1.92)
     """
@@ -144,16 +146,16 @@ def plan(
     made = np.clip(joints_of(arm, pulses(arm, goals)), arm.lower, arm.upper)
     trajectory = plan_joints(arm, joints_of(arm, np.asarray(start)), made, speed=speed)
     try:
-        return cut(trajectory, start, clock=clock, min_interval=min_interval)
+        return cut_trajectory(trajectory, start, clock=clock, min_interval=min_interval)
     except RateError as error:
         percent = math.floor(100 * speed * error.fields["share"])
         raise RateError(f"{error}\nlower its max_speed, or the speed to {percent} percent", **error.fields) from None
 
 
-def _rates(arm: Arm, stretch: Stretch, start: Counts, end: Counts) -> Array:
+def _greatest_rates(arm: Arm, stretch: Stretch, start: Counts, end: Counts) -> Array:
     """Greatest rate of every motor: (motors,) [counts/s]."""
     if not isinstance(stretch, Straight):
-        return rates(arm, stretch)
+        return sampled_rates(arm, stretch)
     return np.asarray(np.abs(end - start) * stretch.law.peak)
 
 

@@ -67,42 +67,42 @@ class Image:
         n = len(self.axes)
         flags = self.abort_closed | self.enable_high << 1 | self.power_sensed << 2
         times = (self.step_high, self.step_low, self.dir_setup, self.wake)
-        out = struct.pack("<8BI", _LAYOUT, n, len(self.rows), flags, *times, self.meaning)
+        packed = struct.pack("<8BI", _LAYOUT, n, len(self.rows), flags, *times, self.meaning)
         for a in self.axes:
             marks = a.used | a.invert << 1
-            out += struct.pack("<BiiiII", marks, a.lower, a.upper, a.home, a.max_rate, a.max_accel)
-        out += b"".join(guard.pack(n) for guard in self.guards)
+            packed += struct.pack("<BiiiII", marks, a.lower, a.upper, a.home, a.max_rate, a.max_accel)
+        packed += b"".join(guard.pack(n) for guard in self.guards)
         for r in self.rows:
-            out += struct.pack(f"<ii{n}h", r.lower, r.upper, *r.weight)
-        return out
+            packed += struct.pack(f"<ii{n}h", r.lower, r.upper, *r.weight)
+        return packed
 
     @classmethod
-    def unpack(cls, data: bytes, switches: int) -> Image | None:
+    def unpack(cls, raw: bytes, switches: int) -> Image | None:
         """The image of its bytes; None if layout or length are wrong (ranges are the board's to check)."""
-        if len(data) < 12:
+        if len(raw) < 12:
             return None
-        layout, n, rows, flags, high, low, setup, wake, meaning = struct.unpack_from("<8BI", data)
-        at = 12
-        if layout != _LAYOUT or flags > 7 or len(data) != at + _AXIS * n + (1 + n) * switches + (8 + 2 * n) * rows:
+        layout, n, rows, flags, high, low, setup, wake, meaning = struct.unpack_from("<8BI", raw)
+        offset = 12
+        if layout != _LAYOUT or flags > 7 or len(raw) != offset + _AXIS * n + (1 + n) * switches + (8 + 2 * n) * rows:
             return None
         axes = []
         for _ in range(n):
-            marks, *fields = struct.unpack_from("<BiiiII", data, at)
-            at += _AXIS
+            marks, *fields = struct.unpack_from("<BiiiII", raw, offset)
+            offset += _AXIS
             if marks > 3:
                 return None
             axes.append(AxisImage(bool(marks & 1), bool(marks & 2), *fields))
         guards = []
         for _ in range(switches):
-            marks, *weight = struct.unpack_from(f"<B{n}b", data, at)
-            at += 1 + n
+            marks, *weight = struct.unpack_from(f"<B{n}b", raw, offset)
+            offset += 1 + n
             if marks > 3 or any(weight) != bool(marks & 1):
                 return None
             guards.append(GuardImage(bool(marks & 2), tuple(weight)))
         limits = []
         for _ in range(rows):
-            lower, upper, *weight = struct.unpack_from(f"<ii{n}h", data, at)
-            at += 8 + 2 * n
+            lower, upper, *weight = struct.unpack_from(f"<ii{n}h", raw, offset)
+            offset += 8 + 2 * n
             limits.append(RowImage(lower, upper, tuple(weight)))
         bits = bool(flags & 1), bool(flags & 2), bool(flags & 4)
         return cls(tuple(axes), tuple(limits), tuple(guards), *bits, high, low, setup, wake, meaning)

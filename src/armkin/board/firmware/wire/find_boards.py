@@ -17,10 +17,10 @@ def answering_ports(
     number: the board's as INFO says it; None: any. Only ports that look like an Arduino are opened (which
     resets most of them: an arm that stands still keeps its position), and none that another program holds.
     """
-    return [name for name in likely() if _answers(name, number, baud, stop, reset)]
+    return [name for name in likely_ports() if _board_answers(name, number, baud, stop, reset)]
 
 
-def likely() -> Iterable[str]:
+def likely_ports() -> Iterable[str]:
     """Names of the ports that look like an Arduino."""
     return [port.device for port in list_ports() if port.board]
 
@@ -30,7 +30,7 @@ def foreign_ports() -> Iterable[str]:
     return [port.device for port in list_ports() if port.board or port.adapter]
 
 
-def _answers(name: str, number: int | None, baud: int, stop: Callable[[], bool], reset: bool) -> bool:
+def _board_answers(name: str, number: int | None, baud: int, stop: Callable[[], bool], reset: bool) -> bool:
     try:
         link = SerialPort(name, baud, reset=reset)
     except LinkError:

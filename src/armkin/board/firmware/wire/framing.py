@@ -12,35 +12,35 @@ from collections.abc import Iterator
 MAX_FRAME = 250  # payload + CRC: COBS then adds one byte
 
 
-def cobs_encode(data: bytes) -> bytes:
+def cobs_encode(raw: bytes) -> bytes:
     """Consistent overhead byte stuffing (Cheshire & Baker 1999) of at most 254 bytes.
 
     >>> cobs_encode(bytes([1, 0, 2])).hex()
     '02010202'
     """
-    if len(data) > 254:
-        raise ValueError(f"{len(data)} bytes in a frame; 254 fit")
-    return b"".join(bytes([len(block) + 1]) + block for block in data.split(b"\0"))
+    if len(raw) > 254:
+        raise ValueError(f"{len(raw)} bytes in a frame; 254 fit")
+    return b"".join(bytes([len(block) + 1]) + block for block in raw.split(b"\0"))
 
 
-def cobs_decode(data: bytes) -> bytes | None:
+def cobs_decode(stuffed: bytes) -> bytes | None:
     """The inverse of `cobs_encode`; None if the stuffing is broken."""
-    blocks, at = [], 0
-    while at < len(data):
-        code = data[at]
-        if code == 0 or at + code > len(data):
+    blocks, offset = [], 0
+    while offset < len(stuffed):
+        code = stuffed[offset]
+        if code == 0 or offset + code > len(stuffed):
             return None
-        blocks.append(data[at + 1 : at + code])
-        at += code
+        blocks.append(stuffed[offset + 1 : offset + code])
+        offset += code
     if not blocks or any(0 in block for block in blocks):
         return None
     return b"\0".join(blocks)
 
 
-def wire(payload: bytes) -> bytes:
+def encode_frame(payload: bytes) -> bytes:
     """A payload as it goes over the line: with CRC, stuffed, ended by a zero.
 
-    >>> wire(bytes([3, 9])).hex()
+    >>> encode_frame(bytes([3, 9])).hex()
     '07030998f9281300'
     """
     if len(payload) + 4 > MAX_FRAME:
@@ -48,13 +48,13 @@ def wire(payload: bytes) -> bytes:
     return cobs_encode(payload + struct.pack("<I", zlib.crc32(payload))) + b"\0"
 
 
-def unwire(frame: bytes) -> bytes | None:
+def decode_frame(frame: bytes) -> bytes | None:
     """The payload of a frame without its zero; None if it is damaged."""
-    data = cobs_decode(frame)
-    if data is None or not 6 <= len(data) <= MAX_FRAME:
+    unstuffed = cobs_decode(frame)
+    if unstuffed is None or not 6 <= len(unstuffed) <= MAX_FRAME:
         return None
-    payload = data[:-4]
-    return payload if struct.unpack("<I", data[-4:])[0] == zlib.crc32(payload) else None
+    payload = unstuffed[:-4]
+    return payload if struct.unpack("<I", unstuffed[-4:])[0] == zlib.crc32(payload) else None
 
 
 class Splitter:
@@ -66,22 +66,22 @@ class Splitter:
         self._incomplete = bytearray()
         self._skip = False  # in a frame that is too long already
 
-    def feed(self, data: bytes) -> Iterator[bytes]:
+    def feed(self, received: bytes) -> Iterator[bytes]:
         """The payloads that `data` completes."""
-        *frames, rest = data.split(b"\0")
+        *frames, incomplete = received.split(b"\0")
         for frame in frames:
-            whole = bytes(self._incomplete) + frame
+            stuffed = bytes(self._incomplete) + frame
             self._incomplete.clear()
-            if self._skip or len(whole) > self._largest:
+            if self._skip or len(stuffed) > self._largest:
                 self._skip = False
                 self.bad += 1
-            elif whole:
-                payload = unwire(whole)
+            elif stuffed:
+                payload = decode_frame(stuffed)
                 if payload is None:
                     self.bad += 1
                 else:
                     yield payload
-        self._incomplete += rest
+        self._incomplete += incomplete
         if len(self._incomplete) > self._largest:
             self._incomplete.clear()
             self._skip = True

@@ -91,7 +91,7 @@ class Window:
             self._go_back(0, len(self._sent[0][1]))
         elif self._gap and not self._line.noisy and begun > self._deaf:
             # what told of it was the answer to the second or a later one: the oldest without one is the third
-            behind = sum(len(data) for _, data in islice(self._sent, 3, None))
+            behind = sum(len(frame_bytes) for _, frame_bytes in islice(self._sent, 3, None))
             if behind + len(self._sent[0][1]) <= self._receive - QUESTION:
                 self._go_back(behind, 0)
 
@@ -119,21 +119,21 @@ class Window:
 
     def _fill(self) -> None:
         credit = self._credit
-        size = sum(len(data) for _, data in self._sent)
+        size = sum(len(frame_bytes) for _, frame_bytes in self._sent)
         most = _UNDER_WAY[0 if self._line.noisy else 1]
         while self._waiting and len(self._sent) < most:
             if self._waiting[0].segments > credit:
                 return
-            data = protocol.wire(self._waiting[0].make((self._next + len(self._sent)) & 255))
-            first = len(self._sent[0][1]) if self._sent else len(data)
+            frame_bytes = protocol.encode_frame(self._waiting[0].make((self._next + len(self._sent)) & 255))
+            first = len(self._sent[0][1]) if self._sent else len(frame_bytes)
             room = self._room(size, first)
-            if self._sent and len(data) > room:
+            if self._sent and len(frame_bytes) > room:
                 return
             frame = self._waiting.popleft()
-            self._sent.append((frame, data))
+            self._sent.append((frame, frame_bytes))
             self._sent_at = self._line.port.now()
             credit -= frame.segments
-            size += self._line.write_frame(data, room)
+            size += self._line.write_frame(frame_bytes, room)
 
     def _go_back(self, size: int, first: int) -> None:
         """Go back to the first frame that was not acknowledged.
@@ -145,12 +145,12 @@ class Window:
         self._sent_at = self._line.port.now()
         self._deaf = max(self._sent_at, self._line.clear) + self._line.slowest + _GAP
         self._line.write(b"\0")
-        for k, (_, data) in enumerate(self._sent):
+        for k, (_, frame_bytes) in enumerate(self._sent):
             room = self._room(size, first)
-            if k and len(data) > room:
+            if k and len(frame_bytes) > room:
                 break  # what follows it would wait for it
             self._line.resent += 1
-            size += self._line.write_frame(data, room)
+            size += self._line.write_frame(frame_bytes, room)
 
     def check(self, reply: Ack | Status) -> None:
         """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
@@ -158,17 +158,17 @@ class Window:
 
     def acknowledge(self, reply: Ack | Status, requested: float = 0.0) -> int:
         """Take a reply's `next` and `free`, asked for then; the number of frames that it acknowledges."""
-        done = (reply.next - self._next) & 255
-        if done > len(self._sent):
+        count = (reply.next - self._next) & 255
+        if count > len(self._sent):
             return 0
-        for _ in range(done):
+        for _ in range(count):
             self._sent.popleft()
         self._next, self._free = reply.next, reply.free
-        if done:
+        if count:
             self._line.clear, self._gap = max(self._line.clear, self._line.port.now()), False
             self._bytes = _BYTES[0] if self._line.noisy else min(_BYTES[1], self._bytes + 20)
         elif self._sent and (
             type(reply) is Ack or requested > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
         ):
             self._gap = True  # something behind the first frame has arrived, the first has not
-        return done
+        return count

@@ -14,7 +14,7 @@ from armkin.board.firmware.wire.protocol import (
     Type,
     mask_of,
 )
-from armkin.board.firmware.wire.segment_format import Segment, pack, segment_size
+from armkin.board.firmware.wire.segment_format import Segment, pack_segment, segment_size
 
 
 def motion(
@@ -38,7 +38,7 @@ def motion(
     gentle = round((1.0 - brake) * GENTLE_PARTS)
     flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0) | gentle << MOTION_GENTLE
     head = struct.pack(f"<BBHBB{k}i{k}i", Type.MOTION, tag, mask_of(axes), flags, len(segments), *start, *end)
-    return head + b"".join(pack(segment, axes, wide=wide) for segment in segments)
+    return head + b"".join(pack_segment(segment, axes, wide=wide) for segment in segments)
 
 
 def motion_size(axes: int, segments: Sequence[Segment]) -> int:
@@ -66,5 +66,5 @@ class Batch:
 
     def payload(self, tag: int) -> bytes:
         """Its frame."""
-        rest, brake = self.at_rest, self.brake
-        return motion(tag, self.axes, self.start, self.end, self.segments, at_rest=rest, brake=brake)
+        at_rest, brake = self.at_rest, self.brake
+        return motion(tag, self.axes, self.start, self.end, self.segments, at_rest=at_rest, brake=brake)

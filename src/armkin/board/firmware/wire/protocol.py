@@ -20,8 +20,8 @@ from armkin.board.firmware.wire.framing import MAX_FRAME as MAX_FRAME
 from armkin.board.firmware.wire.framing import Splitter as Splitter
 from armkin.board.firmware.wire.framing import cobs_decode as cobs_decode
 from armkin.board.firmware.wire.framing import cobs_encode as cobs_encode
-from armkin.board.firmware.wire.framing import unwire as unwire
-from armkin.board.firmware.wire.framing import wire as wire
+from armkin.board.firmware.wire.framing import decode_frame as decode_frame
+from armkin.board.firmware.wire.framing import encode_frame as encode_frame
 from armkin.board.firmware.wire.segment_format import BLOCK as BLOCK
 from armkin.board.firmware.wire.segment_format import COARSE as COARSE
 from armkin.board.firmware.wire.segment_format import FINE as FINE
@@ -209,9 +209,9 @@ def hold(tag: int) -> bytes:
     return struct.pack("<BB", Type.HOLD, tag)
 
 
-def config(tag: int, offset: int, data: bytes) -> bytes:
+def config(tag: int, offset: int, piece: bytes) -> bytes:
     """Writes a piece of the configuration image."""
-    return struct.pack("<BBH", Type.CONFIG, tag, offset) + data
+    return struct.pack("<BBH", Type.CONFIG, tag, offset) + piece
 
 
 def commit(tag: int, length: int, crc: int) -> bytes:
@@ -219,9 +219,9 @@ def commit(tag: int, length: int, crc: int) -> bytes:
     return struct.pack("<BBHI", Type.COMMIT, tag, length, crc)
 
 
-def enable(tag: int, what: int) -> bytes:
+def enable(tag: int, switches: int) -> bytes:
     """Drivers on (bit 0), servo pulses on (bit 1)."""
-    return struct.pack("<BBB", Type.ENABLE, tag, what)
+    return struct.pack("<BBB", Type.ENABLE, tag, switches)
 
 
 def set_position(tag: int, counts: dict[int, int]) -> bytes:
@@ -259,7 +259,7 @@ def mask_of(axes: Iterable[int]) -> int:
 # Frames from the board
 
 
-def parse(payload: bytes) -> Reply | None:
+def parse_reply(payload: bytes) -> Reply | None:
     """A reply; None for anything that no board of this version sends."""
     kind, size = payload[0], len(payload)
     if kind == Type.ACK and size == _ACK.size:
@@ -267,8 +267,8 @@ def parse(payload: bytes) -> Reply | None:
     if kind == Type.CREDIT and size == _ACK.size:
         return Credit(*_ACK.unpack(payload)[1:])
     if kind == Type.INFO and size == _INFO.size:
-        _, tag, version, major, minor, *rest = _INFO.unpack(payload)
-        return Info(tag, version, (major, minor), *rest)
+        _, tag, version, major, minor, *fields = _INFO.unpack(payload)
+        return Info(tag, version, (major, minor), *fields)
     if kind == Type.STATUS and size >= _STATUS.size + 4 and (size - _STATUS.size) % 4 <= 1:
         n, late = divmod(size - _STATUS.size, 4)
         counts = struct.unpack_from(f"<{n}i", payload, _STATUS.size)

@@ -35,7 +35,7 @@ class BoardSaysError(LinkError):
     """The board says what no board with this firmware can say; fields: field, value."""
 
 
-def _impossible(port: str, field: str, value: object, allowed: str) -> BoardSaysError:
+def _impossible_value_error(port: str, field: str, value: object, allowed: str) -> BoardSaysError:
     return BoardSaysError(
         f"the board on {port} answers {field} {value}, but only {allowed} is possible: its answers cannot be trusted\n"
         "flash the firmware that came with this armkin, or look for another program that uses the port",
@@ -61,28 +61,28 @@ def check_info(info: Info, port: str) -> None:
     for field, (least, most) in _INFO.items():
         value = getattr(info, field)
         if not least <= value <= most:
-            raise _impossible(port, field, value, f"{least} to {most}")
+            raise _impossible_value_error(port, field, value, f"{least} to {most}")
     for field in ("known", "servos"):
         value = getattr(info, field)
         if value >> info.axes:
-            raise _impossible(port, field, f"{value:#x}", f"{info.axes} axes")
+            raise _impossible_value_error(port, field, f"{value:#x}", f"{info.axes} axes")
 
 
 def check_reply(reply: Ack | Status, info: Info, port: str) -> None:
     """Raise BoardSaysError for an ACK or STATUS that cannot be."""
     if reply.state > max(State):
-        raise _impossible(port, "state", reply.state, f"0 to {int(max(State))}")
+        raise _impossible_value_error(port, "state", reply.state, f"0 to {int(max(State))}")
     if reply.error > max(Error):
-        raise _impossible(port, "error", reply.error, f"0 to {int(max(Error))}")
+        raise _impossible_value_error(port, "error", reply.error, f"0 to {int(max(Error))}")
     if reply.free > info.queue:
-        raise _impossible(port, "free", reply.free, f"0 to {info.queue}")
+        raise _impossible_value_error(port, "free", reply.free, f"0 to {info.queue}")
     if isinstance(reply, Status):
         if len(reply.counts) != info.axes:
-            raise _impossible(port, "counts", len(reply.counts), str(info.axes))
+            raise _impossible_value_error(port, "counts", len(reply.counts), str(info.axes))
         if reply.known >> info.axes:
-            raise _impossible(port, "known", f"{reply.known:#x}", f"{info.axes} axes")
+            raise _impossible_value_error(port, "known", f"{reply.known:#x}", f"{info.axes} axes")
         if max(map(abs, reply.counts)) > 2**31 - 1:
-            raise _impossible(port, "counts", max(map(abs, reply.counts)), "31 bits")
+            raise _impossible_value_error(port, "counts", max(map(abs, reply.counts)), "31 bits")
 
 
 def check_session(digest: int, expected: int, port: str) -> None:
@@ -98,4 +98,4 @@ def check_session(digest: int, expected: int, port: str) -> None:
 def check_next(acknowledged: int, sent: int, port: str) -> None:
     """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
     if acknowledged > sent:
-        raise _impossible(port, "next", f"{acknowledged} ahead", f"0 to {sent}")
+        raise _impossible_value_error(port, "next", f"{acknowledged} ahead", f"0 to {sent}")

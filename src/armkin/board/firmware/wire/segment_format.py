@@ -39,8 +39,8 @@ class Segment:
         """Cycles to the tick after so many, not rounded from tick to tick."""
         if self.quick:
             return self.interval + (self.add * ticks >> 16) + (self.bend * (ticks * (ticks - 1) // 2) >> 17)
-        blocks, rest = divmod(max(0, ticks - (self.ticks - 1) % BLOCK - 1), BLOCK)
-        bends = (BLOCK // 2 * blocks + rest) * (blocks + 1)
+        blocks, ticks_left = divmod(max(0, ticks - (self.ticks - 1) % BLOCK - 1), BLOCK)
+        bends = (BLOCK // 2 * blocks + ticks_left) * (blocks + 1)
         return self.interval + (self.add * ticks >> 16) + (self.bend * (bends >> 8) >> 14)
 
     @property
@@ -80,20 +80,20 @@ def nearest_rate(exact: float) -> int:
     """The rate nearest to one in 2^-23 steps a tick that a wide segment can say."""
     if abs(exact) < FINE - 0.5:
         return round(exact)
-    return _coarse(exact)
+    return _coarse_rate(exact)
 
 
-def _coarse(exact: float) -> int:
+def _coarse_rate(exact: float) -> int:
     rate = round(exact / COARSE)
     return rate * COARSE if abs(rate) < FINE - 1 else int(math.copysign(_FULL, rate))
 
 
-def _short(rate: int) -> int:
+def _sent_rate(rate: int) -> int:
     """A coarse rate as it is sent."""
     return int(rate / COARSE)
 
 
-def _long(short: int) -> int:
+def _full_rate(short: int) -> int:
     """And back."""
     return short * COARSE if abs(short) != FINE - 1 else int(math.copysign(_FULL, short))
 
@@ -108,16 +108,16 @@ def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Se
     """
     exact = (s * STEP / ticks for s in steps)
     short = ticks <= 255
-    rates = (_coarse(r) if short else nearest_rate(r) for r in exact)
+    rates = (_coarse_rate(r) if short else nearest_rate(r) for r in exact)
     return Segment(ticks, interval, add * 256, tuple(rates))
 
 
-def pack(s: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
+def pack_segment(s: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
     """A segment's bytes; bit i of the wide form's `fine` is axis i, bit 15 `quick`."""
     if not wide:
-        return struct.pack(f"<BHh{len(s.rates)}h", s.ticks, s.interval, s.add // 256, *map(_short, s.rates))
+        return struct.pack(f"<BHh{len(s.rates)}h", s.ticks, s.interval, s.add // 256, *map(_sent_rate, s.rates))
     fine = [axis for axis, r in zip(axes, s.rates, strict=True) if abs(r) < FINE]
-    short = (r if abs(r) < FINE else _short(r) for r in s.rates)
+    short = (r if abs(r) < FINE else _sent_rate(r) for r in s.rates)
     head = struct.pack("<HH", s.ticks, s.interval) + s.add.to_bytes(3, "little", signed=True)
     return head + struct.pack(f"<hH{len(s.rates)}h", s.bend, sum(1 << axis for axis in fine) | s.quick << 15, *short)
 
@@ -127,13 +127,13 @@ def segment_size(axes: int, *, wide: bool) -> int:
     return (11 if wide else 5) + 2 * axes
 
 
-def read_segment(data: bytes, axes: Sequence[int], *, wide: bool) -> Segment:
+def read_segment(raw: bytes, axes: Sequence[int], *, wide: bool) -> Segment:
     """A segment of its bytes (for the simulated board)."""
     if not wide:
-        ticks, interval, add, *short = struct.unpack(f"<BHh{len(axes)}h", data)
-        return Segment(ticks, interval, add * 256, tuple(map(_long, short)))
-    ticks, interval = struct.unpack_from("<HH", data)
-    bend, fine, *short = struct.unpack_from(f"<hH{len(axes)}h", data, 7)
-    rates = tuple(r if fine >> i & 1 and r != -FINE else _long(r) for i, r in zip(axes, short, strict=True))
-    add = int.from_bytes(data[4:7], "little", signed=True)
+        ticks, interval, add, *short = struct.unpack(f"<BHh{len(axes)}h", raw)
+        return Segment(ticks, interval, add * 256, tuple(map(_full_rate, short)))
+    ticks, interval = struct.unpack_from("<HH", raw)
+    bend, fine, *short = struct.unpack_from(f"<hH{len(axes)}h", raw, 7)
+    rates = tuple(r if fine >> i & 1 and r != -FINE else _full_rate(r) for i, r in zip(axes, short, strict=True))
+    add = int.from_bytes(raw[4:7], "little", signed=True)
     return Segment(ticks, interval, add, rates, bend, quick=bool(fine >> 15))

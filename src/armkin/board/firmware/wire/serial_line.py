@@ -47,17 +47,17 @@ class Line:
         self.port.write(data)
         self.clear = max(self.clear, self.port.now()) + len(data) * 10 / self.port.baud
 
-    def write_frame(self, data: bytes, room: int) -> int:
+    def write_frame(self, frame_bytes: bytes, room: int) -> int:
         """Send a frame, on a bad line as often as `room` bytes allow; the bytes written."""
         self._written += 1
-        copies = max(1, min(_COPIES, room // len(data))) if self.noisy else 1
-        self.write(data * copies)  # a copy too many moves nothing
-        return copies * len(data)
+        copies = max(1, min(_COPIES, room // len(frame_bytes))) if self.noisy else 1
+        self.write(frame_bytes * copies)  # a copy too many moves nothing
+        return copies * len(frame_bytes)
 
     def replies(self, timeout: float) -> Iterator[Ack | Info | Status]:
         """What has come, or comes within `timeout` seconds."""
         for payload in self.splitter.feed(self.port.read(timeout)):
-            reply = protocol.parse(payload)
+            reply = protocol.parse_reply(payload)
             if isinstance(reply, Ack | Info | Status):
                 yield reply
 
@@ -75,14 +75,14 @@ class Line:
         """Seconds in which an answer to a STATUS? is here, if nothing was lost."""
         return min(_PATIENCE, 2 * self.slowest + _SURELY) if self.slowest else _PATIENCE
 
-    def answered(self, tag: int) -> float:
+    def take_answer(self, tag: int) -> float:
         """When it was asked; waits as long as it was late: so long the line is behind what was written already."""
-        asked = self._asked_at.pop(tag, None)
-        if asked is None:
+        time_asked = self._asked_at.pop(tag, None)
+        if time_asked is None:
             return 0.0
-        self._asked_at = {t: at for t, at in self._asked_at.items() if at > asked}
-        took = self.port.now() - asked
+        self._asked_at = {t: time for t, time in self._asked_at.items() if time > time_asked}
+        took = self.port.now() - time_asked
         self.slowest = max(self.slowest, took - _ASKING * 10 / self.port.baud)
         if took > _LATE:
             self.clear = max(self.clear, self.port.now() + took - _LATE)
-        return asked
+        return time_asked

@@ -62,16 +62,16 @@ class Session:
 
         Raises LinkError if nothing answers, or something else than this protocol.
         """
-        begin, heard, nonce, leave = self.port.now(), bytearray(), _nonce(), [_LISTENS, _AGAIN]
+        begin, heard, nonce, leave = self.port.now(), bytearray(), _new_nonce(), [_LISTENS, _AGAIN]
         while True:
             since = self.port.now() - begin
             # A few tries; then silence, for a boot loader that listens; then on to the end.
             if leave and since > leave[0]:
                 leave_boot_loader(self.port)
                 del leave[0]
-                nonce = _nonce()  # a new session: a board counts those words as damaged frames
+                nonce = _new_nonce()  # a new session: a board counts those words as damaged frames
             if since < _TRIES or since > _AGAIN:
-                info = self._hello(nonce, 0.06 if since < _TRIES else 0.15 if since < 3.0 else 0.4)
+                info = self._greet(nonce, 0.06 if since < _TRIES else 0.15 if since < 3.0 else 0.4)
                 if info is not None:
                     return info
             else:
@@ -84,24 +84,24 @@ class Session:
     def reopen(self) -> Info:
         """Open a new session on a board that is there: what stopped the last one is over."""
         for _ in range(8):
-            nonce = _nonce()  # an answer to any of these will do: a busy computer's come late
+            nonce = _new_nonce()  # an answer to any of these will do: a busy computer's come late
             for patience in (self.line.patience,) * 8 + (0.2,):
-                info = self._hello(nonce, patience)
+                info = self._greet(nonce, patience)
                 if info is not None:
                     return info
-        raise _silent(self.port)
+        raise _silence_error(self.port)
 
-    def _hello(self, nonce: int, timeout: float) -> Info | None:
+    def _greet(self, nonce: int, timeout: float) -> Info | None:
         """Greet the board. A repeated nonce changes nothing there: the answer to the one before serves as well."""
         self._tag = (self._tag + 1) & 255
-        self.port.write(b"\0" + protocol.wire(protocol.hello(self._tag, nonce)) * self.line.copies)
+        self.port.write(b"\0" + protocol.encode_frame(protocol.hello(self._tag, nonce)) * self.line.copies)
         end = self.port.now() + timeout
         while self.port.now() < end:
             for payload in self.line.splitter.feed(self.port.read(max(0.001, end - self.port.now()))):
                 version = protocol.info_version(payload)
                 if version is not None and version != protocol.VERSION:
                     raise reply_checks.other_version(self.port.name, version)
-                info = protocol.parse(payload)
+                info = protocol.parse_reply(payload)
                 if isinstance(info, Info) and info.nonce == nonce:
                     self._begin(info)
                     return info
@@ -114,13 +114,13 @@ class Session:
         self._window.begin(info)
         self._error = None
         self.heard, self._silent_for = self.port.now(), 0.0
-        self._patient()
+        self._renew_patience()
 
-    def _patient(self) -> None:
+    def _renew_patience(self) -> None:
         """Something went on: wait for the next as long as what is queued may take, and a little."""
         self._until = self.port.now() + self.queued / 1000 + _STALLED
 
-    def _stalled(self) -> None:
+    def _check_stalled(self) -> None:
         """Raise LinkError if the board has neither gone on nor come to rest in all the time that it may take."""
         if self.port.now() > self._until:
             raise LinkError(
@@ -135,7 +135,7 @@ class Session:
     def submit(self, make: Callable[[int], bytes], segments: int = 0, seconds: float = 0.0) -> None:
         """Put a frame in line; make: its payload for a sequence number; segments: credit that it takes."""
         if not self._window:
-            self._patient()
+            self._renew_patience()
         self._window.submit(make, segments, seconds)
 
     @property
@@ -170,29 +170,29 @@ class Session:
         """
         if self._stop():
             raise StoppedError(self.hold())
-        before, now = self._turn, self.port.now()
-        self._turn = now
+        before, present = self._turn, self.port.now()
+        self._turn = present
         self._window.send()
-        if now - self._last_request >= _between_questions(self.line, self._window, ends):
+        if present - self._last_request >= _between_questions(self.line, self._window, ends):
             self._ask()
         self._hear(timeout)
-        self.deaf = max(self.deaf, now - before, self.port.now() - now)
+        self.deaf = max(self.deaf, present - before, self.port.now() - present)
         if self._error is not None:
             if self._stop():  # a suspended sender wakes to both: the board's silence, and the wish that it stop
                 raise StoppedError(self.hold())
             raise DeviceError(self._error.error, self._error.detail, self._error.state)
-        self._silent_for += min(self.port.now() - now, _TURN)
-        if self.heard >= now:
+        self._silent_for += min(self.port.now() - present, _TURN)
+        if self.heard >= present:
             self._silent_for = 0.0
         elif self._silent_for > _GIVE_UP:
-            raise _silent(self.port)
+            raise _silence_error(self.port)
         if self._window:
-            self._stalled()
+            self._check_stalled()
 
     def _ask(self, page: int = 0, copies: int = 1) -> int:
         self._last_request, self._tag = self.port.now(), (self._tag + 1) & 255
         self.line.note_status_request(self._tag)
-        self.line.write(protocol.wire(protocol.status_query(self._tag, page)) * copies)
+        self.line.write(protocol.encode_frame(protocol.status_query(self._tag, page)) * copies)
         return self._tag
 
     def _hear(self, timeout: float) -> None:
@@ -206,16 +206,16 @@ class Session:
             if reply.error != Error.NO_SESSION:  # after a reset there is no session
                 reply_checks.check_session(reply.session, self._digest, self.port.name)
                 self._window.check(reply)
-            goes_on, asked = reply.queued < self.queued or _has_moved(self.latest, reply), 0.0
+            goes_on, time_asked = reply.queued < self.queued or _has_moved(self.latest, reply), 0.0
             self.state, self.queued = State(reply.state), reply.queued
             self.last = reply
             if isinstance(reply, Status):
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
-                asked = self.line.answered(reply.tag)
-            if (taken := self._window.acknowledge(reply, asked)) or goes_on:
+                time_asked = self.line.take_answer(reply.tag)
+            if (taken := self._window.acknowledge(reply, time_asked)) or goes_on:
                 self.taken += taken
-                self._patient()
+                self._renew_patience()
             if reply.error and self._error is None:
                 self._error = reply
 
@@ -235,7 +235,7 @@ class Session:
                 if answer is not None and answer.tag in tags and answer.page == page:
                     self.line.resent += tags.index(answer.tag)  # answers keep order: those before were lost
                     return answer
-        raise _silent(self.port)
+        raise _silence_error(self.port)
 
     def hold(self) -> Status:
         """Stop the arm along its path; its status at rest."""
@@ -243,7 +243,7 @@ class Session:
         begin = self.port.now()
         while True:
             self._tag = (self._tag + 1) & 255
-            self.port.write(b"\0" + protocol.wire(protocol.hold(self._tag)))
+            self.port.write(b"\0" + protocol.encode_frame(protocol.hold(self._tag)))
             status = self.status()
             if status.state == State.IDLE and status.error:
                 return status
@@ -260,7 +260,7 @@ class Session:
                 return status
             if self._stop():
                 raise StoppedError(self.hold())
-            self._stalled()
+            self._check_stalled()
             self._hear(_POLL_SOON)
 
     def arrivals(self, seconds: float = 0.0) -> Iterator[float]:
@@ -270,7 +270,7 @@ class Session:
         """
         self._until = max(self._until, self.port.now() + self.queued / 1000 + seconds + _STALLED)
         while True:
-            self._stalled()
+            self._check_stalled()
             if not self._window and self.state == State.IDLE:
                 return
             left = self.queued - 1000 * (self.port.now() - self.heard)  # what is queued goes on unheard
@@ -289,14 +289,14 @@ def _between_questions(line: Line, window: Window, ends: bool) -> float:
     return quick / 2 if line.noisy else quick
 
 
-def probe(session: Session) -> None:
+def probe_line(session: Session) -> None:
     """Ask a few questions, to learn whether the line is good before anything depends on it."""
     for _ in range(_PROBES):
         if session.status().bad:
             session.line.resent += 1
 
 
-def _nonce() -> int:
+def _new_nonce() -> int:
     """A new session's number. Its low half is the session's digest, and 0 means none."""
     return secrets.randbits(16) << 16 | 1 + secrets.randbelow(65535)
 
@@ -308,7 +308,7 @@ def _has_moved(last_status: Status | None, reply: Ack | Status) -> bool:
     )
 
 
-def _silent(port: Port) -> LinkError:
+def _silence_error(port: Port) -> LinkError:
     return LinkError(
         f"the board on {port.name} does not answer any more: is the cable plugged in?\n"
         "a moving arm has stopped on its path by itself; armkin status tells where it stands"
@@ -320,11 +320,11 @@ def _no_board(port: Port, heard: bytes, damaged: bool) -> LinkError:
 
     heard: what came between two tries; damaged: whether something came that is no frame of the protocol.
     """
-    where = f"{port.name} ({port.baud} baud)"
+    port_text = f"{port.name} ({port.baud} baud)"
     if b"grbl" in heard.lower():
-        why = f"GRBL answers on {where}: its robot file says board: {{kind: grbl}}"
+        why = f"GRBL answers on {port_text}: its robot file says board: {{kind: grbl}}"
     elif heard or damaged:
-        why = f"something answers on {where}, but not in this protocol: is armkin's firmware flashed?"
+        why = f"something answers on {port_text}, but not in this protocol: is armkin's firmware flashed?"
     else:
-        why = f"no board answers on {where}: is armkin's firmware flashed?"
+        why = f"no board answers on {port_text}: is armkin's firmware flashed?"
     return LinkError(f"{why}\n(armkin flash); armkin ports lists the other ports")
