@@ -119,7 +119,7 @@ COMMANDS: dict[str, Callable[[FirmwareMachine], object]] = {
     ),
     "grip": lambda one: gripping.move_gripper(one, gripping.gripper_of("arm", one.configuration), 1500),
     "home": lambda one: homing.home_joints(one),
-    "jog": lambda one: jogging.jog_axes(one, jogging.count_rates(one, 0, 10.0), 0.3),
+    "jog": lambda one: jogging.jog_motors(one, jogging.count_rates(one, 0, 10.0), 0.3),
 }
 
 

@@ -252,7 +252,9 @@ def test_a_way_of_less_than_a_step_is_taken() -> None:
     here = joints(one, [128, -1193, 1333])
     for steps in ([0.55, -0.55, 0], [0, 0, 0.7], [-0.6, 0, 0.6], [1.51, -0.55, 2.6]):
         goal = here + joints(one, steps) - one.home
-        way = cut_trajectory(Trajectory(one, here, (straight_move(one, here, goal),)), [128, -1193, 1333], min_interval=448)
+        way = cut_trajectory(
+            Trajectory(one, here, (straight_move(one, here, goal),)), [128, -1193, 1333], min_interval=448
+        )
         assert _moves(way) == way.end.tolist() != way.start.tolist()
 
 

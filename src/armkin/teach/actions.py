@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.teach import request_checks
-from armkin.teach.arm_description import first_lock, jog_axes, scene_json
+from armkin.teach.arm_description import first_lock, scene_json, tip_jog_axes
 from armkin.teach.page_key import RefusedError
 from armkin.teach.program_actions import ProgramActions
 from armkin.teach.tabs import Action, Fields, Tab, Tabs
@@ -109,7 +109,7 @@ class Actions:
         tab = self.tabs.open()
         self.warm()
         board = None if self.board is None else self.board.thread.state()
-        moved = [] if self.board is None else jog_axes(self.arm)
+        moved = [] if self.board is None else tip_jog_axes(self.arm)
         return {
             "tab": tab.id,
             "scene": scene_json(self.arm) | {"meshes": self.meshes, "jogs": moved},

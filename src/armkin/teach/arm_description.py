@@ -91,7 +91,7 @@ def _obstacle_triangles(arm: Arm) -> list[float]:
     ]
 
 
-def jog_axes(arm: Arm) -> list[str]:
+def tip_jog_axes(arm: Arm) -> list[str]:
     """The axes that the tip may be jogged along: none where no task fits."""
     from armkin.motion.jog_line import jog_axes
 

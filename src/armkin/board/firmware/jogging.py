@@ -85,7 +85,7 @@ def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) ->
     return seconds
 
 
-def jog_axes(
+def jog_motors(
     machine: FirmwareMachine, rate: dict[int, int], seconds: float, goes_on: Callable[[], bool] = lambda: True
 ) -> None:
     """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.

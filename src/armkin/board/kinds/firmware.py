@@ -155,7 +155,7 @@ class FirmwareBoard(Board):
         """Move one joint [rad/s | mm/s] for a time; the board stops it at its limits, if it knows where it stands."""
         rates = jogging.count_rates(self.machine, joint, self._in_shown_units(joint, rate))
         free = jogging.free_seconds(self.machine, joint, rates)
-        jogging.jog_axes(self.machine, rates, min(seconds, free), goes_on or (lambda: True))
+        jogging.jog_motors(self.machine, rates, min(seconds, free), goes_on or (lambda: True))
 
     def _in_shown_units(self, joint: int, rate: float) -> float:
         return rate if self.arm.prismatic[joint] else rate / units.DEGREE
