@@ -170,3 +170,12 @@ def wrapped(angle: E) -> E:
 def numbers_within(count: Int) -> Int:
     """0, 1, ... in each of groups, one behind the other, of so many each: (G,) -> (sum of count,)."""
     return np.asarray(np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count))
+
+
+def slices(count: int, size: int) -> list[slice]:
+    """From 0 to count, one after the other, of so many each and what is left.
+
+    >>> slices(5, 2)
+    [slice(0, 2, None), slice(2, 4, None), slice(4, 5, None)]
+    """
+    return [slice(start, min(start + size, count)) for start in range(0, count, size)]

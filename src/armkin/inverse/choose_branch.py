@@ -167,7 +167,7 @@ def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Req
             with suppress(UsageError):  # none of that name reaches this target
                 wanted = {names[i] for i in find(names, request.branch)}
             wanted = wanted if answer.best is not None else set()
-        best = _best(request, branches, [b.name in wanted for b in branches])
+        best = _best(request, [(branch, branch.name in wanted) for branch in branches])
         yield request, answer._replace(branches=branches, best=best)
         if best is not None:
             request = replace(request, near=branches[best].joints)
@@ -232,11 +232,11 @@ def blocked(request: Request, answer: Answer) -> NoBranchError:
     )
 
 
-def _best(request: Request, branches: Sequence[Branch], wanted: Sequence[bool]) -> int | None:
-    """The first branch that is wanted, within limits and free; where hits are ignored and none is, with hits."""
-    both = list(enumerate(zip(branches, wanted, strict=True)))
-    free = (i for i, (branch, named) in both if named and branch.may_be_taken)
-    hit = (i for i, (branch, named) in both if named and branch.within_limits and request.ignore)
+def _best(request: Request, branches: Sequence[tuple[Branch, bool]]) -> int | None:
+    """Of branches, each with whether it is wanted, the first one within limits and free; where hits are ignored and
+    none is, with hits."""
+    free = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.may_be_taken)
+    hit = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.within_limits and request.ignore)
     return next(free, next(hit, None))
 
 
@@ -332,7 +332,7 @@ class _Found:
         assert self.best is not None
         first = self.best[1]
         both = sorted(self.branches, key=lambda item: _rank(request, item[0]))
-        best = _best(request, [branch for branch, _ in both], [named for _, named in both])
+        best = _best(request, both)
         refused = None
         if request.branch is not None and best is None:
             refused = _refused(request, [branch for branch, named in both if named])

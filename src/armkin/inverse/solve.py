@@ -130,7 +130,7 @@ def answered(  # noqa: C901 - what is looked at after the closed form, in its or
     else:
         target, _, shown = read_targets(definition, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
-        out, count = _row_by_row(arm, definition, geometry, target, each, examine, workers)
+        out, count = _row_by_row(Goals(arm, definition, target, each), geometry, examine, workers)
     shown, most = target_rounding.of_targets(arm, definition, target, (given, shown), single, rounding, lead)
     goals = Goals(arm, definition, target, each)
     if examine:
@@ -191,18 +191,17 @@ def _by_slower_class(
     assert geometry is not None
     some = arm, task, target, near = goals.of(left)
     if not geometry.pairs:
-        return replaced(out, left, _row_by_row(arm, task, geometry, target, near, examine, workers)[0])
+        return replaced(out, left, _row_by_row(some, geometry, examine, workers)[0])
     rest, _, target, _, more = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
     if len(more):
         rest = _by_slower_class(some._replace(target=target), geometry.doubts, rest, more, examine, workers)
     return replaced(out, left, rest)
 
 
-def _row_by_row(
-    arm: Arm, task: Task, geometry: Geometry, target: Array, near: Array, examine: bool, workers: int
-) -> tuple[Batch, int]:
+def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -> tuple[Batch, int]:
     """Solvers that return joint values row by row. Also the number of branch columns."""
     assert geometry.rows is not None
+    arm, task, target, near = goals
     solve = (geometry.unmoved if examine else None) or geometry.rows
     parts = shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
     q, doubt, complete, lost, guesses = stacked(parts)
@@ -215,10 +214,8 @@ def _row_by_row(
     out.complete[...] = complete
     count = out.valid.sum(axis=1)
     out.status[count == 0] = Status.UNREACHABLE
-    for start in range(0, len(count), arrays.CHUNK):
-        rows = slice(start, start + arrays.CHUNK)
+    for rows in arrays.slices(len(count), arrays.CHUNK):
         pack(rows_of(out, rows), count[rows])
-    goals = Goals(arm, task, target, near)
     if examine:
         doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, position(arm, near)))] = True
     doubted = np.flatnonzero(doubt)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, slices
 from armkin.forward import fk, one_pose
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -87,8 +87,8 @@ def closest_each(
     definition = task_for(arm, task)
     goal, *_ = read_targets(definition, targets)
     close = np.broadcast_to(arm.home if near is None else np.asarray(near, float), (len(goal), arm.n))
-    parts = [slice(start, start + AT_ONCE) for start in range(0, len(goal), AT_ONCE)]
-    return [one for part in parts for one in _of_chunk(arm, definition, goal[part], close[part])]
+    parts = slices(len(goal), AT_ONCE)
+    return [nearest for part in parts for nearest in _of_chunk(arm, definition, goal[part], close[part])]
 
 
 def thorough(arm: Arm, task: Task, target: Array, near: Array) -> Closest:

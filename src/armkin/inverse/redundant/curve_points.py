@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import stacked
-from armkin.formula.arrays import Array, Bool, Int
+from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
@@ -41,8 +41,8 @@ def onto(find: Follower, row: Int, q: Array, last: Array, enough: float = tol.PA
 
     The tangents point to where last does. enough: size of a step that is the last one.
     """
-    some = (slice(k, k + AT_ONCE) for k in range(0, max(len(q), 1), AT_ONCE))
-    return stacked([_onto(find, row[own], q[own], last[own], enough) for own in some])
+    parts = slices(max(len(q), 1), AT_ONCE)
+    return stacked([_onto(find, row[part], q[part], last[part], enough) for part in parts])
 
 
 def _onto(find: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool, Int
+from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.boundaries import boundaries, places
 from armkin.inverse.redundant.branch_ends import crossed_at, hidden_stretches, number_of, places_of
@@ -104,12 +104,12 @@ def _pieces(find: Follower, found: Seen) -> Pieces:
     gaps = hidden.set_before
     more, short = rows_of(hidden, ~gaps), places.short
     parts = [_of_runs(t, found.legal, True, found.crossed.at, places.legal)]
-    sample = np.append(hidden.k, short.sample(0, K))
-    held = _hold_samples(
-        found.there, np.append(hidden.row, short.row), sample, np.append(hidden.branch, short.branch), K
-    )
-    families = _of_runs(t, found.there, False, found.gone.at, places.there)
-    parts.append(rows_of(families, ~(found.there.within | held)))
+    there = found.there
+    of = there.row[:, None] == np.append(hidden.row, short.row)
+    of &= there.branch[:, None] == np.append(hidden.branch, short.branch)
+    of &= (np.append(hidden.k, short.sample(0, K)) - there.first[:, None]) % K < there.length[:, None]
+    families = _of_runs(t, there, False, found.gone.at, places.there)
+    parts.append(rows_of(families, ~(there.within | of.any(axis=1))))  # without those that hold one of these
     parts[0] = _without_gaps(find, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
     row, branch = np.append(short.row, more.row), np.append(short.branch, more.branch)
     if len(row):
@@ -132,14 +132,6 @@ def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -
     a[some], b[some] = middle - (middle - begin) % (2 * np.pi), middle + (end - middle) % (2 * np.pi)
     low[some], high[some] = np.clip(low[some], a[some], b[some]), np.clip(high[some], a[some], b[some])
     return Pieces(runs.row, runs.branch, np.full(len(at), legal), a, b, a, b, low, at, high, runs.start)
-
-
-def _hold_samples(runs: Runs, row: Int, k: Int, branch: Int, K: int) -> Bool:
-    """Which runs hold one of the samples k (M,), of K, of branches (M,) of targets (M,)."""
-    out = np.zeros(len(runs.row), bool)
-    for one, sample, own in zip(row.tolist(), k.tolist(), branch.tolist(), strict=True):
-        out |= (runs.row == one) & (runs.branch == own) & ((sample - runs.first) % K < runs.length)
-    return out
 
 
 def _without_gaps(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.arrays import Array, Bool, Entry, Int
+from armkin.formula.arrays import Array, Bool, Entry, Int, slices
 from armkin.formula.trace import StraightLineCode
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
@@ -109,9 +109,8 @@ class Follower(NamedTuple):
         out = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
         missed = np.empty(out.shape[1:])
         room: list[NDArray[Any]] = []
-        for start in range(0, len(t), AT_A_TIME):
-            some = slice(start, min(start + AT_A_TIME, len(t)))
-            shape = (*axes, some.stop - start)
+        for some in slices(len(t), AT_A_TIME):
+            shape = (*axes, some.stop - some.start)
             *values, miss, room = self._candidates(rows[some], t[some], room)
             for j, q in enumerate(values):
                 out[j, :, some] = np.broadcast_to(q, shape).reshape(-1, shape[-1])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array, Int
+from armkin.formula.arrays import Array, Int, slices
 from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
 from armkin.inverse.answers.batch import Goals, as_solutions, empty
@@ -65,8 +65,7 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
     close = read_near(arm, near, lead)
     each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
     found: list[Array] = []
-    for start in range(0, len(goal), AT_ONCE):
-        rows = slice(start, start + AT_ONCE)
+    for rows in slices(len(goal), AT_ONCE):
         found += _of_chunk(ik, arm, task, goal[rows], each[rows])
     if arm.keep_out:
         found = [minima[np.argsort(~clear(arm, minima), kind="stable")] for minima in found]

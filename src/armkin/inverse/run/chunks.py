@@ -107,8 +107,7 @@ def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], 
         if inside is not True:
             within = (within.reshape(shape) & inside).reshape(B, N)
     columns, rows = legal.reshape(-1, N), part.q.reshape(N, -1)
-    for start in range(0, N, TURNED_AT_ONCE):
-        some = slice(start, start + TURNED_AT_ONCE)
+    for some in arrays.slices(N, TURNED_AT_ONCE):
         rows[some] = columns[:, some].T
     part.valid[...] = True if full else valid.T
     part.within[...] = part.valid if within is valid else within.T

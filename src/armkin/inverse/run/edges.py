@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool, Int
+from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, write
 from armkin.inverse.closed.candidates import Recorded, as_rows
@@ -173,12 +173,11 @@ def examined(
 
     seeds: candidates of these; others, unsettled: (N,), see `components.examine`.
     """
-    for start in range(0, len(doubted), AT_ONCE):
-        rows = doubted[start : start + AT_ONCE]
+    for part in slices(len(doubted), AT_ONCE):
+        rows = doubted[part]
         some = goals.of(rows)
-        part = rows_of(seeds, slice(start, start + AT_ONCE))
         lacking = (None, None) if unsettled is None else (unsettled[rows], unsettled[rows] & ~out.complete[rows])
-        seen = components.examine(some, part, others, *lacking)
+        seen = components.examine(some, rows_of(seeds, part), others, *lacking)
         if seen.surface.any():
             seen = surfaces.swept(some, seen)
         out = write(goals.arm, out, rows, seen.q, seen.valid, seen.label, some.near)

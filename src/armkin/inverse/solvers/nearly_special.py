@@ -22,7 +22,7 @@ from functools import cache
 import numpy as np
 
 from armkin.formula.array_tuples import stacked, widened
-from armkin.formula.arrays import Array, Bool, Int
+from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.forward import fk
 from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
 from armkin.inverse.closed.candidates import Recorded, recorded
@@ -67,12 +67,12 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return straight
 
     def rows(target: Array) -> Rows:
-        starts = range(0, max(len(target), 1), CHUNK)
-        parts = [_solve(arm, task, alike, off, elimination, target[k : k + CHUNK]) for k in starts]
-        found = stacked(parts)
+        parts = slices(max(len(target), 1), CHUNK)
+        found = stacked([_solve(source, off, elimination, target[part]) for part in parts])
         complete = _has_four_roots(arm, found.q) if counted else found.complete
         return found._replace(doubt=found.doubt & ~complete, complete=complete)  # four roots apart are simple ones
 
+    source = recorded(arm, task, alike)
     steps = newton_steps.steps(arm, task, off, alike.pairs) if alike.pairs is not None else None
     corrected, counted = steps or (None, False)
     why = f"{alike.why}, but for {off:.0e} of the reach: closed-form seeds, corrected on the true arm"
@@ -95,11 +95,11 @@ def _by_elimination(arm: Arm, task: Task, alike: Geometry, off: float, general_:
         return None
     if method.left_open(general_.elimination) > SICK:
         return None
+    source = recorded(arm, task, alike)
 
     def places(q: Array, target: Array) -> Int:
-        starts = range(0, max(len(target), 1), NAMED_AT_ONCE)
-        parts = [slice(k, k + NAMED_AT_ONCE) for k in starts]
-        return np.concatenate([_places(arm, task, alike, off, q[some], target[some]) for some in parts])
+        parts = slices(max(len(target), 1), NAMED_AT_ONCE)
+        return np.concatenate([_places(source, off, q[part], target[part]) for part in parts])
 
     why = f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class"
     geometry = replace(alike, name=general_.name, why=why, pairs=None, branches=_named_columns(alike), places=places)
@@ -123,15 +123,15 @@ def named(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array
     return rows
 
 
-def _places(arm: Arm, task: Task, alike: Geometry, off: float, q: Array, target: Array) -> Int:
+def _places(source: Recorded, off: float, q: Array, target: Array) -> Int:
     """Indices (N, M) of branches (N, M, n): the similar arm's that each is nearest to, others count on, -1 of none."""
-    seed, miss, _ = recorded(arm, task, alike).rows(target)
+    seed, miss, _ = source.rows(target)
     B = seed.shape[1]
     there = ~np.isnan(q[:, :, 0])
     numbers = np.full(there.shape, -1)
     if q.size:
-        away = newton.distances(arm, seed, q)  # (N, B, M)
-        real = miss < 9.0 * off * np.maximum(1.0, distance(arm, task, target))[:, None]
+        away = newton.distances(source.arm, seed, q)  # (N, B, M)
+        real = miss < 9.0 * off * np.maximum(1.0, distance(source.arm, source.task, target))[:, None]
         away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
         nearest, back = away.argmin(axis=2), away.argmin(axis=1)
         mutual = np.take_along_axis(back, nearest, axis=1) == np.arange(B)
@@ -151,34 +151,27 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
     return float(np.quantile(rough.min(axis=1), 0.8)) + tol.ROUNDED_ANSWER
 
 
-def _solve(
-    arm: Arm, task: Task, alike: Geometry, off: float, elimination: Callable[[], Geometry | None] | None, target: Array
-) -> Rows:
+def _solve(source: Recorded, off: float, elimination: Callable[[], Geometry | None] | None, target: Array) -> Rows:
     """What is found of some targets, none of them complete; the similar arm's branches keep their places."""
-    source = recorded(arm, task, alike)
-    off_here = off * np.maximum(1.0, distance(arm, task, target))  # the error grows with the slide's extension
+    # the error grows with the slide's extension
+    off_here = off * np.maximum(1.0, distance(source.arm, source.task, target))
     if elimination is None:
-        known, open_ = pairs.settled(arm, task, source, off_here, target)
+        known, open_ = pairs.settled(source, off_here, target)
         if len(rest := np.flatnonzero(open_)):
-            more, known.doubt[rest] = _by_neighbours(arm, task, source, off, off_here[rest], None, target[rest])
+            more, known.doubt[rest] = _by_neighbours(source, off, off_here[rest], None, target[rest])
             known = known._replace(q=widened(known.q, more.shape[1]))
             known.q[rest] = more
         return known
-    found = _by_neighbours(arm, task, source, off, off_here, elimination, target)
+    found = _by_neighbours(source, off, off_here, elimination, target)
     return Rows(*found, np.zeros(len(target), bool))
 
 
 def _by_neighbours(
-    arm: Arm,
-    task: Task,
-    source: Recorded,
-    off: float,
-    off_here: Array,
-    elimination: Callable[[], Geometry | None] | None,
-    target: Array,
+    source: Recorded, off: float, off_here: Array, elimination: Callable[[], Geometry | None] | None, target: Array
 ) -> tuple[Array, Bool]:
     """Branches and doubts by the elimination, or by the similar arm's branches at targets around."""
-    seeds, good, doubt = _correct(arm, task, source, off, off_here, target)
+    arm, task = source.arm, source.task
+    seeds, good, doubt = _correct(source, off, off_here, target)
     q = np.where(good[:, :, None], seeds, np.nan)
     few = np.flatnonzero(doubt)
     if not len(few):
@@ -227,15 +220,14 @@ def _filled_columns(q: Array, own: int) -> Array:
     return np.concatenate([q[:, :own], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
 
 
-def _correct(
-    arm: Arm, task: Task, source: Recorded, off: float, off_here: Array, target: Array
-) -> tuple[Array, Bool, Bool]:
+def _correct(source: Recorded, off: float, off_here: Array, target: Array) -> tuple[Array, Bool, Bool]:
     """Seeds moved onto the arm (N, B, n), which are branches (N, B), and for which poses (N,) that may not be all.
 
     off_here: `off` at each target (N,). The true arm reaches a target as the similar one, `source`, reaches
     another, not much more than that away. Hence a pose is sure only if the similar arm's branches hardly move
     all around it: where one comes or goes, it moves with the square root of the distance.
     """
+    arm, task = source.arm, source.task
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
     weak = min(tol.STEADY, 1.5 * np.sqrt(off)) + tol.AT_LEAST

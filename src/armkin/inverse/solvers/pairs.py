@@ -55,12 +55,13 @@ def around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
                 yield there
 
 
-def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -> tuple[Rows, Bool]:
+def settled(source: Recorded, off: Array, target: Array) -> tuple[Rows, Bool]:
     """The branches of an arm that is close to a class; off (N,): how close, at each target [reaches].
 
     source: the class. Targets in doubt are those of which two roots are one, or nearly; guesses (N, B, n): where these
     are. Also of which targets (N,) not all roots are accounted for: the class's own doubts stay open.
     """
+    arm, task = source.arm, source.task
     seed, miss, open_ = source.rows(target)
     tried = ~(miss >= ABSENT * off[:, None]) | arm.prismatic.any()  # the error grows with the slide's extension
     row, place = np.nonzero(tried)
@@ -88,7 +89,7 @@ def settled(arm: Arm, task: Task, source: Recorded, off: Array, target: Array) -
     pair = _meet(arm, task, middle, target[row])
     found = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < MOVED)
     open_[row[~found]] = True
-    sense = np.where(_keep_sense(arm, task, source, (row, one, two), off, target, pair.way), 1.0, -1.0)[:, None]
+    sense = np.where(_keep_sense(source, (row, one, two), off, target, pair.way), 1.0, -1.0)[:, None]
     for place, side in ((one, sense), (two, -sense)):
         guess = pair.middle + side * pair.way
         guesses[row, place] = np.where((pair.square < -TOUCHING)[:, None], np.nan, guess)
@@ -112,16 +113,14 @@ def _partners(source: Recorded) -> Int:
     return np.array(flipped, np.intp).reshape(len(flipped), number.size)
 
 
-def _keep_sense(
-    arm: Arm, task: Task, source: Recorded, where: tuple[Int, ...], off: Array, target: Array, way: Array
-) -> Bool:
+def _keep_sense(source: Recorded, where: tuple[Int, ...], off: Array, target: Array, way: Array) -> Bool:
     """Whether ways (M, n) lead from branch `two` to branch `one` of targets row: as they do where the class's lie
     farthest apart, among the targets around; where: row, one, two, (M,) each."""
-    row, one, two = where
+    arm, (row, one, two) = source.arm, where
     M = np.arange(len(row))
     way = way / radian_or_reach(arm)
     widest, apart = np.zeros(len(row)), way.copy()
-    for there in around(arm, task, target[row], AROUND * off[row]):
+    for there in around(arm, source.task, target[row], AROUND * off[row]):
         q = source.rows(there)[0]
         between = newton.difference(arm, q[M, one], q[M, two])
         size = np.nan_to_num(np.abs(between).max(axis=1))

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import stacked
-from armkin.formula.arrays import Array, Bool, Int
+from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
@@ -125,7 +125,7 @@ def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | Non
         return None
 
     def rows(target: Array) -> Rows:
-        found = stacked([_solved(pencil, target[k : k + CHUNK]) for k in range(0, max(len(target), 1), CHUNK)])
+        found = stacked([_solved(pencil, target[part]) for part in slices(max(len(target), 1), CHUNK)])
         order = _order(newton.distances(arm, seeds.rows(target)[0], found.q))
         return found._replace(q=np.take_along_axis(found.q, order[:, :, None], axis=1))
 

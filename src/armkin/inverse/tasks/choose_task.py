@@ -17,6 +17,7 @@ from armkin.model.units import radian_or_reach
 
 NEARLY_PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
 INDEPENDENT = 1e-4  # singular value of a task's independent rows
+Z = np.array([0.0, 0.0, 1.0])  # of the base
 
 
 def task_for(arm: Arm, name: str | None = None) -> Task:
@@ -84,9 +85,8 @@ def _joints(arm: Arm) -> str:
 
 
 def _plain(arm: Arm, name: str, position: int, sums: ArrayLike, offsets: ArrayLike) -> Task:
-    return Task(
-        name, position, np.asarray(sums, dtype=float).reshape(-1, arm.n), np.asarray(offsets, dtype=float), "none"
-    )
+    rows = np.asarray(sums, dtype=float).reshape(-1, arm.n)
+    return Task(name, position, rows, np.asarray(offsets, dtype=float), "none")
 
 
 def _free(arm: Arm, name: str) -> Task:
@@ -107,9 +107,8 @@ def _along(directions: Array, reference: Array) -> NDArray[np.float64]:
 
 def _planar(arm: Arm, name: str) -> Task | str:
     w = _directions(arm)
-    z = np.array([0.0, 0.0, 1.0])
-    turns = np.where(arm.prismatic, 0.0, _along(w, z))
-    if (turns[~arm.prismatic] == 0).any() or (np.abs(w[arm.prismatic] @ z) > NEARLY_PARALLEL).any():
+    turns = np.where(arm.prismatic, 0.0, _along(w, Z))
+    if (turns[~arm.prismatic] == 0).any() or (np.abs(w[arm.prismatic] @ Z) > NEARLY_PARALLEL).any():
         return "its joints do not all move in the base's x-y plane"
     if name == "xy":
         return _plain(arm, name, 2, np.zeros((0, arm.n)), np.zeros(0))
@@ -123,10 +122,8 @@ def _planar(arm: Arm, name: str) -> Task | str:
 def _yaw(arm: Arm, name: str) -> Task | str:
     from armkin.forward import fk
 
-    w = _directions(arm)
-    z = np.array([0.0, 0.0, 1.0])
-    turns = np.where(arm.prismatic, 0.0, _along(w, z))
-    lifts = np.where(arm.prismatic, _along(w, z), 0.0)
+    upright = _along(_directions(arm), Z)
+    turns, lifts = np.where(arm.prismatic, 0.0, upright), np.where(arm.prismatic, upright, 0.0)
     if (turns[~arm.prismatic] == 0).any() or not lifts.any() or not turns.any():
         return "it needs joints that turn about the base's z axis and one that slides along it"
     T0 = fk(arm, np.zeros(arm.n))

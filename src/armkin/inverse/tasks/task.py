@@ -84,8 +84,7 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
     rounding = np.zeros(len(flat))
     if task.orientation == "full":
         given = flat
-        for start in range(0, len(flat), arrays.CHUNK):
-            rows = slice(start, start + arrays.CHUNK)
+        for rows in arrays.slices(len(flat), arrays.CHUNK):
             part = given[rows]
             near, rounding[rows], _ = read_poses(part)
             if near is not part:
