@@ -166,6 +166,24 @@ def test_the_judge_notices_a_self_motion_listed_by_two_of_its_postures(monkeypat
     assert truth.judge(arm, screw, None, q, target).twice == list(range(8))
 
 
+@pytest.mark.parametrize(
+    ("name", "q"),
+    [
+        # beside it, on its self-motion, joint 5 moves by 5e-4 of joint 1's way; a second singular value is 4e-5
+        ("thor", [0.2436046829014562, -3.1396693827386457, -3.141929721989846, 0.34582602660730455, 2.9490512257290407,
+                  2.7385825936085215]),
+        # one of two roots between which the residual comes to 9.1e-10
+        ("ar4", [-1.611883606173275, -2.5761486601803623, -1.570899601452263, 0.47842766165614736, -0.7096764853685502,
+                 -1.3689599663962295]),
+    ],
+)  # fmt: skip
+def test_the_judge_takes_no_posture_for_lost_that_is_on_a_branch_s_component(name: str, q: list[float]) -> None:
+    arm, screw = shipped(name)
+    task, _ = solver(arm, None)
+    verdict = truth.judge(arm, screw, None, np.array([q]), goal(task, screw, np.array([q])).array())
+    assert verdict, str(verdict)
+
+
 def test_a_rounded_rotation_is_made_orthonormal_first() -> None:
     arm = shipped("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (300, 6))

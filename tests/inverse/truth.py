@@ -318,18 +318,22 @@ def _in_one_component(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) 
         q = a + part * d
         there = across(screw, goals, q, weak=1e-4)  # of a component with two roots 1e-4 at most is lost
         beside = np.abs(there - q).max(axis=1) <= 0.1 * np.abs(d).max(axis=1)
-        beside &= miss_of(arm, screw, goals, there) < 0.9 * SOLVES
-        one &= beside | (miss_of(arm, screw, goals, q) < 0.9 * SOLVES)
+        beside &= miss_of(arm, screw, goals, there) < 1.1 * SOLVES  # what is surely more parts them, and no less
+        one &= beside | (miss_of(arm, screw, goals, q) < 1.1 * SOLVES)
     return one
 
 
 def across(screw: Screws, goals: Goal, q: Array, weak: float = 1e-6) -> Array:
-    """Postures (M, n) after two Newton steps that go nowhere along directions of singular values below `weak`."""
+    """Postures (M, n) after two Newton steps that go nowhere along a component's own direction.
+
+    That is the last one, if its singular value is below `weak`; others are lost below 1e-6.
+    """
     unit = np.where(screw.prismatic, screw.size, 1.0)
     for _ in range(2):
         r, J = oracle._residual(screw, goals, q)
         U, S, Vt = np.linalg.svd(J * unit, full_matrices=False)
-        gain = np.where(weak < S, 1 / np.maximum(S, weak), 0.0)
+        least = np.where(np.arange(S.shape[1]) < S.shape[1] - 1, 1e-6, weak)
+        gain = np.where(least < S, 1 / np.maximum(S, least), 0.0)
         q = q + unit * np.einsum("mki,mk,mrk,mr->mi", Vt, gain, U, r, optimize=True)
     return q
 
