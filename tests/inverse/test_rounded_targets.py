@@ -63,6 +63,27 @@ def test_machine_code_stays_as_python_does(name: str) -> None:
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("q", "rows"),
+    [
+        # nearest is another branch: that of its own self-motion turned joint 4 by 89 degrees
+        ([-0.04155860148898505, -1.6726825875976936, -1.5535001016934755, -0.16762153633218402, 0.0,
+          3.005712444405921], 7),
+        # an elbow folded to 1e-6: half way along the bent self-motion the straight line misses by too much
+        ([-2.7321296946729916, -0.4230729454436415, 1.6177742431431656, -2.8807123576303404, -1.2049253263525124,
+          1.0652089617143359], 4),
+    ],
+)  # fmt: skip
+def test_it_stands_for_the_self_motion_that_it_is_on_but_for_rounding(q: list[float], rows: int) -> None:
+    """It was a row besides the self-motion's: of 426 singular and round postures of a Puma in eight decimals 8."""
+    arm, _ = shipped("puma560")
+    T = np.round(armkin.fk(arm, q), 8)
+    assert armkin.ik(arm, T).valid.sum() == rows
+    found = armkin.ik(arm, T, near=q)
+    assert found.valid.sum() == rows
+    np.testing.assert_array_equal(found.q[found.best], q)
+
+
 def test_a_turn_about_one_axis_shows_its_rounding_by_its_digits() -> None:
     """The columns of such a rotation stay at right angles, and may keep their length: one of some 40 was moved."""
     arm, _ = shipped("puma560")

@@ -15,15 +15,15 @@ from armkin.inverse.answers.batch import Batch, Goals, empty, named
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
+from armkin.inverse.singular.high_order_roots import BESIDE
+from armkin.inverse.singular.self_motions import follow
 from armkin.inverse.tasks.task import Task
 from armkin.model import limits
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 AT_ONCE = 4096  # targets whose branches are compared with `near` together
-ROOM = (
-    2.0 * tol.SOLUTION
-)  # [reaches] from the tool to a target that `near` might solve: twice the tolerance, for rounding
+ROOM = 2.0 * tol.SOLUTION  # [reaches] from the tool to a target that `near` might solve: twice, for rounding
 COARSE = 1e4 * ROOM  # and to a pose that is rounded where its rotation does not show it, to six digits
 ROUNDED = 1.001 * tol.SOLUTION  # residual that solves a rounded target, if it is more
 
@@ -105,15 +105,17 @@ def stand(goals: Goals, out: Batch, most: Array) -> Batch:
     rows = standing(arm, task, target, near, most)
     if not len(rows):
         return out
-    away = newton.wrapped_distance(arm, out.q[rows], near[rows, None])
-    away = np.where(out.valid[rows], away, np.inf)
-    if not away.shape[1]:
-        away = np.full((len(rows), 1), np.inf)
-    place, there = away.argmin(axis=1), away.min(axis=1) <= tol.THERE
-    some = np.flatnonzero(~there & np.isfinite(away.min(axis=1)))
-    way = newton.difference(arm, out.q[rows[some], place[some]], near[rows[some]])
-    between = near[rows[some]] + 0.5 * way * radian_or_reach(arm)
-    there[some] = newton.missing(arm, task, between, target[rows[some]]) <= most[rows[some]]
+    way = newton.difference(arm, out.q[rows], near[rows, None])
+    away = np.where(out.valid[rows], np.abs(way).max(axis=2), np.inf)
+    away = np.pad(away, ((0, 0), (0, 1)), constant_values=np.inf)
+    one, nearest = away <= tol.THERE, away == away.min(axis=1, keepdims=True)
+    for some, steps in (nearest, 0), (away < np.inf, 0), (away < np.inf, 6):  # in the last the component may bend
+        k, b = np.nonzero(some & (away < np.inf) & ~one.any(axis=1, keepdims=True))
+        halfway = near[rows[k]] + 0.5 * way[k, b] * radian_or_reach(arm)
+        beside, size = follow(arm, task, halfway, target[rows[k]], steps)
+        off = newton.wrapped_distance(arm, beside, halfway)
+        one[k, b] = (size <= most[rows[k]]) & (off <= BESIDE * away[k, b])
+    place, there = np.where(one, away, np.inf).argmin(axis=1), one.any(axis=1)
     count = out.valid[rows].sum(axis=1)
     place = np.where(there, place, count)
     out = stacked([out, empty(0, int(place.max()) + 1, arm.n)])
