@@ -8,6 +8,8 @@ import pytest
 import armkin
 from armkin.inverse.closed import crossings
 from armkin.inverse.numeric import newton
+from armkin.inverse.tasks.task import LABELS
+from armkin.model.target_numbers import targets_in
 
 # The wrist 0.001 degrees off straight, its centre all but on axis 1: two directions are nearly lost
 BESIDE = [-5.660692012689249e-06, -8.204135961199831e-06, 524.75, np.pi / 2, -3.1415681650441143, 3.1415661793087657]
@@ -17,6 +19,11 @@ SHORT = [1.5836968407619585, -0.8901812286952255, 1.617829428444212, -2.84851559
 
 FOLD = [-0.7854146633121711, -np.pi, 262.375, np.pi / 2, -3.141510855987255, -2.356194490192345]
 ARCS = [2.3561944911768986, 1.5707963336752944, 1.5707963305306343, -3.141592650653632, -np.pi, -1.167432798680643e-10]
+
+CIRCUIT = [-1.3775657173733071, -0.21475437132500894, -1.3524585503614908, 0.23490001999027776, 2.796888346067023,
+           0.7830329160780761]  # fmt: skip
+FLAT = [0.8487981197583796, -1.5834526887369684, 1.617782823941284, 0.3378108023961631, -2.473330274111655,
+        -2.4097472431493117]  # fmt: skip
 
 
 @pytest.mark.parametrize("others", [0, 60])
@@ -86,3 +93,19 @@ def test_nothing_is_sought_that_crosses_a_manifold_of_which_all_is_known(monkeyp
     assert before.status == armkin.Status.SINGULAR
     monkeypatch.setattr(crossings, "beside", None)
     np.testing.assert_array_equal(armkin.ik(arm, T).q, before.q)
+
+
+def test_a_curve_not_followed_from_one_posture_is_known_from_another_on_it() -> None:
+    """A wrist 1e-11 beside axis 1, two circuits an elbow, were listed by six postures; one 1e-3 beside, by three."""
+    for name, q, count in (("ar4", CIRCUIT, 4), ("puma560", FLAT, 2)):
+        arm = armkin.load(name)
+        found = armkin.ik(arm, armkin.fk(arm, q), near=q)
+        assert (found.status, found.complete, found.valid.sum()) == (armkin.Status.SINGULAR, True, count), name
+        assert (found.q[found.valid] == q).all(axis=1).any(), name
+
+
+def test_an_edge_s_candidate_that_leads_to_another_branch_is_no_second_row() -> None:
+    """One of the left shoulder, on an edge and off its target, was moved onto a branch of the right, and listed."""
+    arm = armkin.load("ur5e")
+    found = armkin.ik(arm, targets_in(LABELS["pose"], [[-213.531, 53.1393, 1047.8, -105.174, 28.9358, 48.3678]])[0])
+    assert found.valid.sum() == 2

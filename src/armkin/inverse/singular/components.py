@@ -124,6 +124,7 @@ class _Groups:
         """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries
         that are alone on their components or two, and self-motions that were known where nothing else may be on them.
         """
+        self.open &= ~(self.component[self.place] & self.at.simple[:, None]).any(axis=2)  # branches as they stand
         valid, sigma, M = self.open, self.lost.sigma, self.open.shape[1]
         on: Bool = np.asarray(self.at.sure.any(axis=2))
         mine, others = valid & ~on, ~np.eye(M, dtype=bool)
@@ -211,6 +212,7 @@ class _Groups:
         exact = np.where(sure[:, None], np.maximum(size[k], tol.CLOSED), size[k])  # of known components as in `_plain`
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
         one: Bool = np.asarray(self.component[self.place[k, b]])
+        new = ~(one & self.at.simple[k]).any(axis=1)
         self._inherit(k, b, one)
         moving, joints = self.moves[k, b], self.which[k, b]
         one &= self.open[k]
@@ -226,9 +228,10 @@ class _Groups:
         pick = np.where(moving[:, None], np.where(on, motion, np.inf), np.where(mine, exact, np.inf)).argmin(axis=1)
         own = np.flatnonzero(label[k, b] == OWN)
         pick[own] = b[own]
-        self.chosen[k, pick] = True
+        self.chosen[k, pick] = new
         self.curve[k, pick] = joints & moving[:, None]
-        self.ended[k, pick], self.alone[k, pick] = self.ended[k, b], self.alone[k, b]
+        for array in (self.known, self.moves, self.place, self.ended, self.alone):
+            array[k, pick] = array[k, b]
         if len(own):  # named like the candidate of its group that is closest to it
             alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
             twin = alike.argmin(axis=1)
@@ -293,17 +296,19 @@ class _Groups:
         while self.open.any():
             k = np.flatnonzero(self.open.any(axis=1))
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
-        arm, task, target, near = self.goals
+        arm, task, target, _ = self.goals
         q, sigma, chosen, each = self.at.q, self.lost.sigma, self.chosen, np.arange(len(self.open))[:, None]
         # also beside a self-motion: a root of high order
         moving = np.asarray(self.curve.any(axis=2))
         beside = (chosen & (sigma < tol.HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
         rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | beside)
         if len(rows):
-            at, kept, curve = q[rows], chosen[rows], self.curve[rows]
-            self_motions.drop_contained(arm, task, at, sigma[rows], self.resting[rows], kept, curve, target[rows])
-            ended, tube = self.ended[rows], self.tube[rows]
-            self_motions.drop_twins(arm, task, at, near[rows], kept, curve, ended, tube, target[rows])
+            goals, at, kept, curve = self.goals.of(rows), q[rows], chosen[rows], self.curve[rows]
+            self_motions.drop_contained(goals, at, sigma[rows], self.resting[rows], kept, curve)
+            # where two directions are lost several manifolds may have a posture
+            on = (self.known & self.moves)[rows, :, None] & (~self.ended & (self.lost.nullity < 2))[rows, None]
+            on &= self.component[self.place[rows]]
+            self_motions.drop_twins(goals, at, kept, curve, self.ended[rows], on, self.tube[rows])
             chosen[rows] = kept
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
         there = chosen[each, order]

@@ -109,24 +109,13 @@ def _undecided(at: newton.Linear) -> Structure:
     """What Jacobians alone tell of their M postures."""
     r, _, S, V = at
     M, n = len(r), V.shape[2]
-    lost = r.shape[1] - n + 1  # with fewer joints than numbers more directions are out of reach
-    return Structure(
-        known=np.zeros(M, bool),
-        manifold=np.zeros(M, bool),
-        boundary=np.zeros(M, bool),
-        joints=np.zeros((M, n), bool),
-        low=np.zeros(M),
-        high=np.zeros(M),
-        span=1.2 * tol.REACH / np.abs(V[:, -1]).max(axis=1),
-        least=np.zeros((M, n)),
-        most=np.zeros((M, n)),
-        longer=np.ones(M),
-        alone=np.zeros(M, bool),
-        v=V[:, -1],
-        second=S[:, n - 2] if n > 1 else np.ones(M),
-        x=np.zeros((NODES, M, n)),
-        g=np.zeros((NODES, M, max(lost, 1))),
-    )
+    known, manifold, boundary, alone = np.zeros((4, M), bool)
+    joints, (low, high), (least, most) = np.zeros((M, n), bool), np.zeros((2, M)), np.zeros((2, M, n))
+    v, second, longer = V[:, -1], S[:, n - 2] if n > 1 else np.ones(M), np.ones(M)
+    span, lost = 1.2 * tol.REACH / np.abs(v).max(axis=1), r.shape[1] - n + 1  # of fewer joints more are out of reach
+    x, g = np.zeros((NODES, M, n)), np.zeros((NODES, M, max(lost, 1)))
+    ends = low, high, span, least, most, longer
+    return Structure(known, manifold, boundary, joints, *ends, alone, v, second, x, g)
 
 
 def leaves(arm: Arm, at: Structure, rows: Int, q: Array, ahead: Array) -> tuple[Array, Array]:

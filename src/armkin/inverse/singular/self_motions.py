@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
+from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import circuits, high_order_roots
@@ -24,15 +25,14 @@ STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
 STEPS = np.array([[STEP], [10 * STEP]])  # a short one and a long one
 
 
-def drop_contained(
-    arm: Arm, task: Task, q: Array, sigma: Array, resting: Bool, chosen: Bool, curve: Bool, target: Array
-) -> None:
+def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: Bool, curve: Bool) -> None:
     """Of self-motions through each other keep the one of more joints, and no root of high order beside or on one.
 
     Changes chosen (K, M); curve: (K, M, n) the joints that a posture's self-motion moves; resting: (K, M, n) joints
     that do not move along the one direction that it loses: a curve that moves such a joint is another. `near`, the
     first, stays.
     """
+    arm, task, target, _ = goals
     pairs: list[tuple[int, int, int]] = []  # a target, a posture of it and one of a self-motion beside
     for k in np.flatnonzero((chosen & curve.any(axis=2)).any(axis=1)):
         mine = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
@@ -75,26 +75,24 @@ def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, targ
     return np.asarray(out.reshape(2, -1).any(axis=0))
 
 
-def drop_twins(
-    arm: Arm, task: Task, q: Array, near: Array, chosen: Bool, curve: Bool, ended: Bool, tube: Array, target: Array
-) -> None:
-    """Of chosen postures (K, M) of self-motions that turn out to be the same keep that nearest to near (K, n): change
-    chosen.
+def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, on: Bool, tube: Array) -> None:
+    """Of chosen postures (K, M) of self-motions that turn out to be the same keep the nearest to `near`: change chosen.
 
-    curve: (K, M, n) the joints that a posture's self-motion moves; ended: (K, M) those of which both ends are known,
-    and all that is between; tube: (K, M) how far postures may be off their curve. One group's posture may be close to
-    another's; where a self-motion consists of double roots, known to the root of rounding, its postures were taken for
-    many.
+    q: (K, M, n); curve: (K, M, n) the joints that a posture's self-motion moves; ended: (K, M) those of which both ends
+    are known, and all that is between; on: (K, M, M) which others, not followed to their ends, are on each one's; tube:
+    (K, M) how far postures may be off their curve. One group's posture may be close to another's; where a self-motion
+    consists of double roots, known to the root of rounding, its postures were taken for many.
     """
+    arm, task, target, near = goals
     moving = np.asarray(curve.any(axis=2))
     moving[:, 0] = True  # `near`, the first: nothing is said to move where three directions are lost at once
     some = chosen & moving & ~ended  # what else were on one of these would be one with it
-    pairs = some[:, :, None] & some[:, None] & np.tri(q.shape[1], k=-1, dtype=bool)
-    k, i, j = np.nonzero(pairs)
+    on = (on | on.swapaxes(1, 2)) & chosen[:, :, None] & chosen[:, None]
+    k, i, j = np.nonzero((on | some[:, :, None] & some[:, None]) & np.tri(q.shape[1], k=-1, dtype=bool))
     if not len(k):
         return
     at, apart, unit = q[k, i], newton.difference(arm, q[k, j], q[k, i]), radian_or_reach(arm)
-    same, size = np.zeros(len(k), bool), np.abs(apart)
+    same, size = on[k, i, j], np.abs(apart)
     # one may be where its own self-motion and the other meet
     turned = np.where(curve[k, i], 0.0, size).max(axis=1)
     thick = np.maximum(tol.TURNED, tube[k, i] + tube[k, j])
@@ -103,7 +101,7 @@ def drop_twins(
     most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
     slow = ~held & (most > tol.TURNED) & (most < tol.DRIFT)
     held |= np.equal(j, 0)  # `near` stands for all that meet there
-    open_ = np.flatnonzero(held)
+    open_ = np.flatnonzero(held & ~same)
     same[open_] = _reached_straight(arm, task, at[open_], apart[open_], target[k[open_]])
     left = np.flatnonzero(slow & ~same)
     if len(left):  # whether the self-motion of the one goes round to the other
