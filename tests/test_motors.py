@@ -25,7 +25,7 @@ from armkin.motors import (
     resolution,
     rounding,
 )
-from armkin.reachability.dexterity import measure
+from armkin.reachability.dexterity import measure_function
 
 ROOT = Path(__file__).parents[1]
 THREE_DOF = armkin.load(ROOT / "robots/three_dof.yaml")
@@ -115,7 +115,7 @@ def test_there_and_back_within_half_a_pulse(arm: Arm, data: st.DataObject) -> No
     assert np.all(np.abs(back - q) <= 0.5 * resolution(arm) * (1 + 1e-9) + 1e-12)
     assert pulses(arm, back).tolist() == p.tolist()
     # To first order the tip is off by no more than the worst half pulses; the second order is far below.
-    assert rounding(arm, q).error <= measure(arm, "step_error")(q[None])[0] * 1.001 + 1e-9
+    assert rounding(arm, q).error <= measure_function(arm, "step_error")(q[None])[0] * 1.001 + 1e-9
 
 
 def test_differential_wrist() -> None:

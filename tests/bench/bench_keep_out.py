@@ -24,7 +24,7 @@ import numpy as np
 
 import armkin
 from armkin.formula.arrays import Array
-from armkin.keep_out.bodies import ends
+from armkin.keep_out.bodies import segment_ends
 from armkin.keep_out.body_pairs import Guard, guard
 from armkin.keep_out.shapes.box import Box
 from armkin.keep_out.shapes.capsule import Capsule
@@ -125,7 +125,7 @@ def exact_box(box: Box, a: Any, b: Any) -> Any:
 
 def exact_distances(held: Guard, q: Array) -> Array:
     """Distances of all pairs, as `Guard.distances`, by other formulas in extended precision: (N, pairs)."""
-    a, b = (np.asarray(x, dtype=np.longdouble) for x in ends(held.arm, q))
+    a, b = (np.asarray(x, dtype=np.longdouble) for x in segment_ends(held.arm, q))
     form, columns = held.bodies, []
     for pair_ in held.pairs:
         least = np.full(len(q), np.inf, dtype=np.longdouble)
@@ -185,7 +185,7 @@ class Coal:
 
     def distances(self, q: Array) -> Array:
         form, held = self.held.bodies, self.held
-        a, b = ends(held.arm, q)
+        a, b = segment_ends(held.arm, q)
         out = np.empty((len(q), len(held.pairs)))
         for n in range(len(q)):
             bodies = [self.capsule(a[:, s, n], b[:, s, n], form.radius[o]) for s, o in enumerate(form.owner)]
@@ -240,12 +240,12 @@ def motions(count: int, rng: np.random.Generator) -> None:
         deepest, looked = 0.0, []
         for arm in scenes(name, rng):
             held, q = guard(arm), random_joints(arm, rng, 600)
-            q = q[held.least(q)[0] >= 0]
+            q = q[held.least_clearances(q)[0] >= 0]
             for a, b in zip(q[0::2][:125], q[1::2][:125], strict=False):
                 b = b if rng.random() < 0.5 else np.clip(a + rng.uniform(0.02, 0.5) * (b - a), arm.lower, arm.upper)
                 found = prove_trajectory(plan_joint_moves(arm, a, b))
                 assert found is not None
-                least = float(held.least(a + share * (b - a))[0].min())
+                least = float(held.least_clearances(a + share * (b - a))[0].min())
                 done, free = done + 1, free + found.free
                 looked.append(found.postures)
                 if found.free:

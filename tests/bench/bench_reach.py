@@ -103,7 +103,7 @@ def compiled() -> bool:
 
 def unseen(seed: int = 1, poses: int = 10**6) -> bool:
     """Cells of random grids by arcs, against `ik` of each of their poses."""
-    from armkin.reachability.cell_answers import TURN, Question, answered
+    from armkin.reachability.cell_answers import TURN, Question, cell_columns
     from armkin.reachability.reach_cells import Grid
 
     rng, total, different = np.random.default_rng(seed), 0, 0
@@ -113,7 +113,7 @@ def unseen(seed: int = 1, poses: int = 10**6) -> bool:
             M, N, L = (int(rng.integers(*limits)) for limits in ((3, 60), (2, 40), (2, 30)))
             grid = Grid(arm, arm.reach / rng.uniform(3.0, 15.0), M, N, L, bool(rng.integers(2)) and arm.n > 3)
             ring = grid.rings[rng.integers(0, len(grid.rings), 1)]
-            found = answered(Question(grid), ring)
+            found = cell_columns(Question(grid), ring)
             D, L = grid.directions_count, grid.rolls_count
             k, each = np.divmod(np.arange(M * D * L), D * L)
             goals = grid.targets(np.repeat(ring, len(k), 0), k * TURN / M, each // L, (each % L) * TURN / L)

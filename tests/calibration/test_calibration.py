@@ -15,7 +15,7 @@ import armkin
 from armkin import robot_file
 from armkin.calibration import dropped_rows, robust_fit
 from armkin.calibration.calibrate_arm import next_poses
-from armkin.calibration.corrected_chain import KINDS, model
+from armkin.calibration.corrected_chain import KINDS, correction_model
 from armkin.errors import UsageError
 from armkin.model.build_arm import build
 from quick import least
@@ -27,7 +27,7 @@ FIGURES = [("ur5e", 0.1, 0.079), ("ar4", 0.1, 0.082), ("three_dof", 0.1, 0.064)]
 @pytest.mark.parametrize("name", ["ur5e", "three_dof", "stanford", "panda", "cobra600"])
 def test_the_jacobian_is_exact(name: str) -> None:
     arm = armkin.load(name)
-    corrections = model(arm)
+    corrections = correction_model(arm)
     rng = np.random.default_rng(1)
     p = rng.normal(size=len(corrections.parameters)) * corrections.prior * 0.3
     c = commands(arm, 5, rng)
@@ -47,13 +47,13 @@ def test_the_jacobian_is_exact(name: str) -> None:
 def test_the_corrected_arm_is_the_model(name: str) -> None:
     path = Path(__file__).parents[1] / "robots" / f"{name}.yaml"
     arm = armkin.load(path if path.exists() else name)
-    corrections = model(arm)
+    corrections = correction_model(arm)
     rng = np.random.default_rng(2)
     p = rng.normal(size=len(corrections.parameters)) * corrections.prior * 0.3
     c = commands(arm, 20, rng)
-    new, _ = corrections.corrected(p)
+    new, _ = corrections.corrected_arm(p)
     assert np.abs(armkin.fk(new, c) - corrections.poses(p, c)[0]).max() < 1e-9
-    none = corrections.corrected(np.zeros(len(p)))[0]
+    none = corrections.corrected_arm(np.zeros(len(p)))[0]
     assert np.abs(armkin.fk(none, c) - armkin.fk(arm, c)).max() < 1e-9
 
 

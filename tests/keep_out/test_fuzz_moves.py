@@ -142,12 +142,12 @@ class Arms:
         line = f"{kind}: armkin {name} {' '.join(map(str, words))}: {told.code} {told.err}"
         assert told.code in ((0, 2, 3) if until == np.inf else (0, 3, STOPPED)), line
         for one in self.given:
-            apart = self.held.least(one.q(np.linspace(0.0, one.duration, 1500)))[0]
+            apart = self.held.least_clearances(one.q(np.linspace(0.0, one.duration, 1500)))[0]
             assert apart.min() >= min(apart[0], 0.0) - DEEP, line
         if self.seen[kind]:
             counts = np.unique(np.array(self.seen[kind]), axis=0)
             q = np.asarray(armkin.joints(self.arms[kind], counts))
-            assert self.held.least(q)[0].min() >= -CLEARANCE, line
+            assert self.held.least_clearances(q)[0].min() >= -CLEARANCE, line
             self.made = float(np.ptp(q, axis=0).max())
         return told
 

@@ -10,7 +10,7 @@ import pytest
 
 import armkin
 from armkin.errors import NoBranchError, RobotFileError
-from armkin.keep_out.body_pairs import guard, postures
+from armkin.keep_out.body_pairs import guard, sample_postures
 from armkin.robot_file import keep_out_keys, scene_file
 from command_line import run
 
@@ -44,7 +44,7 @@ def test_neighbours_and_what_always_overlaps_do_not_count() -> None:
 
 def test_postures_begin_at_home_and_are_haltons() -> None:
     arm = armkin.load("three_dof", scene=BENCH)
-    q = np.rad2deg(postures(arm))
+    q = np.rad2deg(sample_postures(arm))
     assert len(q) == 256
     assert q[0] == pytest.approx([0, 90, -90])
     assert q[1] == pytest.approx([-120 + 240 / 2, -20 + 140 / 3, -120 + 240 / 5])
@@ -98,7 +98,7 @@ def test_the_nearest_pair_is_the_least_of_all(robot: str, table: Path) -> None:
     """Found by middles and half lengths first, as most segments are too far to matter."""
     held = guard(armkin.load(robot, scene=table))
     q = np.random.default_rng(4).uniform(-3, 3, (3000, held.arm.n)) * np.where(held.arm.prismatic, 100.0, 1.0)
-    mm, which = held.least(q)
+    mm, which = held.least_clearances(q)
     every = held.clearances(q)
     assert np.abs(mm - every.min(axis=1)).max() < 1e-9
     assert np.abs(every[np.arange(len(q)), which] - mm).max() < 1e-9

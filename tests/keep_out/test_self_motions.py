@@ -10,7 +10,7 @@ import pytest
 import armkin
 from armkin.inverse.singular.legal_postures import followed
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.keep_out.clearance import clear
+from armkin.keep_out.clearance import hits_nothing
 
 JOINTS = np.deg2rad([20.0, -70.0, 60.0, 30.0, 0.0, 50.0])  # four parallel axes: the elbow can move
 
@@ -23,16 +23,16 @@ def arm(tmp_path: Path) -> armkin.Arm:
 
 
 def test_the_nearest_free_posture_of_a_self_motion_is_the_branch(arm: armkin.Arm) -> None:
-    assert not clear(arm, JOINTS[None]).any()
+    assert not hits_nothing(arm, JOINTS[None]).any()
     T = armkin.fk(arm, JOINTS)
     found = armkin.ik(arm, T, near=JOINTS)
     assert found.status == 2
     best = found.q[found.best]
-    assert clear(arm, best[None]).all()
+    assert hits_nothing(arm, best[None]).all()
     assert np.abs(armkin.fk(arm, best) - T).max() < 1e-6
     every = followed(arm, task_for(arm), JOINTS, T)
     turned = np.abs((every - JOINTS + np.pi) % (2 * np.pi) - np.pi).sum(axis=1)
-    hit = ~clear(arm, every)
+    hit = ~hits_nothing(arm, every)
     nearest = np.rad2deg(turned[~hit].min())
     assert 0.5 < nearest < np.rad2deg(np.abs(best - JOINTS).sum()) + 0.4
     assert np.rad2deg(np.abs(best - JOINTS).sum()) < nearest + 0.4  # four joints, each to 0.1 degrees

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.keep_out.body_pairs import guard, postures
+from armkin.keep_out.body_pairs import guard, sample_postures
 from armkin.teach.pose_answers import Question, answer_question
 from command_line import run
 
@@ -20,7 +20,7 @@ BENCHES = sorted(path.stem for path in Path("examples/scenes").glob("*.yaml"))
 def test_a_bench_leaves_its_arm_room(robot: str) -> None:
     arm = armkin.load(robot, scene=f"examples/scenes/{robot}.yaml")
     assert armkin.clearance(arm, arm.home).mm > 0
-    assert 0.2 < (guard(arm).clearances(postures(arm)).min(axis=1) >= 0).mean() < 0.95
+    assert 0.2 < (guard(arm).clearances(sample_postures(arm)).min(axis=1) >= 0).mean() < 0.95
     assert robot == "three_dof" or not guard(arm).bodies.assumed.any()
     assert not armkin.load(robot).keep_out
 

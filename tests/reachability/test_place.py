@@ -152,7 +152,7 @@ def test_places_are_a_file_that_goes_on_after_a_kill(tmp_path: Path, monkeypatch
     words = ("place", "three_dof", "roarm_m2", path, "--step", 200, "--yaw", 90)
     done = run(*words, "--out", whole)
     with monkeypatch.context() as patch:
-        patch.setattr(places, "work", interrupted(places.work, 5))
+        patch.setattr(places, "count_chunk", interrupted(places.count_chunk, 5))
         assert run(*words, "--out", out).code == 130
     other = run("place", "three_dof", path, "--step", 100, "--out", out)
     assert other.code == 2
@@ -193,7 +193,7 @@ def test_a_path_is_carried_from_the_places_that_plan_it(name: str, tmp_path: Pat
         assert len(some)
         for i, j, k in rng.permutation(some)[:3].tolist():
             at = (float(found.x[i]), float(found.y[j]), 0.0)
-            asked = place_path.plan(arm, Obstacles(), (i, j, k), at, float(found.yaw[k]), file)
+            asked = place_path.plan_from_place(arm, Obstacles(), (i, j, k), at, float(found.yaw[k]), file)
             assert (asked.plan is not None) == whole[i, j, k], asked.refused
 
 

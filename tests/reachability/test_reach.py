@@ -13,7 +13,7 @@ import armkin
 from armkin.errors import UsageError
 from armkin.reachability import reach_map as maps
 from armkin.reachability import voxels
-from armkin.reachability.cell_answers import TURN, Question, answered
+from armkin.reachability.cell_answers import TURN, Question, cell_columns
 from armkin.reachability.reach_cells import Grid
 from command_line import ROOT, Result, run
 from interrupted import interrupted
@@ -54,8 +54,8 @@ def test_arcs_are_what_each_pose_says(name: str) -> None:
     grid = Grid(arm, arm.reach / 9, 3 if few else 7, 4 if few else 9, 2 if few else 5, False)
     question = Question(grid)
     rings = grid.rings[np.random.default_rng(4).permutation(len(grid.rings))[: 2 if few else 20]]
-    found = answered(question, rings)
-    assert question.arcs
+    found = cell_columns(question, rings)
+    assert question.by_arcs
     columns = np.stack([found[name] for name in ("share", "share_any", "branches", "single")], axis=1)
     assert np.allclose(columns, asked(grid, rings), rtol=0, atol=1e-12, equal_nan=True)
     assert columns[:, 1].max() > 0
@@ -63,7 +63,7 @@ def test_arcs_are_what_each_pose_says(name: str) -> None:
 
 def test_rings_that_no_branch_reaches_are_counted_as_that() -> None:
     grid = Grid(armkin.load("moveo"), 60.0, 2, 4, 1, False)
-    found = answered(Question(grid, measures=False), np.array([[11, 11]]))  # 930 mm away, of 761
+    found = cell_columns(Question(grid, measures=False), np.array([[11, 11]]))  # 930 mm away, of 761
     assert found["share"].tolist() == found["share_any"].tolist() == [0.0, 0.0]
     assert np.isnan(found["branches"]).all()
 
@@ -124,9 +124,9 @@ def test_the_share_under_keep_outs_is_what_another_count_finds() -> None:
 def test_an_arm_of_seven_joints_is_asked_pose_by_pose() -> None:
     grid = Grid(armkin.load("iiwa7"), 300.0, 1, 2, 1, False)
     question = Question(grid)
-    assert not question.arcs
+    assert not question.by_arcs
     ring = np.array([[1, 1]])
-    found = {name: float(values[0]) for name, values in answered(question, ring).items()}
+    found = {name: float(values[0]) for name, values in cell_columns(question, ring).items()}
     T = grid.targets(np.repeat(ring, 2, 0), np.zeros(2), np.arange(2), np.zeros(2))
     legal = armkin.ik(grid.arm, T).within_limits.sum(axis=1)
     assert found["share"] == (legal > 0).mean() > 0
@@ -149,7 +149,7 @@ def test_a_voxel_takes_the_cell_that_its_centre_lies_in() -> None:
     top, low = (float(end(local[:, 2])) for end in (np.max, np.min))  # of the cells, and the next ones beyond
     beyond = voxels.rows_at(grid, np.array([[1.0, 0, top + 150.0], [1.0, 0, low - 150.0]]))
     assert (beyond == -1).all()
-    side = voxels.section(grid)
+    side = voxels.section_layer(grid)
     assert (side.row % 7 == np.where(side.places[:, 0] >= 0, 0, side.row % 7)).all()
     assert side.table(found.share).shape == (np.ptp(side.places[:, 1]) + 1, np.ptp(side.places[:, 0]) + 1)
 
@@ -174,7 +174,7 @@ def test_engines_and_kills_change_no_byte(tmp_path: Path, monkeypatch: pytest.Mo
     assert reach("--out", one).code == 0
     assert reach("--out", two, "--workers", 2).code == 0
     with monkeypatch.context() as patch:
-        patch.setattr(maps, "work", interrupted(maps.work, 4))
+        patch.setattr(maps, "answer_chunk", interrupted(maps.answer_chunk, 4))
         assert reach("--out", three).code == 130
     assert (tmp_path / f"c.{end}.parts" / "00000002").exists()
     other = run("reach", "puma560", "--grid", 200, "--out", three)

@@ -19,8 +19,8 @@ from armkin.model.arm import Arm, from_links
 from armkin.model.rotation import transform
 from armkin.motors import joints_per_pulse, rounding
 from armkin.reachability import workspace
-from armkin.reachability.dexterity import measure
-from armkin.reachability.sampling import CHUNK, Random, grid
+from armkin.reachability.dexterity import measure_function
+from armkin.reachability.sampling import CHUNK, Random, joint_grid
 from armkin.reachability.volume import extent
 
 ROOT = Path(__file__).parents[2]
@@ -161,15 +161,15 @@ def test_random_samples_are_within_limits_and_repeatable() -> None:
 
 
 def test_grid_has_both_limits_and_a_half_open_turn() -> None:
-    q = grid(THREE_DOF, (3, 2, 1)).part(0)
+    q = joint_grid(THREE_DOF, (3, 2, 1)).part(0)
     assert np.rad2deg(q).round(9).tolist() == [[a, b, 0] for a, b in product((-120, 0, 120), (-20, 120))]
-    q = grid(PAN_TILT, (4, 2)).part(0)
+    q = joint_grid(PAN_TILT, (4, 2)).part(0)
     assert np.rad2deg(q).round(9).tolist() == [list(pair) for pair in product((-180, -90, 0, 90), (-180, 0))]
-    assert grid(THREE_DOF, [5]).points == (5, 5, 5)
+    assert joint_grid(THREE_DOF, [5]).points == (5, 5, 5)
 
 
 def test_grid_across_chunks_is_the_whole_grid() -> None:
-    sampling = grid(THREE_DOF, (7, 101, 211))
+    sampling = joint_grid(THREE_DOF, (7, 101, 211))
     parts = [sampling.part(i) for i in range(sampling.parts)]
     assert len(parts) > 1
     q = np.concatenate(parts)
@@ -208,24 +208,26 @@ def test_step_error_is_the_worst_of_all_signs() -> None:
     q = np.random.default_rng(5).uniform(THREE_DOF.lower, THREE_DOF.upper, (50, 3))
     J = jacobian(THREE_DOF, q)[:, :3] @ joints_per_pulse(THREE_DOF)
     worst = np.max([np.linalg.norm(J @ (0.5 * np.array(s)), axis=1) for s in product((-1, 1), repeat=3)], axis=0)
-    assert measure(THREE_DOF, "step_error")(q) == pytest.approx(worst, rel=1e-12)
+    assert measure_function(THREE_DOF, "step_error")(q) == pytest.approx(worst, rel=1e-12)
     many = np.random.default_rng(6).uniform(THREE_DOF.lower, THREE_DOF.upper, (20_000, 3))
-    ratio = rounding(THREE_DOF, many).error / measure(THREE_DOF, "step_error")(many)
+    ratio = rounding(THREE_DOF, many).error / measure_function(THREE_DOF, "step_error")(many)
     assert 0.9 < ratio.max() < 1.001  # a bound, and a tight one
 
 
 def test_tip_manipulability() -> None:
     q = np.random.default_rng(7).uniform(-2, 2, (30, 3))
     values = np.linalg.svd(jacobian(THREE_DOF, q)[:, :3], compute_uv=False)
-    assert measure(THREE_DOF, "manipulability")(q) == pytest.approx(values.prod(axis=1), rel=1e-9)
+    assert measure_function(THREE_DOF, "manipulability")(q) == pytest.approx(values.prod(axis=1), rel=1e-9)
     # Planar arm: a1 a2 |sin q2| (Yoshikawa 1985, eq. 26); and the same in a plane that stands askew.
     tilted = chain(TILTED, along(200), along(300), kinds="RR", limits=[FREE, FREE])
     for arm in (PLANAR, tilted):
-        assert measure(arm, "manipulability")(q[:, :2]) == pytest.approx(200 * 300 * np.abs(np.sin(q[:, 1])), rel=1e-9)
+        assert measure_function(arm, "manipulability")(q[:, :2]) == pytest.approx(
+            200 * 300 * np.abs(np.sin(q[:, 1])), rel=1e-9
+        )
     # Two joints in space: the area of the parallelogram.
     J = jacobian(PAN_TILT, q[:, :2])[:, :3]
     area = np.linalg.norm(np.cross(J[..., 0], J[..., 1]), axis=1)
-    assert measure(PAN_TILT, "manipulability")(q[:, :2]) == pytest.approx(area, rel=1e-6)
+    assert measure_function(PAN_TILT, "manipulability")(q[:, :2]) == pytest.approx(area, rel=1e-6)
 
 
 def read_csv(path: Path) -> tuple[list[str], np.ndarray]:

@@ -58,7 +58,7 @@ def test_of_seven_joints_one_of_some_values_must_reach_and_no_task_is_told(monke
     found = reach_slice(arm)
     assert (found["held"], found["values"]) == ("J7", VALUES)
     grid = Grid(arm, arm.reach / 4, 2, DIRECTIONS, 1, False)
-    row = voxels.section(grid).row
+    row = voxels.section_layer(grid).row
     asked = 0.0
     for k in row[:: len(row) // 4].tolist():
         rings = np.repeat(grid.rings[[k // 2]], DIRECTIONS, axis=0)

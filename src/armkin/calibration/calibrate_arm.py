@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.calibration import observability
-from armkin.calibration.corrected_chain import KINDS, model
+from armkin.calibration.corrected_chain import KINDS, correction_model
 from armkin.calibration.dropped_rows import dropped_row_numbers
-from armkin.calibration.measurement_checks import check
-from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose, free_at
+from armkin.calibration.measurement_checks import check_measurements
+from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose_level, free_at
 from armkin.calibration.robust_fit import Measurements
 from armkin.errors import UsageError
 from armkin.export import conventions
@@ -71,7 +71,7 @@ class Calibration:
     def kinds(self) -> list[str]:
         """The kinds of corrections that were made."""
         names = {name for name, *_ in self.corrections}
-        return list(dict.fromkeys(p.kind for p in model(self.arm).parameters if p.name in names))
+        return list(dict.fromkeys(p.kind for p in correction_model(self.arm).parameters if p.name in names))
 
     def rms(self, which: str) -> float:
         """Root mean square of the rows' errors, flagged rows apart.
@@ -126,32 +126,32 @@ def calibrate(
     >>> found.level, [round(value, 4) + 0.0 for _, value, _, _ in found.corrections]
     ('zeros', [0.0, 0.02, 0.0])
     """
-    fixed = _kinds(fix)
-    data = _measured(arm, q, measured)
-    check(arm, data)
-    corrections = model(arm)
+    fixed = _fixed_kinds(fix)
+    rows = _measurements(arm, q, measured)
+    check_measurements(arm, rows)
+    corrections = correction_model(arm)
     hold, held = fixed_corrections(arm, fixed)
-    choice = choose(corrections, data, hold, tick)
-    _must_explain(data, choice)
-    found = choice.fit
-    new, tool = corrections.corrected(found.p)
-    doubts = observability.doubts(corrections, found) if len(found.free) else np.zeros(0)
-    if len(data) < STATED:
+    choice = choose_level(corrections, rows, hold, tick)
+    _must_explain(rows, choice)
+    best_fit = choice.fit
+    corrected_arm, tool = corrections.corrected_arm(best_fit.p)
+    doubts = observability.doubts(corrections, best_fit) if len(best_fit.free) else np.zeros(0)
+    if len(rows) < STATED:
         doubts = np.full(len(doubts), np.nan)
     listed = [
-        (corrections.parameters[k].name, float(found.p[k]), float(doubt), corrections.parameters[k].unit)
-        for k, doubt in zip(found.free, doubts, strict=True)
+        (corrections.parameters[k].name, float(best_fit.p[k]), float(doubt), corrections.parameters[k].unit)
+        for k, doubt in zip(best_fit.free, doubts, strict=True)
     ]
     return Calibration(
-        arm=new,
-        data=conventions.screws(new, conventions.tool_of(arm) @ tool),
+        arm=corrected_arm,
+        data=conventions.screws(corrected_arm, conventions.tool_of(arm) @ tool),
         level=LEVELS[choice.level],
         before=choice.errors[0],
         after=choice.errors[choice.level],
-        flagged=dropped_row_numbers(found.weights),
-        noise=found.scale[0],
+        flagged=dropped_row_numbers(best_fit.weights),
+        noise=best_fit.scale[0],
         corrections=listed,
-        unseen=observability.unseen_corrections(corrections, found),
+        unseen=observability.unseen_corrections(corrections, best_fit),
         held=held,
     )
 
@@ -161,11 +161,11 @@ def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterabl
 
     q: (M, n) poses measured already; fix as in `calibrate`.
     """
-    corrections = model(arm)
-    hold, _ = fixed_corrections(arm, _kinds(fix))
+    corrections = correction_model(arm)
+    hold, _ = fixed_corrections(arm, _fixed_kinds(fix))
     before = None if q is None else as_joints(arm, q).reshape(-1, arm.n)
     none = Measurements(np.zeros((0, arm.n)), np.zeros((0, 3)))
-    return observability.suggestions(corrections, count, free_at(corrections, len(LEVELS) - 1, none, hold), before)
+    return observability.suggest_poses(corrections, count, free_at(corrections, len(LEVELS) - 1, none, hold), before)
 
 
 def fixed_corrections(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
@@ -184,16 +184,16 @@ def fixed_corrections(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
     return hold, held
 
 
-def _kinds(fix: Iterable[str]) -> set[str]:
-    wanted = {fix} if isinstance(fix, str) else set(fix)
-    if unknown := sorted(wanted - set(KINDS)):
+def _fixed_kinds(fix: Iterable[str]) -> set[str]:
+    fixed = {fix} if isinstance(fix, str) else set(fix)
+    if unknown := sorted(fixed - set(KINDS)):
         raise UsageError(f"there is no kind {unknown[0]} of corrections; there are {', '.join(KINDS)}")
-    if wanted == set(KINDS):
+    if fixed == set(KINDS):
         raise UsageError("all corrections are fixed; nothing is left to find")
-    return wanted
+    return fixed
 
 
-def _measured(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
+def _measurements(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
     c = as_joints(arm, q)
     values = arrays.real(measured, "measured")
     if c.ndim != 2:
@@ -208,10 +208,10 @@ def _measured(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
     return Measurements(c, values[:, :3, 3], values[:, :3, :3])
 
 
-def _must_explain(data: Measurements, choice: Choice) -> None:
-    spread = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
+def _must_explain(rows: Measurements, choice: Choice) -> None:
+    spread = float(np.median(np.linalg.norm(rows.position - np.median(rows.position, axis=0), axis=1)))
     left = float(np.median(choice.errors[choice.level]))
-    enough = HOPELESS if len(data) >= MANY else 1.0  # few rows say little of rows they have not seen
+    enough = HOPELESS if len(rows) >= MANY else 1.0  # few rows say little of rows they have not seen
     if left > enough * spread:
         raise UsageError(
             f"the rows do not fit this arm: half of them stay more than {left:.3g} mm off, of points {spread:.3g} mm "

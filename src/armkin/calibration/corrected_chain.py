@@ -93,7 +93,7 @@ class Model:
             if step.joint >= 0:
                 j = step.joint
                 value = p[k] + (self.arm.ratio[j] + p[ratios[j]]) * c[:, j]
-            T = _moved(T, step, value)
+            T = _move_columns(T, step, value)
         tip = T[:, :3, 3]
         about = turns[:, None, None]
         moved = np.where(about, np.cross(axes, tip - points), axes)
@@ -102,7 +102,7 @@ class Model:
             J[:, :, ratios[j]] = J[:, :, zeros[j]] * c[:, j, None]
         return T, J
 
-    def corrected(self, p: Array) -> tuple[Arm, Array]:
+    def corrected_arm(self, p: Array) -> tuple[Arm, Array]:
         """The arm with corrections p, and its tool (4, 4)."""
         arm, ratios = self.arm, self.indices("ratios")
         links: list[Array] = []
@@ -111,33 +111,33 @@ class Model:
             if step.constant is not None:
                 T = T @ step.constant
             elif step.joint < 0:
-                T = T @ _motion(step, p[step.parameter])
+                T = T @ _axis_motion(step, p[step.parameter])
             else:
-                links.append(T @ _motion(step, p[self.indices("zeros")[step.joint]]))
+                links.append(T @ _axis_motion(step, p[self.indices("zeros")[step.joint]]))
                 T = np.eye(4)
         links.append(T)
         base = self._product("base", p) @ arm.base
         sign = np.where(arm.dh_sign < 0, -1.0, 1.0)
         zeros = p[self.indices("zeros")]
-        new = replace(
+        corrected_arm = replace(
             arm,
-            link=_frozen(np.array(links)),
-            base=_frozen(base),
-            ratio=_frozen(arm.ratio + p[ratios]),
-            dh_theta=_frozen(arm.dh_theta + np.where(arm.prismatic, 0.0, sign * zeros)),
+            link=_freeze(np.array(links)),
+            base=_freeze(base),
+            ratio=_freeze(arm.ratio + p[ratios]),
+            dh_theta=_freeze(arm.dh_theta + np.where(arm.prismatic, 0.0, sign * zeros)),
         )
-        return new, self._product("tool", p)
+        return corrected_arm, self._product("tool", p)
 
     def _product(self, kind: str, p: Array) -> Array:
         """The product of one kind's motions."""
         T = np.eye(4)
         for step in self.steps:
             if step.parameter >= 0 and self.parameters[step.parameter].kind == kind:
-                T = T @ _motion(step, p[step.parameter])
+                T = T @ _axis_motion(step, p[step.parameter])
         return T
 
 
-def model(arm: Arm) -> Model:
+def correction_model(arm: Arm) -> Model:
     """The arm with a correction at every place, all of them zero."""
     parameters: list[Parameter] = []
     steps: list[_Step] = []
@@ -192,23 +192,23 @@ def _link_along_normal(link: Array, reach: float) -> Array:
     return A
 
 
-def _motion(step: _Step, value: float) -> Array:
+def _axis_motion(step: _Step, value: float) -> Array:
     """The transform (4, 4) along or about an axis."""
-    return _moved(np.eye(4), step, value)
+    return _move_columns(np.eye(4), step, value)
 
 
-def _moved(T: Array, step: _Step, value: Array | float) -> Array:
+def _move_columns(T: Array, step: _Step, value: Array | float) -> Array:
     """Transforms (..., 4, 4), and behind each a motion along or about its axis: of two columns, or of the origin."""
-    T, by = T.copy(), np.asarray(value)[..., None]
+    T, shift = T.copy(), np.asarray(value)[..., None]
     if step.turns:
         i, j = (step.axis + 1) % 3, (step.axis + 2) % 3
-        a, b, c, s = T[..., i].copy(), T[..., j].copy(), np.cos(by), np.sin(by)
+        a, b, c, s = T[..., i].copy(), T[..., j].copy(), np.cos(shift), np.sin(shift)
         T[..., i], T[..., j] = c * a + s * b, c * b - s * a
     else:
-        T[..., 3] += by * T[..., step.axis]
+        T[..., 3] += shift * T[..., step.axis]
     return T
 
 
-def _frozen(values: Array) -> Array:
+def _freeze(values: Array) -> Array:
     values.flags.writeable = False
     return values

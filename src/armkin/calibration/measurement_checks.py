@@ -25,19 +25,19 @@ FITS = 0.1  # of the rows' spread, a miss that needs no explanation
 EXPLAINS = 0.35  # of the miss as given, what another reading must leave to be the explanation
 
 
-def check(arm: Arm, data: Measurements) -> None:
+def check_measurements(arm: Arm, data_rows: Measurements) -> None:
     """Raise UsageError, naming what is wrong, if the rows cannot calibrate this arm."""
-    if len(data) < LEAST_ROWS:
-        rows = "1 row is" if len(data) == 1 else f"{len(data)} rows are"
+    if len(data_rows) < LEAST_ROWS:
+        rows = "1 row is" if len(data_rows) == 1 else f"{len(data_rows)} rows are"
         raise UsageError(f"{rows} too few; measure at least {LEAST_ROWS}, better 20 to 60")
-    _check_motion(arm, data)
-    _check_spread(data)
-    _check_readings(arm, data)
+    _check_motion(arm, data_rows)
+    _check_spread(data_rows)
+    _check_readings(arm, data_rows)
 
 
-def _check_motion(arm: Arm, data: Measurements) -> None:
+def _check_motion(arm: Arm, rows: Measurements) -> None:
     least = np.where(arm.prismatic, STILL[1], STILL[0])
-    still = np.flatnonzero(np.ptp(data.c, axis=0) < least)
+    still = np.flatnonzero(np.ptp(rows.c, axis=0) < least)
     if len(still):
         names = ", ".join(arm.joint_names[j] for j in still)
         raise UsageError(
@@ -45,7 +45,7 @@ def _check_motion(arm: Arm, data: Measurements) -> None:
             f"{'it' if len(still) == 1 else 'them'} cannot be determined; measure poses that move every joint"
         )
     unit = radian_or_reach(arm)
-    sizes = np.linalg.svd((data.c - data.c.mean(axis=0)) / unit, compute_uv=False)
+    sizes = np.linalg.svd((rows.c - rows.c.mean(axis=0)) / unit, compute_uv=False)
     if arm.n > 1 and sizes[1] < 1e-3 * sizes[0]:
         raise UsageError(
             "all joints move in step from row to row: their effects cannot be told apart; "
@@ -53,8 +53,8 @@ def _check_motion(arm: Arm, data: Measurements) -> None:
         )
 
 
-def _check_spread(data: Measurements) -> None:
-    centred = data.position - np.median(data.position, axis=0)
+def _check_spread(rows: Measurements) -> None:
+    centred = rows.position - np.median(rows.position, axis=0)
     # The rows nearest the middle of the cloud: a wrong row alone would make a line look thick.
     near = np.argsort(np.linalg.norm(centred, axis=1))[: max(LEAST_ROWS, math.ceil(0.8 * len(centred)))]
     sizes = np.linalg.svd(centred[near] - centred[near].mean(axis=0), compute_uv=False)
@@ -72,21 +72,21 @@ class _Reading(NamedTuple):
     position: Array
 
 
-def _check_readings(arm: Arm, data: Measurements) -> None:
+def _check_readings(arm: Arm, rows: Measurements) -> None:
     """Units and columns: whether another reading of the rows fits far better than the one given."""
-    expected = position(arm, data.c)
-    size = float(np.median(np.linalg.norm(data.position - np.median(data.position, axis=0), axis=1)))
-    miss, plain = _aligned_miss(expected, data.position), _median_miss(expected, data.position)
+    expected = position(arm, rows.c)
+    size = float(np.median(np.linalg.norm(rows.position - np.median(rows.position, axis=0), axis=1)))
+    miss, plain = _aligned_miss(expected, rows.position), _median_miss(expected, rows.position)
     says = ""
     if plain > FITS * size:
-        says = _axes_in_place(expected, data.position, 0.2 * plain, FITS * size)
+        says = _axes_in_place(expected, rows.position, 0.2 * plain, FITS * size)
     if not says and miss > FITS * size:
         least = EXPLAINS * miss
-        for reading in _readings(arm, data):
+        for reading in _readings(arm, rows):
             moved = position(arm, reading.c)
-            off = _aligned_miss(moved, reading.position) * size / max(_size(reading.position), 1e-12)
-            if off < least:
-                least, says = 0.999 * off, reading.explanation
+            reading_miss = _aligned_miss(moved, reading.position) * size / max(_cloud_size(reading.position), 1e-12)
+            if reading_miss < least:
+                least, says = 0.999 * reading_miss, reading.explanation
     if says:
         raise UsageError(f"{says}; as given, the rows miss the arm by {miss:.3g} mm (median); nothing is written")
 
@@ -96,7 +96,7 @@ def _axes_in_place(expected: Array, measured: Array, most: float, largest: float
 
     Measuring frames may stand anywhere, so `_readings` allows any rigid motion; these need none, and are tried first.
     """
-    found = [
+    candidates = [
         (
             _median_miss(expected, measured[:, order]),
             f"columns {_axis_names(order)} of the measured points look like x y z",
@@ -104,24 +104,24 @@ def _axes_in_place(expected: Array, measured: Array, most: float, largest: float
         for order in itertools.permutations(range(3))
         if order != (0, 1, 2)
     ]
-    found += [
+    candidates += [
         (
             _median_miss(expected, measured * flip),
             f"the measured {axis} looks negative (or the first joint turns the other way)",
         )
         for flip, axis in _FLIPS
     ]
-    off, says = min(found)
-    return says if off < min(most, largest) else ""
+    reading_miss, says = min(candidates)
+    return says if reading_miss < min(most, largest) else ""
 
 
 _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "z"))
 
 
-def _readings(arm: Arm, data: Measurements) -> list[_Reading]:
-    c, x = data.c, data.position
+def _readings(arm: Arm, rows: Measurements) -> list[_Reading]:
+    c, x = rows.c, rows.position
     degree = units.scale(arm)
-    found = [
+    readings = [
         _Reading("the joint values look like radians where degrees are expected", c / degree, x),
         _Reading("the joint values look like degrees where radians are expected", c * degree, x),
         _Reading("the measured points look like metres where millimetres are expected", c, x * 1e3),
@@ -132,22 +132,22 @@ def _readings(arm: Arm, data: Measurements) -> list[_Reading]:
         order = list(range(arm.n))
         order[i], order[j] = j, i
         names = f"{arm.joint_names[i]} and {arm.joint_names[j]}"
-        found.append(_Reading(f"the columns of {names} look swapped", c[:, order], x))
+        readings.append(_Reading(f"the columns of {names} look swapped", c[:, order], x))
     for j in range(arm.n):
         sign = np.ones(arm.n)
         sign[j] = -1.0
-        found.append(_Reading(f"{arm.joint_names[j]} looks commanded with the other sign", c * sign, x))
+        readings.append(_Reading(f"{arm.joint_names[j]} looks commanded with the other sign", c * sign, x))
     for axes in ((0, 2, 1), (2, 1, 0), (1, 0, 2)):
         says = f"columns {_axis_names(axes)} of the measured points look like x y z"
-        found.append(_Reading(says, c, x[:, axes]))
-    return found
+        readings.append(_Reading(says, c, x[:, axes]))
+    return readings
 
 
 def _axis_names(order: tuple[int, ...]) -> str:
     return " ".join("xyz"[k] for k in order)
 
 
-def _size(x: Array) -> float:
+def _cloud_size(x: Array) -> float:
     return float(np.median(np.linalg.norm(x - np.median(x, axis=0), axis=1)))
 
 
@@ -159,12 +159,12 @@ def _median_miss(expected: Array, measured: Array) -> float:
 def _aligned_miss(expected: Array, measured: Array) -> float:
     """The median miss after the best rigid motion of the expected points (Kabsch, 1976), robustly."""
     weight = np.ones(len(expected))
-    off = np.zeros(len(expected))
+    distances = np.zeros(len(expected))
     for _ in range(6):
         a, b = (np.average(points, axis=0, weights=weight) for points in (expected, measured))
         U, _s, Vt = np.linalg.svd((expected - a).T @ ((measured - b) * weight[:, None]))
         turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt)) or 1.0])
         R = (U @ turn @ Vt).T
-        off = np.linalg.norm(measured - b - (expected - a) @ R.T, axis=1)
-        weight = (1.0 + (off / (3.0 * np.median(off) + 1e-9)) ** 2) ** -2
-    return float(np.median(off))
+        distances = np.linalg.norm(measured - b - (expected - a) @ R.T, axis=1)
+        weight = (1.0 + (distances / (3.0 * np.median(distances) + 1e-9)) ** 2) ** -2
+    return float(np.median(distances))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from armkin.calibration.corrected_chain import KINDS, Model
 from armkin.calibration.observability import left_open
-from armkin.calibration.robust_fit import Fit, Measurements, fit, residuals
+from armkin.calibration.robust_fit import Fit, Measurements, fit_corrections, residuals
 from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
@@ -40,33 +40,36 @@ class Choice:
     fit: Fit
 
 
-def choose(
-    model: Model, data: Measurements, fixed: Collection[str] = (), tick: Callable[[int, int], object] | None = None
+def choose_level(
+    model: Model,
+    rows: Measurements,
+    fixed: Collection[str] = (),
+    tick: Callable[[int, int], object] | None = None,
 ) -> Choice:
     """The level that the rows justify, fitted to all of them; tick: how many fits are done, and of how many."""
-    sets = [free_at(model, level, data, fixed) for level in range(len(LEVELS))]
-    fits, errors = _cross_validated(model, data, sets, tick or (lambda done, of: None))
+    sets = [free_at(model, level, rows, fixed) for level in range(len(LEVELS))]
+    fits, errors = _cross_validate(model, rows, sets, tick or (lambda done, of: None))
     level, sure = 0, False  # sure: the level is better than the file by more than chance
     for richer in range(1, len(LEVELS)):
         if np.array_equal(sets[richer], sets[level]):
             continue
-        better = _better(errors[level], errors[richer], first=not sure)
-        if not better and not (richer == 1 and _clearly(errors)):
+        better = _is_better(errors[level], errors[richer], first=not sure)
+        if not better and not (richer == 1 and _is_clearly_better(errors)):
             continue
-        if len(data) >= MANY or _settled(model, fits[richer], errors[0]):
+        if len(rows) >= MANY or _is_settled(model, fits[richer], errors[0]):
             level, sure = richer, better
     return Choice(level, errors, fits[level])
 
 
-def _cross_validated(
-    model: Model, data: Measurements, sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
+def _cross_validate(
+    model: Model, rows: Measurements, sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
 ) -> tuple[list[Fit], Array]:
     """Every level fitted to all rows, and how far each row is off where it was left out: (levels, N) [mm].
 
     sets: numbers of the parameters that are free at each level.
     """
-    parts = _parts(len(data))
-    errors = np.empty((len(sets), len(data)))
+    parts = _five_parts(len(rows))
+    errors = np.empty((len(sets), len(rows)))
     fits: list[Fit] = []
     count = 1 + len(parts)
     for level, free in enumerate(sets):
@@ -76,47 +79,47 @@ def _cross_validated(
             continue
         # Every level starts from the last one's fit to all rows: from the pose of its base.
         start = fits[-1].p if fits else None
-        whole = fit(model, data, free, start)
-        fits.append(whole)
+        full_fit = fit_corrections(model, rows, free, start)
+        fits.append(full_fit)
         for part, held in enumerate(parts):
             tick(level * count + part + 1, len(sets) * count)
-            used = np.setdiff1d(np.arange(len(data)), held)
-            p = fit(model, data.rows(used), free, start, steps=12).p if len(free) else whole.p
-            errors[level, held] = np.linalg.norm(residuals(model, p, data.rows(held))[0], axis=1)
+            used = np.setdiff1d(np.arange(len(rows)), held)
+            p = fit_corrections(model, rows.take(used), free, start, steps=12).p if len(free) else full_fit.p
+            errors[level, held] = np.linalg.norm(residuals(model, p, rows.take(held))[0], axis=1)
     return fits, errors
 
 
-def free_at(model: Model, level: int, data: Measurements, fixed: Collection[str]) -> NDArray[np.intp]:
+def free_at(model: Model, level: int, rows: Measurements, fixed: Collection[str]) -> NDArray[np.intp]:
     """The free parameters of a level: its own kind's and the simpler levels'."""
     kinds = KINDS[: level + 1 if level else 0]  # level 1 frees the first two
-    wanted = [
+    is_free = [
         parameter.kind in kinds
         and not {parameter.kind, parameter.name} & set(fixed)
         # points alone do not show how the measuring tip is turned
-        and not (parameter.kind == "tool" and parameter.unit == "rad" and data.rotation is None)
+        and not (parameter.kind == "tool" and parameter.unit == "rad" and rows.rotation is None)
         for parameter in model.parameters
     ]
-    return np.flatnonzero(wanted)
+    return np.flatnonzero(is_free)
 
 
-def _parts(count: int) -> list[NDArray[np.intp]]:
+def _five_parts(count: int) -> list[NDArray[np.intp]]:
     """The rows in five parts of equal size, by chance (the same each time)."""
     order = np.random.default_rng(1).permutation(count)
     return [np.sort(order[k :: min(FOLDS, count)]) for k in range(min(FOLDS, count))]
 
 
-def _settled(model: Model, candidate: Fit, before: Array) -> bool:
+def _is_settled(model: Model, candidate: Fit, before: Array) -> bool:
     """Whether the fit's covariance leaves less of the tip's place open than OPEN times the file's error."""
     return left_open(model, candidate) < OPEN * float(np.sqrt(np.mean(before**2)))
 
 
-def _clearly(errors: Array) -> bool:
+def _is_clearly_better(errors: Array) -> bool:
     """Whether few rows, each predicted without itself, are met clearly better with another base and tool."""
     file, placed = np.sqrt(np.mean(errors[:2] ** 2, axis=1))
     return errors.shape[1] < MANY and bool(placed <= CLEAR * file)
 
 
-def _better(simple: Array, rich: Array, *, first: bool) -> bool:
+def _is_better(simple: Array, rich: Array, *, first: bool) -> bool:
     """Whether the richer level's errors on unseen rows are smaller by more than chance.
 
     The file is left only for a clear gain. From there on the prior keeps richer levels from doing harm.

@@ -42,15 +42,15 @@ def unseen_corrections(model: Model, fit: Fit) -> list[str]:
     correlation = spread / np.outer(left, left)
     names = [model.parameters[k].name for k in fit.free]
     weak = np.flatnonzero(left > UNSEEN)
-    told: list[str] = []
-    done: set[int] = set()
+    lines: list[str] = []
+    grouped: set[int] = set()
     for k in weak:
-        if k in done:
+        if k in grouped:
             continue
         group = [k] + [j for j in np.flatnonzero(np.abs(correlation[k]) > TOGETHER) if j != k]
-        done.update(int(j) for j in group)
-        told.append(names[k] if len(group) == 1 else " + ".join(names[j] for j in group) + " (only their sum)")
-    return told
+        grouped.update(int(j) for j in group)
+        lines.append(names[k] if len(group) == 1 else " + ".join(names[j] for j in group) + " (only their sum)")
+    return lines
 
 
 def left_open(model: Model, fit: Fit) -> float:
@@ -58,11 +58,11 @@ def left_open(model: Model, fit: Fit) -> float:
 
     The poses are random, within limits.
     """
-    J = model.poses(fit.p, _anywhere(model.arm, 100))[1][:, :3, fit.free] * model.prior[fit.free]
+    J = model.poses(fit.p, _random_poses(model.arm, 100))[1][:, :3, fit.free] * model.prior[fit.free]
     return float(np.sqrt(np.einsum("mip,pq,miq->m", J, np.linalg.inv(fit.normal), J, optimize=True).mean()))
 
 
-def suggestions(model: Model, count: int, free: NDArray[np.intp], measured: Array | None = None) -> Array:
+def suggest_poses(model: Model, count: int, free: NDArray[np.intp], measured: Array | None = None) -> Array:
     """Joint values (count, n) whose measurement would tell most, one after the other, within limits.
 
     free: the corrections to see; measured: (M, n) poses measured already. Each next pose is that of 400 random ones
@@ -72,12 +72,12 @@ def suggestions(model: Model, count: int, free: NDArray[np.intp], measured: Arra
         raise UsageError(f"{count} poses cannot be suggested; ask for 1 to 1000")
     arm = model.arm
     step = units.scale(arm)  # whole degrees and millimetres, as people type them
-    low, high = _range(arm)
-    candidates = np.clip(np.round(_anywhere(arm, CANDIDATES) / step) * step, low, high)
-    J = _whitened(model, candidates, free)
+    low, high = _joint_range(arm)
+    candidates = np.clip(np.round(_random_poses(arm, CANDIDATES) / step) * step, low, high)
+    J = _whitened_jacobian(model, candidates, free)
     N = np.eye(len(free))
     if measured is not None and len(measured):
-        rows = _whitened(model, measured, free).reshape(-1, len(free))
+        rows = _whitened_jacobian(model, measured, free).reshape(-1, len(free))
         N += rows.T @ rows
     chosen: list[int] = []
     for _ in range(count):
@@ -89,19 +89,19 @@ def suggestions(model: Model, count: int, free: NDArray[np.intp], measured: Arra
     return np.asarray(candidates[chosen])
 
 
-def _range(arm: Arm) -> tuple[Array, Array]:
+def _joint_range(arm: Arm) -> tuple[Array, Array]:
     """Limits, lower and upper (n,) [rad | mm]; where a joint has none, half a turn or 200 mm to that side."""
     span = np.where(arm.prismatic, UNLIMITED[1], UNLIMITED[0])
     low = np.where(np.isfinite(arm.lower), arm.lower, np.where(np.isfinite(arm.upper), arm.upper - span, -span))
     return low, np.where(np.isfinite(arm.upper), arm.upper, np.where(np.isfinite(arm.lower), arm.lower + span, span))
 
 
-def _anywhere(arm: Arm, count: int) -> Array:
+def _random_poses(arm: Arm, count: int) -> Array:
     """Random joint values (count, n) within limits, the same each time."""
-    return np.random.default_rng(3).uniform(*_range(arm), (count, arm.n))
+    return np.random.default_rng(3).uniform(*_joint_range(arm), (count, arm.n))
 
 
-def _whitened(model: Model, c: Array, free: NDArray[np.intp]) -> Array:
+def _whitened_jacobian(model: Model, c: Array, free: NDArray[np.intp]) -> Array:
     """What the corrections do to the tip, in units of the prior and of a noise of 0.1 mm: (M, 3, F)."""
     J = model.poses(np.zeros(len(model.parameters)), c)[1][:, :3, free]
     return np.asarray(J * model.prior[free] / max(0.1, FINEST[0]))

@@ -29,7 +29,7 @@ class Measurements:
     def __len__(self) -> int:
         return len(self.c)
 
-    def rows(self, selected: NDArray[np.intp] | NDArray[np.bool_]) -> Measurements:
+    def take(self, selected: NDArray[np.intp] | NDArray[np.bool_]) -> Measurements:
         """Some of the rows."""
         return Measurements(
             self.c[selected], self.position[selected], None if self.rotation is None else self.rotation[selected]
@@ -47,20 +47,20 @@ class Fit:
     free: NDArray[np.intp]  # (F,)
 
 
-def residuals(model: Model, p: Array, data: Measurements) -> tuple[Array, Array | None, Array]:
+def residuals(model: Model, p: Array, rows: Measurements) -> tuple[Array, Array | None, Array]:
     """What the model misses: (M, 3) [mm], (M, 3) [rad] or None, and the Jacobian (M, 6, P)."""
-    T, J = model.poses(p, data.c)
-    off = data.position - T[:, :3, 3]
-    if data.rotation is None:
-        return off, None, J
+    T, J = model.poses(p, rows.c)
+    position_residuals = rows.position - T[:, :3, 3]
+    if rows.rotation is None:
+        return position_residuals, None, J
     # Half the sum of the columns' cross products is the rotation vector to third order.
-    turned = 0.5 * np.cross(T[:, :3, :3], data.rotation, axis=1).sum(axis=2)
-    return off, turned, J
+    turned = 0.5 * np.cross(T[:, :3, :3], rows.rotation, axis=1).sum(axis=2)
+    return position_residuals, turned, J
 
 
-def fit(
+def fit_corrections(
     model: Model,
-    data: Measurements,
+    rows: Measurements,
     free: NDArray[np.intp],
     start: Array | None = None,
     steps: int = STEPS,
@@ -70,14 +70,14 @@ def fit(
     prior = model.prior[free]
     damping = 1e-3
     scale = (0.0, 0.0)
-    off, turned, J = residuals(model, p, data)
+    position_residuals, turned, J = residuals(model, p, rows)
     held = 0.0  # numbers that the fit itself has used up
     for step in range(steps):
-        scale = scales(off, turned, held)
-        weight, weight_turn = weights(off, scale[0]), weights(turned, scale[1])
-        H, g = _normal(J[:, :, free] * prior, off, turned, weight, weight_turn, scale)
+        scale = scales(position_residuals, turned, held)
+        weight, weight_turn = weights(position_residuals, scale[0]), weights(turned, scale[1])
+        H, g = _normal_equations(J[:, :, free] * prior, position_residuals, turned, weight, weight_turn, scale)
         z = p[free] / prior
-        cost = _cost(off, turned, scale, z)
+        cost = _cost(position_residuals, turned, scale, z)
         with_prior = H + np.eye(len(free))
         held = float(np.trace(np.linalg.solve(with_prior, H))) if len(free) else 0.0
         better = False
@@ -85,20 +85,20 @@ def fit(
             move = np.linalg.solve(with_prior + damping * np.diag(np.diag(H)), g - z)
             trial = p.copy()
             trial[free] += move * prior
-            new = residuals(model, trial, data)
-            if _cost(new[0], new[1], scale, z + move) <= cost:
+            trial_residuals = residuals(model, trial, rows)
+            if _cost(trial_residuals[0], trial_residuals[1], scale, z + move) <= cost:
                 better = True
                 break
             damping = max(damping, 1e-6) * 10
         if not better:
             break
-        p, (off, turned, J) = trial, new
+        p, (position_residuals, turned, J) = trial, trial_residuals
         damping *= 0.1
         if np.abs(move).max(initial=0.0) < 1e-5 and step > 3:
             break
-    scale = scales(off, turned, held)
-    weight, weight_turn = weights(off, scale[0]), weights(turned, scale[1])
-    H, _ = _normal(J[:, :, free] * prior, off, turned, weight, weight_turn, scale)
+    scale = scales(position_residuals, turned, held)
+    weight, weight_turn = weights(position_residuals, scale[0]), weights(turned, scale[1])
+    H, _ = _normal_equations(J[:, :, free] * prior, position_residuals, turned, weight, weight_turn, scale)
     return Fit(p, scale, np.minimum(weight, weight_turn), H + np.eye(len(free)), free)
 
 
@@ -108,7 +108,7 @@ def _cost(position_residuals: Array, rotation_residuals: Array | None, scale: tu
     )
 
 
-def _normal(
+def _normal_equations(
     J: Array,
     position_residuals: Array,
     rotation_residuals: Array | None,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from armkin import forward
 from armkin.formula.arrays import Array
 from armkin.inverse.run.workers import shared
-from armkin.keep_out.clearance import Clearance, clearance, least, named_clearance
+from armkin.keep_out.clearance import Clearance, clearance, least_clearances, named_clearance
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -43,7 +43,7 @@ class JointFunctions:
         values = forward.as_joints(self.arm, q)
         if self._clearances is None or not np.isfinite(values).all():
             return clearance(self.arm, values)
-        found = self._run(self._clearances, least, (2,), values, 1).reshape(-1, 2)
+        found = self._run(self._clearances, least_clearances, (2,), values, 1).reshape(-1, 2)
         return named_clearance(self.arm, found[:, 0], found[:, 1].astype(np.intp), values.shape[:-1])
 
     def _run(

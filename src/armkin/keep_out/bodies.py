@@ -62,12 +62,14 @@ def bodies(arm: Arm) -> Bodies:
     >>> found.names, found.radius.round(1).tolist(), found.end[found.owner == 2].tolist()
     (('base', 'q1', 'q2', 'q3'), [12.5, 12.5, 12.5, 12.5], [[0.0, 0.0, -10.0], [197.0, 0.0, -10.0]])
     """
-    said = np.full(arm.n + 1, np.nan) if arm.body_radius is None else arm.body_radius
-    assumed = np.isnan(said)
-    owner, begin, end, slide = zip(*_of_base(arm), *(s for i in range(arm.n) for s in _of_link(arm, i)), strict=True)
+    radii = np.full(arm.n + 1, np.nan) if arm.body_radius is None else arm.body_radius
+    assumed = np.isnan(radii)
+    owner, begin, end, slide = zip(
+        *_base_segments(arm), *(s for i in range(arm.n) for s in _link_segments(arm, i)), strict=True
+    )
     return Bodies(
         (BASE, *arm.joint_names),
-        np.where(assumed, ASSUMED * arm.reach, said),
+        np.where(assumed, ASSUMED * arm.reach, radii),
         assumed,
         np.array(owner),
         np.array(begin),
@@ -76,30 +78,30 @@ def bodies(arm: Arm) -> Bodies:
     )
 
 
-def _of_base(arm: Arm) -> list[_Segment]:
+def _base_segments(arm: Arm) -> list[_Segment]:
     """The base's segments, with those of link 1 that lie on joint 1's own axis: they do not turn."""
     form, least = shape(arm), 1e-9 * arm.reach
-    still = list(_segments(form.bodies[0], least))
+    still = list(_segments_between(form.bodies[0], least))
     if not arm.prismatic[0]:
-        on_axis = [s for s in _segments(form.bodies[1], least) if _on_axis(s, least)]
-        still += [(_placed(arm.link[0], a), _placed(arm.link[0], b)) for a, b in on_axis]
+        on_axis = [s for s in _segments_between(form.bodies[1], least) if _on_axis(s, least)]
+        still += [(_place_point(arm.link[0], a), _place_point(arm.link[0], b)) for a, b in on_axis]
     return [(0, a, b, False) for a, b in still or [(form.bodies[0][-1],) * 2]]
 
 
-def _of_link(arm: Arm, i: int) -> list[_Segment]:
+def _link_segments(arm: Arm, i: int) -> list[_Segment]:
     """The segments that move with joint i; of a slide the first one, which grows, as well."""
     corners, least = shape(arm).bodies[i + 1], 1e-9 * arm.reach
-    own = list(_segments(corners, least))
+    segments = list(_segments_between(corners, least))
     if arm.prismatic[i]:
-        return [(i + 1, corners[0], corners[0], True), *((i + 1, a, b, False) for a, b in own)]
+        return [(i + 1, corners[0], corners[0], True), *((i + 1, a, b, False) for a, b in segments)]
     if i == 0:
-        own = [s for s in own if not _on_axis(s, least)]
-    elif not own:
-        own = [(corners[-1], corners[-1])]  # a body without length is a sphere
-    return [(i + 1, a, b, False) for a, b in own]
+        segments = [s for s in segments if not _on_axis(s, least)]
+    elif not segments:
+        segments = [(corners[-1], corners[-1])]  # a body without length is a sphere
+    return [(i + 1, a, b, False) for a, b in segments]
 
 
-def _segments(corners: Array, least: float) -> list[tuple[Array, Array]]:
+def _segments_between(corners: Array, least: float) -> list[tuple[Array, Array]]:
     """Neighbouring corners that are apart."""
     pairs = pairwise(corners)
     return [(a, b) for a, b in pairs if np.linalg.norm(b - a) > least]
@@ -109,39 +111,39 @@ def _on_axis(segment: tuple[Array, Array], least: float) -> bool:
     return all(float(np.hypot(*point[:2])) <= least for point in segment)
 
 
-def _placed(T: Array, point: Array) -> Array:
+def _place_point(T: Array, point: Array) -> Array:
     return np.asarray(T[:3, :3] @ point + T[:3, 3])
 
 
-def ends(arm: Arm, q: Array) -> tuple[Array, Array]:
+def segment_ends(arm: Arm, q: Array) -> tuple[Array, Array]:
     """Both ends of every segment: q (N, n) [rad | mm] -> (3, S, N) twice, in the world."""
     form = bodies(arm)
-    out = np.empty((2, 3, len(form.owner), len(q)))
+    ends_of_segments = np.empty((2, 3, len(form.owner), len(q)))
     columns = list(np.ascontiguousarray(q.T))
-    code = _recorded(arm).get(len(q))
-    found = ends_formula(arm, columns) if code is None else code.run(columns, code.workspace(len(q)))
-    for k, entry in enumerate(found):
-        segment, rest = divmod(k, 6)
-        out[rest // 3, rest % 3, segment] = entry
-    return out[0], out[1]
+    code = _recorded_ends(arm).get(len(q))
+    entries = ends_formula(arm, columns) if code is None else code.run(columns, code.workspace(len(q)))
+    for k, entry in enumerate(entries):
+        segment, coordinate = divmod(k, 6)
+        ends_of_segments[coordinate // 3, coordinate % 3, segment] = entry
+    return ends_of_segments[0], ends_of_segments[1]
 
 
 @lru_cache(maxsize=64)
-def _recorded(arm: Arm) -> LazyCode:
+def _recorded_ends(arm: Arm) -> LazyCode:
     return LazyCode(lambda q: ends_formula(arm, q), arm.n)
 
 
 def ends_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """Six numbers a segment: where it begins and where it ends."""
     form = bodies(arm)
-    out: list[Entry] = []
+    entries: list[Entry] = []
     for k in np.flatnonzero(form.owner == 0):
-        out += [*map(float, form.begin[k]), *map(float, form.end[k])]
+        entries += [*map(float, form.begin[k]), *map(float, form.end[k])]
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
         before, P = P, move(arm, P, i, q[i])
         for k in np.flatnonzero(form.owner == i + 1):
-            out += pose.apply(before if form.slide[k] else P, [float(x) for x in form.begin[k]])
-            out += pose.apply(P, [float(x) for x in form.end[k]])
+            entries += pose.apply(before if form.slide[k] else P, [float(x) for x in form.begin[k]])
+            entries += pose.apply(P, [float(x) for x in form.end[k]])
         P = pose.times(P, pose.constant(arm.link[i + 1]))
-    return out
+    return entries

@@ -10,7 +10,7 @@ import numpy as np
 
 from armkin.errors import RobotFileError
 from armkin.formula.arrays import Array
-from armkin.keep_out.bodies import Bodies, bodies, ends
+from armkin.keep_out.bodies import Bodies, bodies, segment_ends
 from armkin.keep_out.shapes import Shape, shape_of
 from armkin.keep_out.shapes.segment_distances import segment_distance
 from armkin.robot_file.keep_out_keys import SELF, names, problems
@@ -50,45 +50,45 @@ class Guard:
 
     def distances(self, q: Array) -> Array:
         """Signed distance of every pair, `clearance` not taken off: q (N, n) [rad | mm] -> (N, pairs) [mm]."""
-        out = np.empty((len(q), len(self.pairs)))
+        mm = np.empty((len(q), len(self.pairs)))
         for k in range(0, len(q), CHUNK):
-            out[k : k + CHUNK] = self._distances(q[k : k + CHUNK]).T
-        return out
+            mm[k : k + CHUNK] = self._distances(q[k : k + CHUNK]).T
+        return mm
 
     def _distances(self, q: Array) -> Array:
         """(pairs, N)"""
-        a, b = ends(self.arm, q)
+        a, b = segment_ends(self.arm, q)
         radius, owner = self.bodies.radius, self.bodies.owner
-        found = []
+        parts = []
         if len(self.moving):
             begin, end = a[:, self.moving], b[:, self.moving]
             less = radius[owner[self.moving]][:, None]
-            found = [np.minimum.reduceat(shape.distance(begin, end) - less, self.first) for _, shape in self.obstacles]
+            parts = [np.minimum.reduceat(shape.distance(begin, end) - less, self.first) for _, shape in self.obstacles]
         if len(self.ours):
             i, j = self.ours, self.theirs
             apart = segment_distance(a[:, i], b[:, i], a[:, j], b[:, j])
             apart -= (radius[owner[i]] + radius[owner[j]])[:, None]
-            found.append(np.minimum.reduceat(apart, self.starts))
-        return np.concatenate(found) if found else np.empty((0, len(q)))
+            parts.append(np.minimum.reduceat(apart, self.starts))
+        return np.concatenate(parts) if parts else np.empty((0, len(q)))
 
     def clearances(self, q: Array) -> Array:
         """The same with `clearance` taken off: negative is a hit."""
         return self.distances(q) - self.arm.clearance
 
-    def least(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
+    def least_clearances(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least clearance and its pair: q (N, n) -> (N,), (N,); nan where a joint value is, inf where none counts."""
-        mm, which = np.full(len(q), np.inf), np.zeros(len(q), np.intp)
+        mm, pairs = np.full(len(q), np.inf), np.zeros(len(q), np.intp)
         for k in range(0, len(q) if self.pairs else 0, CHUNK):
-            mm[k : k + CHUNK], which[k : k + CHUNK] = self._least(q[k : k + CHUNK])
+            mm[k : k + CHUNK], pairs[k : k + CHUNK] = self._least_distances(q[k : k + CHUNK])
         mm -= self.arm.clearance
         mm[np.isnan(q).any(axis=1)] = np.nan
-        return mm, which
+        return mm, pairs
 
-    def _least(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
+    def _least_distances(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least distance and its pair. A segment is as near as its middle, and nearer by half its length at most:
         most are too far to be the nearest, and only the others are looked at.
         """
-        a, b = ends(self.arm, q)
+        a, b = segment_ends(self.arm, q)
         middle, way = (a + b) / 2, b - a
         half = np.sqrt(np.einsum("ksn,ksn->sn", way, way)) / 2
         radius, moving, i, j = self.bodies.radius[self.bodies.owner][:, None], self.moving, self.ours, self.theirs
@@ -98,25 +98,25 @@ class Guard:
             apart = middle[:, i] - middle[:, j]
             most.append(np.sqrt(np.einsum("ksn,ksn->sn", apart, apart)) - radius[i] - radius[j])
             nearer.append(half[i] + half[j])
-        found = np.full((sum(map(len, most)), len(q)), np.inf)
+        distances = np.full((sum(map(len, most)), len(q)), np.inf)
         bound = np.min([part.min(axis=0) for part in most if len(part)], axis=0) + 1e-9 * self.arm.reach
         row = 0
         for k, (far, least) in enumerate(zip(most, nearer, strict=True)):
             s, n = np.nonzero(far - least <= bound)
             if k < len(self.obstacles):
-                one = moving[s]
-                exact = self.obstacles[k][1].distance(a[:, one, n], b[:, one, n]) - radius[one, 0]
+                segment = moving[s]
+                exact = self.obstacles[k][1].distance(a[:, segment, n], b[:, segment, n]) - radius[segment, 0]
             else:
-                one, two = i[s], j[s]
+                segment, other_segment = i[s], j[s]
                 exact = (
-                    segment_distance(a[:, one, n], b[:, one, n], a[:, two, n], b[:, two, n])
-                    - radius[one, 0]
-                    - radius[two, 0]
+                    segment_distance(a[:, segment, n], b[:, segment, n], a[:, other_segment, n], b[:, other_segment, n])
+                    - radius[segment, 0]
+                    - radius[other_segment, 0]
                 )
-            found[row + s, n] = exact
+            distances[row + s, n] = exact
             row += len(far)
-        nearest = found.argmin(axis=0)
-        return found[nearest, np.arange(len(q))], self._pair_of_row[nearest]
+        nearest = distances.argmin(axis=0)
+        return distances[nearest, np.arange(len(q))], self._pair_of_row[nearest]
 
     @cached_property
     def _pair_of_row(self) -> NDArray[np.intp]:
@@ -139,12 +139,12 @@ def guard(arm: Arm) -> Guard:
     if not any(entry.kind == SELF for _, entry in entries):
         return _guard_of_pairs(arm, obstacles, [], ())
     form = bodies(arm)
-    there = [k for k in range(arm.n + 1) if form.exists(k)]
-    pairs = [(later, earlier) for later in there for earlier in there if later - earlier >= 2]
-    apart = _guard_of_pairs(arm, (), pairs, ()).distances(postures(arm)).max(axis=0, initial=-np.inf)
-    kept = [pair for pair, most in zip(pairs, apart, strict=True) if most >= 0.0]
-    left = tuple((form.names[i], form.names[j]) for i, j in pairs if (i, j) not in kept)
-    return _guard_of_pairs(arm, obstacles, kept, left)
+    existing = [k for k in range(arm.n + 1) if form.exists(k)]
+    pairs = [(later, earlier) for later in existing for earlier in existing if later - earlier >= 2]
+    apart = _guard_of_pairs(arm, (), pairs, ()).distances(sample_postures(arm)).max(axis=0, initial=-np.inf)
+    counting = [pair for pair, most in zip(pairs, apart, strict=True) if most >= 0.0]
+    left = tuple((form.names[i], form.names[j]) for i, j in pairs if (i, j) not in counting)
+    return _guard_of_pairs(arm, obstacles, counting, left)
 
 
 def _guard_of_pairs(
@@ -157,9 +157,9 @@ def _guard_of_pairs(
     solid = [k for k in range(1, arm.n + 1) if form.exists(k)]
     moving = np.flatnonzero(np.isin(form.owner, solid))
     segments = [np.flatnonzero(form.owner == k) for k in range(arm.n + 1)]
-    both = [[(i, j) for i in segments[later] for j in segments[earlier]] for later, earlier in pairs]
-    flat = np.array([one for part in both for one in part], dtype=np.intp).reshape(-1, 2)
-    sizes = [len(part) for part in both]
+    segment_pairs = [[(i, j) for i in segments[later] for j in segments[earlier]] for later, earlier in pairs]
+    flat = np.array([segment_pair for part in segment_pairs for segment_pair in part], dtype=np.intp).reshape(-1, 2)
+    sizes = [len(part) for part in segment_pairs]
     listed = [Pair(k, None, name) for name, _ in obstacles for k in solid]
     listed += [Pair(later, earlier, form.names[earlier]) for later, earlier in pairs]
     return Guard(
@@ -176,7 +176,7 @@ def _guard_of_pairs(
     )
 
 
-def postures(arm: Arm) -> Array:
+def sample_postures(arm: Arm) -> Array:
     """Home, and the first points of the Halton sequence in the first n primes, scaled to the limits: (256, n)."""
     span = np.where(arm.prismatic, arm.reach, np.pi)
     low = np.where(np.isfinite(arm.lower), arm.lower, -span)
@@ -195,15 +195,15 @@ def _radical_inverse(index: int, base: int) -> float:
     return value
 
 
-def check(arm: Arm) -> None:
+def check_keep_out(arm: Arm) -> None:
     """Raise RobotFileError for names that clash, and for an obstacle that is hit in every posture looked at."""
-    where = arm.scene or arm.path or arm.name
+    source = arm.scene or arm.path or arm.name
     for path, text in problems(arm.keep_out, ["base", *arm.joint_names]):
-        raise RobotFileError(f"{where}: keep_out {int(path[1]) + 1}: {text}", file=where)
+        raise RobotFileError(f"{source}: keep_out {int(path[1]) + 1}: {text}", file=source)
     held = guard(arm)
-    apart = held.clearances(postures(arm))
+    apart = held.clearances(sample_postures(arm))
     for name, _ in held.obstacles:
         columns = [k for k, pair in enumerate(held.pairs) if pair.other is None and pair.name == name]
         if columns and (apart[:, columns].min(axis=1) < 0).all():
             hint = "is the base's z right?" if name.startswith("floor") else "does the arm stand in it?"
-            raise RobotFileError(f"{where}: {name} is hit in every posture: {hint}", file=where, keep_out=name)
+            raise RobotFileError(f"{source}: {name} is hit in every posture: {hint}", file=source, keep_out=name)

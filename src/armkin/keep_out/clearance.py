@@ -56,26 +56,26 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
     (np.float64(-47.505), 'q3', 'table')
     """
     values = as_joints(arm, q)
-    whole, full = whole_arm(arm, values.reshape(-1, arm.n))
+    full_arm, full = whole_arm(arm, values.reshape(-1, arm.n))
     lead = values.shape[:-1]
-    if not whole.keep_out:
+    if not full_arm.keep_out:
         nothing = np.full(lead, "", dtype="<U1")
         return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], nothing[()], nothing[()])
-    held = _guard(whole)
-    mm, which = held.least(full)
-    return named_clearance(whole, mm, which, lead)
+    held = _guard(full_arm)
+    mm, pairs = held.least_clearances(full)
+    return named_clearance(full_arm, mm, pairs, lead)
 
 
 def named_clearance(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
     """Clearances (N,) of pairs (N,) with their names, in the shape of a batch."""
     held = _guard(arm)
-    bodies, others = (np.array([held.pair_names(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
-    return Clearance(mm.reshape(lead)[()], bodies[pairs].reshape(lead)[()], others[pairs].reshape(lead)[()])
+    bodies, partners = (np.array([held.pair_names(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
+    return Clearance(mm.reshape(lead)[()], bodies[pairs].reshape(lead)[()], partners[pairs].reshape(lead)[()])
 
 
-def least(arm: Arm, q: Array) -> Array:
+def least_clearances(arm: Arm, q: Array) -> Array:
     """Least clearances and the numbers of their pairs of an arm with keep-outs: q (N, n) -> (N, 2)."""
-    return np.stack(_guard(arm).least(q), axis=1)
+    return np.stack(_guard(arm).least_clearances(q), axis=1)
 
 
 def whole_arm(arm: Arm, q: Array) -> tuple[Arm, Array]:
@@ -86,27 +86,27 @@ def whole_arm(arm: Arm, q: Array) -> tuple[Arm, Array]:
     return arm, q
 
 
-def clear(arm: Arm, q: Array) -> NDArray[np.bool_]:
+def hits_nothing(arm: Arm, q: Array) -> NDArray[np.bool_]:
     """Which postures hit nothing: q (..., n) [rad | mm] -> (...,); a row of nan is none."""
-    whole, full = whole_arm(arm, q.reshape(-1, arm.n))
+    full_arm, full = whole_arm(arm, q.reshape(-1, arm.n))
     free: NDArray[np.bool_] = np.asarray(np.isfinite(full).all(axis=1))
-    if whole.keep_out:
-        free[free] = _guard(whole).least(full[free])[0] >= 0.0
+    if full_arm.keep_out:
+        free[free] = _guard(full_arm).least_clearances(full[free])[0] >= 0.0
     return free.reshape(q.shape[:-1])
 
 
 def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
     """Of each posture (N, n) the least clearance [mm] (None: nothing counts) and its hits, the deepest first."""
-    whole, full = whole_arm(arm, q)
-    held = _guard(whole)
-    found = []
+    full_arm, full = whole_arm(arm, q)
+    held = _guard(full_arm)
+    answers = []
     for row in held.clearances(full):
         deep = [k for k in np.argsort(row, kind="stable") if row[k] < 0]
         hit: list[Hit] = [
             {"body": held.pair_names(k)[0], "with": held.pair_names(k)[1], "depth_mm": float(-row[k])} for k in deep
         ]
-        found.append((float(row.min()) if len(row) else None, hit))
-    return found
+        answers.append((float(row.min()) if len(row) else None, hit))
+    return answers
 
 
 def hits_text(hits: list[Hit]) -> str:
@@ -115,21 +115,21 @@ def hits_text(hits: list[Hit]) -> str:
     >>> hits_text([{"body": "q3", "with": "table", "depth_mm": 12.345}])
     'hits table by 12.3 mm (q3)'
     """
-    words = [f"{hit['with']} by {_size(hit['depth_mm'])} ({hit['body']})" for hit in hits]
+    words = [f"{hit['with']} by {_size_text(hit['depth_mm'])} ({hit['body']})" for hit in hits]
     return f"hits {', '.join(words)}" if words else ""
 
 
-def _size(mm: float) -> str:
+def _size_text(mm: float) -> str:
     return f"{mm:.1f} mm" if mm >= 0.05 else "less than 0.1 mm"
 
 
 def assumed_radii(arm: Arm) -> list[tuple[str, float]]:
     """Bodies whose radius no file states, and the radius [mm] that is taken: none for an arm without keep-outs."""
-    whole = whole_arm(arm, np.empty((0, arm.n)))[0]
-    if not whole.keep_out:
+    full_arm = whole_arm(arm, np.empty((0, arm.n)))[0]
+    if not full_arm.keep_out:
         return []
-    form = _guard(whole).bodies
-    return [(name, float(r)) for name, r, so in zip(form.names, form.radius, form.assumed, strict=True) if so]
+    form = _guard(full_arm).bodies
+    return [(name, float(r)) for name, r, taken in zip(form.names, form.radius, form.assumed, strict=True) if taken]
 
 
 def _guard(arm: Arm) -> Guard:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armkin.keep_out.body_pairs import Guard
 
 
-def levers(guard: Guard, out: Array) -> Array:
+def levers(guard: Guard, slide_out: Array) -> Array:
     """Of every pair how far its bodies come nearer, at most, for a unit of each joint: (n, pairs) [mm/rad, mm/mm].
 
     out: (n,) [mm] how far a slide is out at most during the motion. Seen from the earlier body (an obstacle: from
@@ -21,30 +21,30 @@ def levers(guard: Guard, out: Array) -> Array:
     the axis counts.
     """
     arm, form = guard.arm, guard.bodies
-    found = np.zeros((arm.n, len(guard.pairs)))
-    of_body = {body: _body_levers(guard, body, out) for body in {pair.body for pair in guard.pairs}}
+    by_pair = np.zeros((arm.n, len(guard.pairs)))
+    of_body = {body: _body_levers(guard, body, slide_out) for body in {pair.body for pair in guard.pairs}}
     for k, pair in enumerate(guard.pairs):
-        found[pair.other or 0 :, k] = of_body[pair.body][pair.other or 0 :]
+        by_pair[pair.other or 0 :, k] = of_body[pair.body][pair.other or 0 :]
         if pair.other and (form.slide & (form.owner == pair.other)).any():
-            found[pair.other - 1, k] = 1.0  # the earlier body's slide grows, seen from its own end
-    return found * np.abs(arm.ratio)[:, None]
+            by_pair[pair.other - 1, k] = 1.0  # the earlier body's slide grows, seen from its own end
+    return by_pair * np.abs(arm.ratio)[:, None]
 
 
-def _body_levers(guard: Guard, body: int, out: Array) -> Array:
+def _body_levers(guard: Guard, body: int, slide_out: Array) -> Array:
     """Levers of a body on every axis: (n,); 0 on those behind it."""
     arm, form = guard.arm, guard.bodies
-    own = form.owner == body
-    ends = np.concatenate([form.end[own], form.begin[own & ~form.slide]])
+    is_own = form.owner == body
+    ends = np.concatenate([form.end[is_own], form.begin[is_own & ~form.slide]])
     across, far = float(np.hypot(ends[:, 0], ends[:, 1]).max()), float(np.linalg.norm(ends, axis=1).max())
-    found = np.zeros(arm.n)
+    by_axis = np.zeros(arm.n)
     for j in range(body - 1, -1, -1):  # axis j is joint j + 1's: `across` it, and `far` from its origin
-        found[j] = 1.0 if arm.prismatic[j] else across
+        by_axis[j] = 1.0 if arm.prismatic[j] else across
         if arm.prismatic[j]:
-            far += out[j] * abs(float(arm.ratio[j]))
-        if j == body - 1 and (own & form.slide).any():  # where a slide begins stands before its motion
-            starts = form.begin[own & form.slide]
+            far += slide_out[j] * abs(float(arm.ratio[j]))
+        if j == body - 1 and (is_own & form.slide).any():  # where a slide begins stands before its motion
+            starts = form.begin[is_own & form.slide]
             far = max(far, float(np.linalg.norm(starts, axis=1).max()))
         shift = arm.link[j][:3, 3]
         across = float(np.hypot(shift[0], shift[1])) + far
         far += float(np.linalg.norm(shift))
-    return found
+    return by_axis

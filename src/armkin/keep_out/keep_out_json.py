@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.forward import frames
-from armkin.keep_out.bodies import ends
+from armkin.keep_out.bodies import segment_ends
 from armkin.keep_out.body_pairs import guard
 from armkin.keep_out.clearance import hits
 from armkin.robot_file.keep_out_keys import names
@@ -16,19 +16,21 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def report(arm: Arm) -> dict[str, Any]:
+def keep_out_fields(arm: Arm) -> dict[str, Any]:
     """Bodies with their segments in the frames that they move with, pairs left out, hits at home."""
     held = guard(arm)
     form = held.bodies
     home = arm.home[None]
-    placed, begin, end = frames(arm, home)[0], *ends(arm, home)
+    placed, begin, end = frames(arm, home)[0], *segment_ends(arm, home)
     bodies = []
     for k, name in enumerate(form.names):
         T = placed[k]  # base, then every joint's frame
         segments: list[dict[str, Any]] = []
         for s in np.flatnonzero(form.owner == k):
-            both = [(T[:3, :3].T @ (point[:, s, 0] - T[:3, 3]) + 0.0).tolist() for point in (begin, end)]
-            segments.append({"from": both[0], "to": both[1], **({"slide": True} if form.slide[s] else {})})
+            ends_in_frame = [(T[:3, :3].T @ (point[:, s, 0] - T[:3, 3]) + 0.0).tolist() for point in (begin, end)]
+            segments.append(
+                {"from": ends_in_frame[0], "to": ends_in_frame[1], **({"slide": True} if form.slide[s] else {})}
+            )
         radius, assumed = float(form.radius[k]), bool(form.assumed[k])
         bodies.append({"name": name, "radius_mm": radius, "assumed": assumed, "segments": segments})
     [(_, at_home)] = hits(arm, home)

@@ -51,7 +51,7 @@ def arm_in_scene(file: RobotFile, scene: Scene | None = None, tool: Sequence[flo
     """The arm of a robot file and a scene. Raises RobotFileError if a keep-out is hit in every posture."""
     arm = build(file, scene, tool)
     if arm.keep_out:
-        from armkin.keep_out.body_pairs import check
+        from armkin.keep_out.body_pairs import check_keep_out
 
-        check(arm)
+        check_keep_out(arm)
     return arm

@@ -46,14 +46,14 @@ class Cubics:
     @cached_property
     def _sums(self) -> Array:
         """Variation from the beginning to every cell's end: (cells + 1, n)."""
-        each = np.abs(np.diff(self.points, axis=0)).sum(axis=0)
-        return np.concatenate([np.zeros((1, each.shape[1])), np.cumsum(each, axis=0)])
+        cell_lengths = np.abs(np.diff(self.points, axis=0)).sum(axis=0)
+        return np.concatenate([np.zeros((1, cell_lengths.shape[1])), np.cumsum(cell_lengths, axis=0)])
 
     def joints_at(self, place: Array) -> Array:
         """Joint values (P, n) at places (P,)."""
         cell = np.clip(place.astype(int), 0, self.cells - 1)
         share = place - cell
-        return self._polar(cell, share, share, share)
+        return self._polar_form(cell, share, share, share)
 
     def variation(self, begin: Array, end: Array) -> Array:
         """Bounds of the ways that the joints go between places: (P, n)."""
@@ -61,20 +61,20 @@ class Cubics:
         last = np.clip(np.ceil(end).astype(int) - 1, 0, self.cells - 1)
         low, high = begin - first, end - last
         same = first == last
-        found = self._part(first, low, np.where(same, high, 1.0))
+        lengths = self._part_lengths(first, low, np.where(same, high, 1.0))
         if (~same).any():
             between = self._sums[last] - self._sums[np.minimum(first + 1, last)]
-            found += np.where(same[:, None], 0.0, between + self._part(last, np.zeros_like(high), high))
-        return found
+            lengths += np.where(same[:, None], 0.0, between + self._part_lengths(last, np.zeros_like(high), high))
+        return lengths
 
-    def _part(self, cell: Array, low: Array, high: Array) -> Array:
+    def _part_lengths(self, cell: Array, low: Array, high: Array) -> Array:
         """Length of the control polygon of a cell's part, joint by joint: (P, n)."""
         a, b = (low, high)
-        corners = [self._polar(cell, *three) for three in ((a, a, a), (a, a, b), (a, b, b), (b, b, b))]
-        found: Array = np.abs(np.diff(corners, axis=0)).sum(axis=0)
-        return found
+        corners = [self._polar_form(cell, *three) for three in ((a, a, a), (a, a, b), (a, b, b), (b, b, b))]
+        lengths: Array = np.abs(np.diff(corners, axis=0)).sum(axis=0)
+        return lengths
 
-    def _polar(self, cell: Array, *shares: Array) -> Array:
+    def _polar_form(self, cell: Array, *shares: Array) -> Array:
         """The polar form of a cell's cubic: three equal shares give its point."""
         points = self.points[:, cell]
         for share in shares:

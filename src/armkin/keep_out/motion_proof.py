@@ -49,7 +49,7 @@ class Proof:
     postures: int
 
 
-def prove(guard: Guard, way: Way, *, tight: bool = False, ignored_pairs: tuple[int, ...] | None = None) -> Proof:
+def prove_motion(guard: Guard, way: Way, *, tight: bool = False, ignored_pairs: tuple[int, ...] | None = None) -> Proof:
     """Prove a motion free, or find its first hit.
 
     tight: look on until the bound of the clearance is near the least that was seen. ignored_pairs: those that may be
@@ -59,8 +59,8 @@ def prove(guard: Guard, way: Way, *, tight: bool = False, ignored_pairs: tuple[i
         return Proof(True, 0.0, None, np.inf, (), 0)
     places = np.unique(np.round(np.linspace(0.0, way.cells, min(way.cells, _FIRST) + 1)))
     q = way.joints_at(places)
-    out = np.abs(q).max(axis=0) + way.variation(np.zeros(1), np.array([float(way.cells)]))[0]
-    lever = levers(guard, out)
+    slide_out = np.abs(q).max(axis=0) + way.variation(np.zeros(1), np.array([float(way.cells)]))[0]
+    lever = levers(guard, slide_out)
     apart = guard.clearances(q)
     start = apart[0] < 0.0
     if ignored_pairs is not None:
@@ -71,9 +71,9 @@ def prove(guard: Guard, way: Way, *, tight: bool = False, ignored_pairs: tuple[i
         if not len(middle):
             return round_.result()
         q = way.joints_at(middle)
-        where = np.searchsorted(places, middle)
-        places = np.insert(places, where, middle)
-        apart = np.insert(apart, where, guard.clearances(q), axis=0)
+        positions = np.searchsorted(places, middle)
+        places = np.insert(places, positions, middle)
+        apart = np.insert(apart, positions, guard.clearances(q), axis=0)
 
 
 def hit_samples(guard: Guard, q: Array) -> NDArray[np.bool_]:
@@ -84,18 +84,18 @@ def hit_samples(guard: Guard, q: Array) -> NDArray[np.bool_]:
         return hit
     gone = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(np.abs(np.diff(q, axis=0)), axis=0)])
     lever = levers(guard, np.abs(q).max(axis=0))
-    known = np.arange(0, count, _STRIDES[0])
-    known = np.append(known, count - 1) if known[-1] < count - 1 else known
-    apart = guard.clearances(q[known])
+    samples = np.arange(0, count, _STRIDES[0])
+    samples = np.append(samples, count - 1) if samples[-1] < count - 1 else samples
+    apart = guard.clearances(q[samples])
     for stride in (*_STRIDES[1:], 0):
-        hit[known] = (apart < 0).any(axis=1)
-        free = (apart[:-1] + apart[1:] >= (gone[known[1:]] - gone[known[:-1]]) @ lever).all(axis=1)
-        rows = np.flatnonzero(~free & (np.diff(known) > 1))
+        hit[samples] = (apart < 0).any(axis=1)
+        free = (apart[:-1] + apart[1:] >= (gone[samples[1:]] - gone[samples[:-1]]) @ lever).all(axis=1)
+        rows = np.flatnonzero(~free & (np.diff(samples) > 1))
         if not stride or not len(rows):
             break
-        more = np.concatenate([np.arange(known[k] + stride, known[k + 1], stride) for k in rows])
-        where = np.searchsorted(known, more)
-        known, apart = np.insert(known, where, more), np.insert(apart, where, guard.clearances(q[more]), axis=0)
+        added = np.concatenate([np.arange(samples[k] + stride, samples[k + 1], stride) for k in rows])
+        at = np.searchsorted(samples, added)
+        samples, apart = np.insert(samples, at, added), np.insert(apart, at, guard.clearances(q[added]), axis=0)
     return hit
 
 
@@ -107,8 +107,8 @@ class _Round:
         self.bound = (clearances[:-1] + clearances[1:] - moved) / 2
         best = np.maximum.accumulate(clearances, axis=0)
         least = np.where(start & (best < 0.0), best - STEP, 0.0)  # what a pair has to keep from here on
-        here = np.concatenate([least[:1], least[:-1]])
-        bad = (clearances < here).any(axis=1)
+        required = np.concatenate([least[:1], least[:-1]])
+        bad = (clearances < required).any(axis=1)
         self.hit = int(np.argmax(bad)) if bad.any() else len(places)  # the first place that is one
         self.open: NDArray[np.bool_] = np.asarray((self.bound < least[:-1]).any(axis=1))
         self.open[self.hit :] = False
@@ -122,13 +122,13 @@ class _Round:
         """Places between, of the intervals that are still open; none when all is known."""
         rows = np.flatnonzero(self.open)
         if tight and not len(rows) and self.hit == self.stuck == len(self.places):
-            others = np.where(self.start, np.inf, self.bound).min(axis=1, initial=np.inf)
+            bounds = np.where(self.start, np.inf, self.bound).min(axis=1, initial=np.inf)
             seen = float(np.where(self.start, np.inf, self.clearances).min(initial=np.inf))
-            rows = np.flatnonzero(others < seen - max(_ROUGH[0], _ROUGH[1] * seen)) if np.isfinite(seen) else rows
+            rows = np.flatnonzero(bounds < seen - max(_ROUGH[0], _ROUGH[1] * seen)) if np.isfinite(seen) else rows
         rows = rows[:_AT_ONCE]
         low, high = self.places[rows], self.places[rows + 1]
-        whole = np.round((low + high) / 2)  # a cell's end, where several cells are between
-        middle = np.where(high - low > 1.0, np.clip(whole, np.floor(low) + 1, np.ceil(high) - 1), (low + high) / 2)
+        cell_end = np.round((low + high) / 2)  # a cell's end, where several cells are between
+        middle = np.where(high - low > 1.0, np.clip(cell_end, np.floor(low) + 1, np.ceil(high) - 1), (low + high) / 2)
         return np.asarray(middle[(middle > low) & (middle < high)])
 
     def result(self) -> Proof:
@@ -137,8 +137,8 @@ class _Round:
         count = len(self.places)
         if self.stuck < count:
             pair = int(np.argmin(self.lacking[self.stuck]))
-            found = float(self.clearances[self.stuck : self.stuck + 2, pair].min())
-            return Proof(False, float(self.places[self.stuck]), pair, found, escaping, count)
+            least_clearance = float(self.clearances[self.stuck : self.stuck + 2, pair].min())
+            return Proof(False, float(self.places[self.stuck]), pair, least_clearance, escaping, count)
         if self.hit < count:
             pair = int(np.argmin(self.clearances[self.hit]))
             return Proof(

@@ -17,7 +17,7 @@ from armkin.forward import frames as joint_frames
 from armkin.keep_out.clearance import hits, hits_text
 from armkin.model.limits import outside
 from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat, picture, renderer, space, true_proportions
-from armkin.reachability.volume import motion
+from armkin.reachability.volume import tip_freedoms
 from armkin.view.skeleton import Skeleton, skeleton
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ class _Drawing:
         self.robot, self.figure = arm, figure
         ways = [] if track is None else [track]
         self.points = np.concatenate([*(bone.path for bone in bones), *ways, arm.base[None, :3, 3]])
-        normal, _ = motion(arm)
+        normal, _ = tip_freedoms(arm)
         self.planar = view is None and normal is not None and bool(abs(normal[2]) > 1 - 1e-9)
         self.size = float(np.ptp(self.points, axis=0).max()) or arm.reach
         if self.planar:

@@ -24,7 +24,7 @@ def plot_reach(reach: Reach, out: str) -> None:
     grid = reach.grid
     share = reach.columns["share"]
     fullest = _fullest(grid.rings[:, 1], share.reshape(-1, grid.azimuths).sum(axis=1))
-    side, slab = voxels.section(grid), voxels.level(grid, fullest)
+    side, slab = voxels.section_layer(grid), voxels.level_layer(grid, fullest)
     with picture(out, 11.4, 6.6) as figure:
         for column, (name, label) in enumerate(_SHOWN):
             values = np.where(share > 0, reach.columns[name], np.nan)

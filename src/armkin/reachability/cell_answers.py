@@ -25,7 +25,7 @@ from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.solve import ik
 from armkin.model.limits import SLACK
 from armkin.motors import joints_per_pulse
-from armkin.reachability.dexterity import measure
+from armkin.reachability.dexterity import measure_function
 from armkin.reachability.reach_cells import STRAIGHT, Grid
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Question:
     measures: bool = True
 
     @cached_property
-    def arcs(self) -> bool:
+    def by_arcs(self) -> bool:
         """Whether joint 1's turn is an arc."""
         arm = self.grid.arm
         plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and not arm.keep_out
@@ -55,7 +55,7 @@ class Question:
         """Whether the last joint's turn is an arc, too: the tool's z axis lies on that joint's axis."""
         arm, end = self.grid.arm, self.grid.arm.link[-1]
         on_axis = np.abs(end[:2, 3]).max() <= STRAIGHT * arm.reach and np.abs(end[:2, 2]).max() <= STRAIGHT
-        return self.arcs and self.grid.task.orientation == "full" and not arm.prismatic[-1] and bool(on_axis)
+        return self.by_arcs and self.grid.task.orientation == "full" and not arm.prismatic[-1] and bool(on_axis)
 
     @cached_property
     def round_azimuths(self) -> bool:
@@ -63,7 +63,7 @@ class Question:
 
         Not with measures, as its distance to the limits differs.
         """
-        return self.arcs and not self.measures and whole_turn(self.grid.arm, 0)
+        return self.by_arcs and not self.measures and whole_turn(self.grid.arm, 0)
 
     @cached_property
     def round_rolls(self) -> bool:
@@ -74,36 +74,36 @@ class Question:
     def solves_a_ring(self) -> int:
         """Poses that a ring gives to the solver."""
         g = self.grid
-        return (1 if self.arcs else g.azimuths) * g.directions_count * (1 if self.roll_arcs else g.rolls_count)
+        return (1 if self.by_arcs else g.azimuths) * g.directions_count * (1 if self.roll_arcs else g.rolls_count)
 
     @cached_property
     def roll_words(self) -> Words:
         """Bits of an arc of rolls by length and first index: (L + 1, L, W)."""
-        return packed(_arcs(self.grid.rolls_count if self.roll_arcs and not self.round_rolls else 1))
+        return pack_bits(_all_arcs(self.grid.rolls_count if self.roll_arcs and not self.round_rolls else 1))
 
     @property
     def turns(self) -> int:
         """Azimuths that are told apart: M of them where joint 1's turn is an arc."""
-        return self.grid.azimuths if self.arcs and not self.round_azimuths else 1
+        return self.grid.azimuths if self.by_arcs and not self.round_azimuths else 1
 
 
-def answered(question: Question, rings: Array) -> dict[str, Array]:
+def cell_columns(question: Question, rings: Array) -> dict[str, Array]:
     """The columns of some rings (R, 2), M rows each, besides x, y, z."""
     grid, M = question.grid, question.grid.azimuths
-    count = question.solves_a_ring // (1 if question.arcs else M)
-    if question.arcs:
-        at = np.repeat(rings, count, axis=0)
-        azimuth = np.zeros(len(at))
+    count = question.solves_a_ring // (1 if question.by_arcs else M)
+    if question.by_arcs:
+        ring = np.repeat(rings, count, axis=0)
+        azimuth = np.zeros(len(ring))
     else:
-        at = np.repeat(rings, M * count, axis=0)
+        ring = np.repeat(rings, M * count, axis=0)
         azimuth = np.tile(np.repeat(np.arange(M) * (TURN / M), count), len(rings))
-    each = np.arange(len(at)) % count
+    orientation = np.arange(len(ring)) % count
     L = 1 if question.roll_arcs else grid.rolls_count
-    roll = np.asarray((each % L) * (TURN / grid.rolls_count), dtype=float)
-    target = grid.targets(at, azimuth, each // L, roll)
-    found = _Answers(question, target, at, each // L).columns(count)
+    roll = np.asarray((orientation % L) * (TURN / grid.rolls_count), dtype=float)
+    target = grid.targets(ring, azimuth, orientation // L, roll)
+    columns = _Answers(question, target, ring, orientation // L).columns(count)
     cells = len(rings) * M
-    return {name: values.reshape(cells) for name, values in found.items()}
+    return {name: values.reshape(cells) for name, values in columns.items()}
 
 
 class _Edges(NamedTuple):
@@ -126,24 +126,24 @@ class _Answers:
         self.rolls: Words = np.full((*s.valid.shape, 1), np.uint64(1))
         self.first: NDArray[Any] = np.zeros(s.valid.shape, np.intp)  # (S, B) of azimuths
         self.length: NDArray[Any] = legal.astype(np.intp)
-        if question.arcs:
+        if question.by_arcs:
             last = self.arm.n - 1 if question.roll_arcs else self.arm.n
             inner = s.valid & cells_inside(self.arm, s.q, range(1, last))
-            self.first, length = arc(self.arm, s.q[:, :, 0], 0, question.turns, 1)
+            self.first, length = legal_arc(self.arm, s.q[:, :, 0], 0, question.turns, 1)
             self.length = np.where(inner, length, 0)
             if question.roll_arcs:
                 rolls = question.roll_words
                 sense = 1 if self.arm.link[-1][2, 2] > 0 else -1
-                first, length = arc(self.arm, s.q[:, :, -1], -1, rolls.shape[1], sense)
+                first, length = legal_arc(self.arm, s.q[:, :, -1], -1, rolls.shape[1], sense)
                 self.rolls = rolls[length, first]
 
     def columns(self, orientations: int) -> dict[str, Array]:
         """Columns (R * M,), so many solves a ring (or a cell)."""
-        M = self.grid.azimuths if self.question.arcs else 1
+        M = self.grid.azimuths if self.question.by_arcs else 1
         counts, edges = self._counts(), self._edges(M)
         for values in counts.values():
             values[edges.rows] = 0.0
-        sums = {name: self._summed(values, orientations, M) for name, values in counts.items()}
+        sums = {name: self._sum_over_solves(values, orientations, M) for name, values in counts.items()}
         ring = edges.rows // orientations
         for name, values in edges.counts.items():
             np.add.at(sums[name], ring, values)
@@ -172,20 +172,24 @@ class _Answers:
         once: Words = np.zeros((S, P, self.rolls.shape[-1]), np.uint64)
         twice: Words = np.zeros_like(once)
         legal = np.zeros((S, P))
-        each = _bits(self.rolls)
+        roll_counts = _count_bits(self.rolls)
         for b in range(self.first.shape[1]):
             after = self.places - self.first[:, b, None]
             after += (after < 0) * self.question.turns
-            on = after < self.length[:, b, None]
-            legal += on * each[:, b, None]
-            one = -on.astype(np.int64).view(np.uint64)[:, :, None] & self.rolls[:, b, None, :]
-            twice |= once & one
-            once |= one
+            on_arc = after < self.length[:, b, None]
+            legal += on_arc * roll_counts[:, b, None]
+            rolls_there = -on_arc.astype(np.int64).view(np.uint64)[:, :, None] & self.rolls[:, b, None, :]
+            twice |= once & rolls_there
+            once |= rolls_there
         anywhere = np.any(self.valid, axis=1, keepdims=True) * float(self.count)
-        found = {"reached": weight * _bits(once), "single": weight * _bits(once & ~twice), "legal": weight * legal}
-        return found | {"anywhere": anywhere}
+        counts = {
+            "reached": weight * _count_bits(once),
+            "single": weight * _count_bits(once & ~twice),
+            "legal": weight * legal,
+        }
+        return counts | {"anywhere": anywhere}
 
-    def _summed(self, values: Array, orientations: int, M: int) -> Array:
+    def _sum_over_solves(self, values: Array, orientations: int, M: int) -> Array:
         """Sums over the solves of a cell: (S, P), each from its place to the next one, or (S, 1) -> (R, M)."""
         R = len(values) // orientations
         if not values.shape[1]:  # no solve has a branch at all
@@ -202,48 +206,48 @@ class _Answers:
     def _edges(self, M: int) -> _Edges:
         """Targets on an edge by arcs: merging branches, free joints. All their poses are asked."""
         rows = np.zeros(0, np.intp)
-        if self.question.arcs:
+        if self.question.by_arcs:
             rows = np.flatnonzero((self.s.status == Status.BOUNDARY) | (self.s.status == Status.SINGULAR))
         counts = {name: np.zeros((len(rows), M)) for name in ("reached", "single", "legal", "anywhere")}
         for k, row in enumerate(rows.tolist()):
             s = self._all_solutions(row)
             legal = s.within_limits.sum(axis=1)
-            for name, found in zip(counts, (legal > 0, legal == 1, legal, s.valid.any(axis=1)), strict=True):
-                counts[name][k] = found.reshape(M, self.count).sum(axis=1)
+            for name, flags in zip(counts, (legal > 0, legal == 1, legal, s.valid.any(axis=1)), strict=True):
+                counts[name][k] = flags.reshape(M, self.count).sum(axis=1)
         return _Edges(rows, counts)
 
     def _all_solutions(self, row: int) -> Solutions:
         """All poses of one solve, azimuth by azimuth."""
         M, L = self.grid.azimuths, self.count
         azimuth, turn = np.divmod(np.arange(M * L), L)
-        each = np.full(M * L, row)
+        rows = np.full(M * L, row)
         roll = turn * (TURN / L)
         if not self.question.roll_arcs and self.grid.rolls_count > 1:
             roll = np.full(
                 M * L, (row % self.question.solves_a_ring % self.grid.rolls_count) * (TURN / self.grid.rolls_count)
             )
-        return ik(self.arm, self.grid.targets(self.azimuth[each], azimuth * (TURN / M), self.direction[each], roll))
+        return ik(self.arm, self.grid.targets(self.azimuth[rows], azimuth * (TURN / M), self.direction[rows], roll))
 
     def _measures(self, orientations: int, M: int) -> dict[str, Array]:
         """Best manipulability and limit margin, least step error over legal answers; nan where there is none."""
         after = (np.arange(self.question.turns) - self.first[:, :, None]) % self.question.turns
         rolls = np.asarray(np.any(self.rolls != 0, axis=2, keepdims=True))
         legal = (after < self.length[:, :, None]) & rolls  # (S, B, M or 1)
-        some: Bool = np.asarray(legal.any(axis=2))
-        q = self.s.q[some]
-        found = {
+        any_turn: Bool = np.asarray(legal.any(axis=2))
+        q = self.s.q[any_turn]
+        measures = {
             "manipulability": _manipulability(self.arm, q)[:, None],
             "limit_margin": self._margins(q, legal.shape[2]),
             "step_error_mm": -_step_error(self.arm, q)[:, None],
         }
-        for name, values in found.items():
-            each = np.full(legal.shape, -np.inf)
-            each[some] = np.where(np.isnan(values), -np.inf, values)
-            best = np.where(legal, each, -np.inf).max(axis=1, initial=-np.inf)
+        for name, values in measures.items():
+            legal_values = np.full(legal.shape, -np.inf)
+            legal_values[any_turn] = np.where(np.isnan(values), -np.inf, values)
+            best = np.where(legal, legal_values, -np.inf).max(axis=1, initial=-np.inf)
             best = best.reshape(-1, orientations, best.shape[1]).max(axis=1)
             best = np.where(np.isfinite(best), np.abs(best) if name == "step_error_mm" else best, np.nan)
-            found[name] = np.asarray(np.broadcast_to(best, (len(best), M)))
-        return found
+            measures[name] = np.asarray(np.broadcast_to(best, (len(best), M)))
+        return measures
 
     def _margins(self, q: Array, M: int) -> Array:
         """Least distance to a limit as a share of the range, of the best copies: (K, M); nan without limits."""
@@ -253,7 +257,7 @@ class _Answers:
             if not (math.isfinite(low) and math.isfinite(high)) or low == high:
                 continue
             away = q[:, j, None] - 0.5 * (low + high)
-            if j == 0 and self.question.arcs:
+            if j == 0 and self.question.by_arcs:
                 away = away + np.arange(M) * (TURN / M)
             if not self.arm.prismatic[j]:
                 step = TURN / self.count if j == self.arm.n - 1 and self.question.roll_arcs else TURN
@@ -294,7 +298,7 @@ def some_copy_legal(arm: Arm, value: Array, joint: int) -> Bool:
     return np.asarray((value >= low) & (value <= high))
 
 
-def arc(arm: Arm, q: Array, joint: int, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def legal_arc(arm: Arm, q: Array, joint: int, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The turns i 2 pi / count at which a joint, q + sense times the turn, is within limits: the first, how many."""
     low, high = float(arm.lower[joint]) - SLACK, float(arm.upper[joint]) + SLACK
     if whole_turn(arm, joint):
@@ -313,22 +317,22 @@ def whole_turn(arm: Arm, joint: int) -> bool:
     return not (math.isfinite(low) and math.isfinite(high)) or high - low + 2 * SLACK >= TURN
 
 
-def _arcs(count: int) -> Bool:
+def _all_arcs(count: int) -> Bool:
     """All arcs of a circle of so many places: (length, first, place)."""
     length, first, place = np.ogrid[: count + 1, :count, :count]
     return np.asarray((place - first) % count < length)
 
 
-def packed(bits: Bool) -> Words:
+def pack_bits(bits: Bool) -> Words:
     """Flags (..., L) as words of 64: (..., W)."""
     L = bits.shape[-1]
-    whole = np.zeros((*bits.shape[:-1], -(-L // 64) * 64), bool)
-    whole[..., :L] = bits
-    packed = np.packbits(whole, axis=-1, bitorder="little")
+    padded = np.zeros((*bits.shape[:-1], -(-L // 64) * 64), bool)
+    padded[..., :L] = bits
+    packed = np.packbits(padded, axis=-1, bitorder="little")
     return packed.view("<u8").astype(np.uint64)
 
 
-def _bits(words: Words) -> NDArray[np.int64]:
+def _count_bits(words: Words) -> NDArray[np.int64]:
     """How many bits are set in the words of the last axis."""
     if hasattr(np, "bitwise_count"):
         return np.asarray(np.bitwise_count(words).sum(axis=-1, dtype=np.int64))
@@ -341,7 +345,7 @@ _ONES = np.array([bin(i).count("1") for i in range(256)], dtype=np.int64)
 
 def _manipulability(arm: Arm, q: Array) -> Array:
     """See `armkin.reachability.dexterity`."""
-    return measure(arm, "manipulability")(q) if len(q) else np.zeros(0)
+    return measure_function(arm, "manipulability")(q) if len(q) else np.zeros(0)
 
 
 def _step_error(arm: Arm, q: Array) -> Array:

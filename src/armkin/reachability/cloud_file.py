@@ -30,24 +30,24 @@ Write = Callable[[Array, Array, list[Array]], None]
 _ENDS = (".csv", ".npz", ".ply")
 
 
-def check(path: str) -> str:
+def check_cloud(path: str) -> str:
     """The kind of cloud that a file's name asks for."""
     return ending(path, "a cloud is", _ENDS)
 
 
 @contextmanager
-def cloud(path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+def open_cloud(path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
     """The function that writes a chunk: joints (N, n) [rad | mm], tips (N, 3) [mm], measures (N,) each.
 
     count: samples in all. Raises FileError, after which there is no file.
     """
-    writer = {".csv": _csv, ".npz": _npz, ".ply": _ply}[check(path)]
+    writer = {".csv": _csv_writer, ".npz": _npz_writer, ".ply": _ply_writer}[check_cloud(path)]
     with write_whole(path, "wb") as file, writer(file, path, arm, count, measures) as write:
         yield write
 
 
 @contextmanager
-def _csv(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+def _csv_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
     heading = [*arm.joint_names, "x", "y", "z", *measures]
     file.write(f"{','.join(heading)}\n".encode())
     row = ",".join(["%.10g"] * len(heading)) + "\n"
@@ -62,7 +62,7 @@ def _csv(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[st
 
 
 @contextmanager
-def _ply(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+def _ply_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
     lines = ["ply", "format binary_little_endian 1.0", f"comment {arm.name}, tip positions in mm, by armkin"]
     lines += [f"element vertex {count}", *(f"property float {name}" for name in ("x", "y", "z", *measures))]
     # The header is ASCII and a line of it a line, whatever an arm is called.
@@ -75,7 +75,7 @@ def _ply(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[st
 
 
 @contextmanager
-def _npz(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+def _npz_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
     # A zip file takes one member after the other: each array waits in a nameless file beside the target.
     folder = os.path.dirname(os.path.realpath(path))
     shapes = {"joints": (count, arm.n), "position": (count, 3), **dict.fromkeys(measures, (count,))}

@@ -11,7 +11,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian
 from armkin.motors import joints_per_pulse
-from armkin.reachability.volume import motion
+from armkin.reachability.volume import tip_freedoms
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -20,7 +20,7 @@ _MOST_MOTORS = 14  # 8,192 combinations of signs a pose
 MEASURES = ("manipulability", "step_error")
 
 
-def measure(arm: Arm, name: str) -> Callable[[Array], Array]:
+def measure_function(arm: Arm, name: str) -> Callable[[Array], Array]:
     """The function (N, n) [rad | mm] -> (N,) of a measure's name, its constants worked out.
 
     step_error [mm]: how far the tip is off when every motor is half a pulse off, in the worst combination of signs:
@@ -38,13 +38,13 @@ def measure(arm: Arm, name: str) -> Callable[[Array], Array]:
                 most=_MOST_MOTORS,
             )
         half = 0.5 * joints_per_pulse(arm)
-        return lambda q: _worst(jacobian(arm, q)[:, :3] @ half)
-    normal, _ = motion(arm)
+        return lambda q: _longest_sum(jacobian(arm, q)[:, :3] @ half)
+    normal, _ = tip_freedoms(arm)
     basis = np.eye(3) if normal is None else np.linalg.svd(normal[None])[2][1:]
-    return lambda q: _volume(basis @ jacobian(arm, q)[:, :3])
+    return lambda q: _singular_value_product(basis @ jacobian(arm, q)[:, :3])
 
 
-def _volume(J: Array) -> Array:
+def _singular_value_product(J: Array) -> Array:
     """Product of the singular values of J (N, k, n)."""
     k, n = J.shape[1:]
     if k == n:  # no square root, hence no loss of digits at a singular pose
@@ -53,7 +53,7 @@ def _volume(J: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(np.linalg.det(square), 0.0)))
 
 
-def _worst(columns: Array) -> Array:
+def _longest_sum(columns: Array) -> Array:
     """Largest length of a sum of +- the columns of (N, 3, m), all combinations of signs.
 
     The combinations run in the order of a Gray code: each differs from the one before in one sign. The

@@ -36,7 +36,7 @@ def hold_parts(parts: Parts | None, count: int) -> Iterator[None]:
             parts.leave()
 
 
-def tables(
+def chunk_tables(
     engine: Engine,
     work: Callable[[Any, Chunk], tuple[int, Table]],
     job: Any,
@@ -44,23 +44,23 @@ def tables(
     parts: Parts | None,
 ) -> Iterator[tuple[int, Table]]:
     """Number and columns of all chunks, in any order: those that an earlier run has kept, and the others, kept now."""
-    kept: deque[int] = deque()
+    kept_numbers: deque[int] = deque()
 
     def missing_chunks() -> Iterator[Chunk]:
         for chunk in chunks:
             if parts is not None and parts.held and parts.about(chunk.number) is not None:
-                kept.append(chunk.number)
+                kept_numbers.append(chunk.number)
             else:
                 yield chunk
 
-    def read() -> Iterator[tuple[int, Table]]:
-        while parts is not None and kept:
-            number = kept.popleft()
+    def read_kept() -> Iterator[tuple[int, Table]]:
+        while parts is not None and kept_numbers:
+            number = kept_numbers.popleft()
             yield number, npz.decoded(parts.read(number))
 
     for number, columns in in_order(engine, work, job, missing_chunks()):
         if parts is not None and parts.held:
             parts.keep(number, {}, npz.encoded(columns))
         yield number, columns
-        yield from read()
-    yield from read()
+        yield from read_kept()
+    yield from read_kept()

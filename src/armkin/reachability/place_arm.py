@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.keep_out.body_pairs import guard
-from armkin.keep_out.clearance import clear
+from armkin.keep_out.clearance import hits_nothing
 from armkin.model.rotation import rotation_about
 from armkin.model.units import DEGREE
 from armkin.robot_file.scene_file import read
@@ -38,21 +38,22 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
 
     What the arm's bodies keep from each other is the arm's own, wherever it is asked for.
     """
-    own = len(arm.keep_out) - arm.of_scene
-    mine, there, clearance, sha256 = arm.keep_out[:own], list(arm.keep_out[own:]), arm.clearance, arm.scene_sha256
+    count = len(arm.keep_out) - arm.of_scene
+    own, obstacles = arm.keep_out[:count], list(arm.keep_out[count:])
+    clearance, sha256 = arm.clearance, arm.scene_sha256
     if scene is not None:
-        more = read(os.fspath(scene))
-        there, clearance, sha256 = [*there, *more.keep_out], max(clearance, more.clearance), more.sha256
-    if not there:
+        added = read(os.fspath(scene))
+        obstacles, clearance, sha256 = [*obstacles, *added.keep_out], max(clearance, added.clearance), added.sha256
+    if not obstacles:
         return arm, Obstacles()
-    selves = tuple(entry for entry in there if entry.kind == "self")
-    if not any(entry.kind == "self" for entry in mine):
-        mine += selves[:1]
-    still = tuple(entry for entry in there if entry.kind != "self")
-    return replace(arm, keep_out=mine, clearance=clearance, of_scene=0), Obstacles(still, clearance, sha256)
+    selves = tuple(entry for entry in obstacles if entry.kind == "self")
+    if not any(entry.kind == "self" for entry in own):
+        own += selves[:1]
+    still = tuple(entry for entry in obstacles if entry.kind != "self")
+    return replace(arm, keep_out=own, clearance=clearance, of_scene=0), Obstacles(still, clearance, sha256)
 
 
-def free(
+def free_at_place(
     arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float, q: Array
 ) -> NDArray[np.bool_]:
     """Which postures (..., n) of an arm at a place hit nothing of what stands there; nan: none.
@@ -65,7 +66,7 @@ def free(
     begin, end = held.bodies.begin[base].T, held.bodies.end[base].T
     if any((shape.distance(begin, end) < -INSIDE).any() for _, shape in held.obstacles):
         return np.zeros(q.shape[:-1], bool)
-    return clear(stands, q)
+    return hits_nothing(stands, q)
 
 
 @lru_cache(maxsize=4)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FARTHEST = 0.5 * math.pi  # [rad] that a joint turns from one target to the next
 
 
-def ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
+def branch_ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
     """Branches that go all the way: which ones do (B,), and the least and greatest joint values on it (B, n).
 
     s: answers to targets in their order (S, ...); free: (S, B) which hit nothing. Of limits nothing is said.
@@ -32,18 +32,18 @@ def ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
     number = s.branch  # the same along a path
     S, B, n = s.q.shape
     way = np.full((S, max(B, int(number.max(initial=-1)) + 1), n), np.nan)
-    some = s.valid & free & (number >= 0)
+    branch_there = s.valid & free & (number >= 0)
     row = np.broadcast_to(np.arange(S)[:, None], (S, B))
-    way[row[some], number[some]] = s.q[some]
+    way[row[branch_there], number[branch_there]] = s.q[branch_there]
     step = np.diff(way, axis=0)
     turning = ~s.arm.prismatic
     step[:, :, turning] -= TURN * np.rint(step[:, :, turning] / TURN)
     with np.errstate(invalid="ignore"):
-        whole = np.asarray(
+        carries = np.asarray(
             ~np.isnan(way).any(axis=(0, 2)) & ~(np.abs(step[:, :, turning]) >= FARTHEST).any(axis=(0, 2))
         )
     along = np.concatenate([way[:1], way[:1] + np.cumsum(step, axis=0)])
-    return whole, along.min(axis=0), along.max(axis=0)
+    return carries, along.min(axis=0), along.max(axis=0)
 
 
 def some_copy_legal(arm: Arm, low: Array, high: Array, joints: range) -> Bool:
@@ -60,7 +60,7 @@ def some_copy_legal(arm: Arm, low: Array, high: Array, joints: range) -> Bool:
     return inside
 
 
-def arc(arm: Arm, low: Array, high: Array, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def branch_arc(arm: Arm, low: Array, high: Array, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Turns i 2 pi / count by which joint 1's way, from low to high (B,) plus sense times the turn, is within limits.
 
     Returns the first of each arc, and how many.

@@ -23,7 +23,7 @@ def write(places: Sequence[Place], out: str | os.PathLike[str]) -> None:
     """All places as a file of columns: .npz, .parquet, .jsonl or .csv; parts of an unfinished run go."""
     path = os.fspath(out)
     format = format_of(path)
-    table = columns(places)
+    table = place_columns(places)
     with files.write_whole(path, "wb") as file:
         if format.name == "csv":
             file.write((csv_line(list(table)) + "\n").encode())
@@ -31,15 +31,17 @@ def write(places: Sequence[Place], out: str | os.PathLike[str]) -> None:
     Parts(path, {}).remove()
 
 
-def columns(places: Sequence[Place]) -> Table:
+def place_columns(places: Sequence[Place]) -> Table:
     """One row a place: robot, x, y, z [mm], yaw [deg], targets reached, of how many, margin [mm]."""
-    names = tuple(dict.fromkeys(one.arm.name for one in places))
+    names = tuple(dict.fromkeys(place.arm.name for place in places))
     rows = []
-    for one in places:
-        x, y, yaw = (axis.ravel() for axis in np.meshgrid(one.x, one.y, np.degrees(one.yaw).round(9), indexing="ij"))
-        z, of = np.full(x.shape, one.z), np.full(x.shape, one.of)
-        which = np.full(x.shape, names.index(one.arm.name))
-        rows.append([which, x, y, z, yaw, one.reached.ravel(), of, one.margin.ravel()])
-    robot, *rest = (np.concatenate(parts) for parts in zip(*rows, strict=True))
+    for place in places:
+        x, y, yaw = (
+            axis.ravel() for axis in np.meshgrid(place.x, place.y, np.degrees(place.yaw).round(9), indexing="ij")
+        )
+        z, of = np.full(x.shape, place.z), np.full(x.shape, place.of)
+        robots = np.full(x.shape, names.index(place.arm.name))
+        rows.append([robots, x, y, z, yaw, place.reached.ravel(), of, place.margin.ravel()])
+    robot, *numbers = (np.concatenate(parts) for parts in zip(*rows, strict=True))
     named = ("x_mm", "y_mm", "z_mm", "yaw_deg", "reached", "of", "margin_mm")
-    return {"robot": Words(robot, names), **dict(zip(named, rest, strict=True))}
+    return {"robot": Words(robot, names), **dict(zip(named, numbers, strict=True))}

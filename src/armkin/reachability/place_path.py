@@ -46,12 +46,12 @@ def path_of(targets: Any) -> PathFile | None:
     return targets if hasattr(targets, "moves") else None
 
 
-def ways(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
+def ways_of_path(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
     """The task, and the targets of each way that one branch is to carry."""
     from armkin.motion.path_outline import route_targets
 
-    task, found = route_targets(arm, file, STEP * arm.reach)
-    return task, [np.asarray(each) for each in found]
+    task, routes = route_targets(arm, file, STEP * arm.reach)
+    return task, [np.asarray(way) for way in routes]
 
 
 def joint_to_hold(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
@@ -74,7 +74,7 @@ def rates_lacking(arm: Arm) -> str:
     return ""
 
 
-def plan(
+def plan_from_place(
     arm: Arm,
     obstacles: Obstacles,
     index: tuple[int, int, int],

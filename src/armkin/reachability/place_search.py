@@ -170,9 +170,9 @@ def place(
     """
     several = [arms] if not isinstance(arms, Sequence) else list(arms)
     settings = {"area": area, "step": step, "yaw": yaw, "z": z}
-    told = None if progress is None else lambda done, total: progress(done)
+    tell = None if progress is None else lambda done, total: progress(done)
     return place_several(
-        several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), told, solve or ik
+        several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), tell, solve or ik
     )
 
 
@@ -190,36 +190,37 @@ def place_several(
     for name in ("step", "yaw"):
         if not (math.isfinite(settings[name]) and settings[name] > 0):
             raise UsageError(f"{name}: {settings[name]:g}; it must be above 0")
-    paths = [place_path.path_of(some) for some in targets]
-    asked = [_question(arm, some, file, settings, scene) for arm, some, file in zip(arms, targets, paths, strict=True)]
-    asked = [one._replace(solve=solve) for one in asked]
-    grids = [_axes(one, settings["area"], settings["step"]) for one in asked]
-    work_list = _chunks(asked, [axes for axes, _ in grids])
-    parts, done, total = _parts(asked, settings, out), 0, sum(len(chunk.positions) for chunk in work_list)
+    paths = [place_path.path_of(goals) for goals in targets]
+    per_arm = zip(arms, targets, paths, strict=True)
+    questions = [_question(arm, goals, file, settings, scene) for arm, goals, file in per_arm]
+    questions = [question._replace(solve=solve) for question in questions]
+    grids = [_axes(question, settings["area"], settings["step"]) for question in questions]
+    work_list = _chunks(questions, [axes for axes, _ in grids])
+    parts, done, total = _parts(questions, settings, out), 0, sum(len(chunk.positions) for chunk in work_list)
     counts: dict[int, NDArray[np.int64]] = {}
     with kept_chunks.hold_parts(parts, len(work_list)):
-        for number, columns in kept_chunks.tables(engine, work, asked, work_list, parts):
+        for number, columns in kept_chunks.chunk_tables(engine, count_chunk, questions, work_list, parts):
             counts[number] = np.asarray(columns["reached"])
             done += len(work_list[number].positions)
             if progress is not None:
                 progress(done, total)
-    found = []
-    for i, (one, grid, file) in enumerate(zip(asked, grids, paths, strict=True)):
+    places = []
+    for i, (question, grid, file) in enumerate(zip(questions, grids, paths, strict=True)):
         mine = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.question == i])
-        found.append(_result(one, *grid, mine, settings, file))
-    return found
+        places.append(_place_result(question, *grid, mine, settings, file))
+    return places
 
 
 def _chunks(questions: Sequence[Question], grids: Sequence[tuple[Array, Array]]) -> list[Chunk]:
     """All positions of all arms, some at a time."""
     made: list[Chunk] = []
     for i, (question, axes) in enumerate(zip(questions, grids, strict=True)):
-        at = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        made += [Chunk(len(made) + k, i, part) for k, part in enumerate(_blocks(question, at))]
+        positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        made += [Chunk(len(made) + k, i, part) for k, part in enumerate(_position_blocks(question, positions))]
     return made
 
 
-def _result(
+def _place_result(
     question: Question,
     axes: tuple[Array, Array],
     inner: tuple[slice, slice],
@@ -231,45 +232,45 @@ def _result(
     every = counts.reshape(len(axes[0]), len(axes[1]), question.yaws)
     margin, reached = _margins(every == len(question.targets), settings["step"])[inner], every[inner]
     x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(question.yaws) * settings["yaw"]
-    room = _rooms(question, x, y, yaws)
-    best = _best(room, reached, margin)
-    where, none = positions_of(question.task, question.targets), np.zeros((0, question.arm.n))
-    place = Place(question.arm, x, y, yaws, question.z, reached, margin, len(question.targets), best, where, none)
-    return _with_postures(question, place if file is None else _planned(question, place, file, room))
+    room = _limit_rooms(question, x, y, yaws)
+    best = _best_place(room, reached, margin)
+    goals, none = positions_of(question.task, question.targets), np.zeros((0, question.arm.n))
+    place = Place(question.arm, x, y, yaws, question.z, reached, margin, len(question.targets), best, goals, none)
+    return _with_postures(question, place if file is None else _plan_best_places(question, place, file, room))
 
 
 def _with_postures(question: Question, place: Place) -> Place:
     """The same with, for each target reached from the best place, the legal posture that is nearest to home."""
-    at, turn = place.xyz[:2], float(place.yaw[place.best[2]])
-    plan = next((one.plan for one in place.planned if one.index == place.best and one.plan is not None), None)
+    position, turn = place.xyz[:2], float(place.yaw[place.best[2]])
+    plan = next((path.plan for path in place.planned if path.index == place.best and path.plan is not None), None)
     if plan is not None and plan.held:
         question = question._replace(values=tuple(plan.held.values()))
-    one = at_value(question, at, turn)
-    s, legal = free_from(one, at, turn)
+    fixed = at_value(question, position, turn)
+    s, legal = free_from(fixed, position, turn)
     row = np.flatnonzero(legal.any(axis=1))
     q = s.q[row, np.where(legal, s.motion, np.inf)[row].argmin(axis=1)] if len(row) else place.postures
-    if one.full_arm is None:
+    if fixed.full_arm is None:
         return replace(place, postures=np.asarray(q))
-    held = one.full_arm.joints
+    held = fixed.full_arm.joints
     return replace(place, postures=unlock(question.arm, held, q) if len(row) else place.postures, held=held)
 
 
-def _planned(question: Question, place: Place, file: PathFile, room: Room) -> Place:
+def _plan_best_places(question: Question, place: Place, file: PathFile, room: Room) -> Place:
     """The same with the best places planned; one that cannot be planned does not reach all."""
     if why := place_path.rates_lacking(question.arm):
         return replace(place, unplanned=why)
     tried: list[PathFromPlace] = []
     left = place.reached.copy()
-    while left.max() == place.of and len(tried) < TRIES and sum(one.plan is not None for one in tried) < FEW:
-        i, j, k = _best(room, left, place.margin)
-        at = (float(place.x[i]), float(place.y[j]), place.z)
-        tried.append(place_path.plan(question.arm, question.obstacles, (i, j, k), at, float(place.yaw[k]), file))
+    while left.max() == place.of and len(tried) < TRIES and sum(path.plan is not None for path in tried) < FEW:
+        i, j, k = _best_place(room, left, place.margin)
+        xyz, yaw = (float(place.x[i]), float(place.y[j]), place.z), float(place.yaw[k])
+        tried.append(place_path.plan_from_place(question.arm, question.obstacles, (i, j, k), xyz, yaw, file))
         left[i, j, k] = -1
         if tried[-1].plan is None:
             place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
-    best = next((one.index for one in tried if one.plan is not None), None)
+    best = next((path.index for path in tried if path.plan is not None), None)
     if best is None:
-        best = _best(room, place.reached, place.margin)
+        best = _best_place(room, place.reached, place.margin)
     return replace(place, best=best, planned=tuple(tried))
 
 
@@ -282,7 +283,7 @@ def _question(
     if file is None:
         task = task_for(arm, None)
     else:
-        task, each_way = place_path.ways(arm, file)
+        task, each_way = place_path.ways_of_path(arm, file)
         targets, ways = np.concatenate(each_way), tuple(map(len, each_way))
         spare, held = place_path.joint_to_hold(arm, file)
     arm, around = split_keep_outs(arm, scene)
@@ -297,13 +298,10 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
         return None
     files.ending(out, "places are", ENDINGS)
     files.check(os.fspath(out))
-    robots = [
-        [one.arm.sha256, one.obstacles.sha256, digest(one.targets.tobytes()), *one.ways, *one.values]
-        for one in questions
-    ]
-    asked = {"command": "place", "armkin": __version__, "robots, scene and targets": robots, **settings}
-    asked["solve"] = [f"{one.solve.__module__}.{one.solve.__qualname__}" for one in questions]
-    return Parts(os.fspath(out), asked)
+    robots = [[q.arm.sha256, q.obstacles.sha256, digest(q.targets.tobytes()), *q.ways, *q.values] for q in questions]
+    inputs = {"command": "place", "armkin": __version__, "robots, scene and targets": robots, **settings}
+    inputs["solve"] = [f"{question.solve.__module__}.{question.solve.__qualname__}" for question in questions]
+    return Parts(os.fspath(out), inputs)
 
 
 def _axes(
@@ -330,15 +328,15 @@ def _axes(
     return (axes[0], axes[1]), (inner[0], inner[1])
 
 
-def _blocks(question: Question, positions: Array) -> Iterator[Array]:
-    one = next(each_value(question))
-    solves = len(one.targets) * (1 if one.arcs else one.yaws) * max(len(question.values), 1)
-    count = max((ANSWERS // len(one.targets) // one.yaws if one.by_distance_alone else SOLVES // solves), 1)
+def _position_blocks(question: Question, positions: Array) -> Iterator[Array]:
+    first = next(each_value(question))
+    solves = len(first.targets) * (1 if first.by_arcs else first.yaws) * max(len(question.values), 1)
+    count = max((ANSWERS // len(first.targets) // first.yaws if first.by_distance_alone else SOLVES // solves), 1)
     for start in range(0, len(positions), count):
         yield positions[start : start + count]
 
 
-def work(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
+def count_chunk(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
     """How many targets are reached from each position and yaw: (P K,)."""
     return chunk.number, {"reached": reached_counts(questions[chunk.question], chunk.positions).ravel()}
 
@@ -346,15 +344,15 @@ def work(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
 def _margins(good: NDArray[np.bool_], step: float) -> Array:
     """Distance of each place (X, Y, K) to the nearest one, at the same yaw, that is not good; 0 for these."""
     X, _, K = good.shape
-    out = np.zeros(good.shape)
+    distances = np.zeros(good.shape)
     columns = np.arange(X)[:, None]
     for k in range(K):
         if not good[:, :, k].any():
             continue
         # along y, then across x: the lower envelope of parabolas, here tried row by row
         rows = _depth_along_y(good[:, :, k])
-        out[:, :, k] = np.sqrt(np.min((columns - columns.T)[:, :, None] ** 2 + rows[None] ** 2, axis=1)) * step
-    return out
+        distances[:, :, k] = np.sqrt(np.min((columns - columns.T)[:, :, None] ** 2 + rows[None] ** 2, axis=1)) * step
+    return distances
 
 
 def _depth_along_y(good: NDArray[np.bool_]) -> Array:
@@ -365,7 +363,7 @@ def _depth_along_y(good: NDArray[np.bool_]) -> Array:
     return np.asarray(np.minimum(ahead, behind))
 
 
-def _best(room: Room, reached: NDArray[np.int64], margin: Array) -> tuple[int, int, int]:
+def _best_place(room: Room, reached: NDArray[np.int64], margin: Array) -> tuple[int, int, int]:
     """The place that reaches most, by the greatest margin, then by the greatest distance to a joint limit."""
     most = reached == reached.max()
     tied = np.argwhere(most & (margin >= margin[most].max() - 1e-9))
@@ -376,20 +374,20 @@ def _best(room: Room, reached: NDArray[np.int64], margin: Array) -> tuple[int, i
     return i, j, k
 
 
-def _rooms(question: Question, x: Array, y: Array, yaws: Array) -> Room:
-    """`_room` of places by their index, each asked once."""
+def _limit_rooms(question: Question, x: Array, y: Array, yaws: Array) -> Room:
+    """`_limit_room` of places by their index, each asked once."""
 
     @cache
     def room(i: int, j: int, k: int) -> float:
-        return _room(question, np.array([x[i], y[j]]), float(yaws[k]))
+        return _limit_room(question, np.array([x[i], y[j]]), float(yaws[k]))
 
     return room
 
 
-def _room(question: Question, position: Array, turn: float) -> float:
+def _limit_room(question: Question, position: Array, turn: float) -> float:
     """The least, over the targets reached, of the best branch's distance to a limit, as a share of the range."""
     question = at_value(question, position, turn)
     s, legal = free_from(question, position, turn)
     margins = np.where(legal, limit_margin(question.arm, s.q), -np.inf).max(axis=1, initial=-np.inf)
-    there = margins[np.isfinite(margins)]
-    return float(there.min()) if len(there) else 0.0
+    reached_margins = margins[np.isfinite(margins)]
+    return float(reached_margins.min()) if len(reached_margins) else 0.0

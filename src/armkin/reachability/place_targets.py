@@ -17,8 +17,8 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.lock_joints import lock, unlock
 from armkin.model.rotation import rotation_about
 from armkin.reachability import place_branches
-from armkin.reachability.cell_answers import TURN, arc, packed, some_copy_legal
-from armkin.reachability.place_arm import Obstacles, free
+from armkin.reachability.cell_answers import TURN, legal_arc, pack_bits, some_copy_legal
+from armkin.reachability.place_arm import Obstacles, free_at_place
 from armkin.reachability.place_upright import RADII, by_radius
 from armkin.reachability.reach_cells import STRAIGHT
 
@@ -57,7 +57,7 @@ class Question(NamedTuple):
     solve: Solve = ik  # a function of a module, as it travels
 
     @property
-    def arcs(self) -> bool:
+    def by_arcs(self) -> bool:
         """Whether a yaw adds to joint 1 alone, and the yaws divide the circle."""
         on_axis = np.abs(self.arm.link[0][:2, 3]).max() <= STRAIGHT * self.arm.reach
         return self._upright and bool(on_axis) and abs(self.yaws * self.step - TURN) < STRAIGHT
@@ -66,7 +66,7 @@ class Question(NamedTuple):
     def by_distance_alone(self) -> bool:
         """Whether what joints behind joint 1 are asked depends on the target's distance from that alone."""
         turning = self.task.orientation != "none" or self.task.name in TURNING
-        return self._upright and not turning and not self.arcs
+        return self._upright and not turning and not self.by_arcs
 
     @property
     def _upright(self) -> bool:
@@ -105,12 +105,12 @@ def _most_of_values(question: Question, positions: Array) -> NDArray[np.int64]:
     blocked = question.arm.keep_out or question.obstacles.keep_out
     bare = question._replace(arm=_without_keep_outs(question.arm), obstacles=Obstacles())
     left = np.arange(len(positions))
-    for one, without in zip(each_value(question), each_value(bare), strict=True):
-        some, found = left, reached_counts(without, positions[left])
+    for held, without in zip(each_value(question), each_value(bare), strict=True):
+        to_ask, counted = left, reached_counts(without, positions[left])
         if blocked:
-            some = left[(found > counts[left]).any(axis=1)]
-        if len(some):
-            counts[some] = np.maximum(counts[some], reached_counts(one, positions[some]) if blocked else found)
+            to_ask = left[(counted > counts[left]).any(axis=1)]
+        if len(to_ask):
+            counts[to_ask] = np.maximum(counts[to_ask], reached_counts(held, positions[to_ask]) if blocked else counted)
         left = left[(counts[left] < len(question.targets)).any(axis=1)]
         if not len(left):
             break
@@ -122,9 +122,9 @@ def each_value(question: Question) -> Iterator[Question]:
     if not question.values:
         yield question
     for value in question.values:
-        whole = HeldArm(question.arm, {question.spare: value})
-        rest = _with_held_joint(question.arm, question.spare, value)  # one of many arms: not worth being compiled
-        yield question._replace(arm=rest, values=(), full_arm=whole, solve=ik)
+        full_arm = HeldArm(question.arm, {question.spare: value})
+        free_arm = _with_held_joint(question.arm, question.spare, value)  # one of many arms: not worth being compiled
+        yield question._replace(arm=free_arm, values=(), full_arm=full_arm, solve=ik)
 
 
 def at_value(question: Question, position: Array, turn: float) -> Question:
@@ -132,9 +132,9 @@ def at_value(question: Question, position: Array, turn: float) -> Question:
     if not question.values:
         return question
     k, most, best = round(turn / question.step), -1, question
-    for one in each_value(question):
-        if (count := int(reached_counts(one, position[None])[0, k])) > most:
-            most, best = count, one
+    for held in each_value(question):
+        if (count := int(reached_counts(held, position[None])[0, k])) > most:
+            most, best = count, held
         if most == len(question.targets):
             break
     return best
@@ -158,12 +158,12 @@ def _counted_targets(question: Question, positions: Array, legal: NDArray[np.boo
         return np.asarray(legal.sum(axis=1, dtype=np.int64))
     counts, begin = np.zeros((len(positions), question.yaws), np.int64), 0
     for length in question.ways:
-        here = slice(begin, begin + length)
-        count = legal[:, here].sum(axis=1, dtype=np.int64)
-        whole = count == length
-        for p in np.flatnonzero(whole.any(axis=1)) if length > 1 else ():
-            whole[p] = _on_one_branch(question._replace(targets=question.targets[here]), positions[p], whole[p])
-        counts += np.where(whole, length, np.minimum(count, length - 1))
+        way = slice(begin, begin + length)
+        count = legal[:, way].sum(axis=1, dtype=np.int64)
+        carried = count == length
+        for p in np.flatnonzero(carried.any(axis=1)) if length > 1 else ():
+            carried[p] = _on_one_branch(question._replace(targets=question.targets[way]), positions[p], carried[p])
+        counts += np.where(carried, length, np.minimum(count, length - 1))
         begin += length
     return counts
 
@@ -173,7 +173,9 @@ def _legal_yaws(question: Question, positions: Array) -> NDArray[np.bool_]:
     N, K = len(question.targets), question.yaws
     if question.arm.keep_out or question.obstacles.keep_out:
         turns = (np.arange(K) * question.step).tolist()
-        return np.stack([np.stack([legal_from(question, one, turn) for turn in turns], axis=1) for one in positions])
+        return np.stack(
+            [np.stack([legal_from(question, position, turn) for turn in turns], axis=1) for position in positions]
+        )
     target, place = np.tile(np.arange(N), len(positions)), np.repeat(positions, N, axis=0)
     if (
         question.by_distance_alone
@@ -181,7 +183,7 @@ def _legal_yaws(question: Question, positions: Array) -> NDArray[np.bool_]:
         and (read := _by_radius(question, positions)) is not None
     ):
         return read
-    legal = (_by_arcs if question.arcs else _yaw_by_yaw)(question, target, place)
+    legal = (_by_arcs if question.by_arcs else _yaw_by_yaw)(question, target, place)
     return legal.reshape(len(positions), N, K)
 
 
@@ -191,33 +193,33 @@ def _by_radius(question: Question, positions: Array) -> NDArray[np.bool_] | None
     if question.task.position > 2:
         high[:, 2] -= question.z
     turns: Array = np.asarray(np.arange(question.yaws) * question.step, float)
-    if (found := by_radius(question.arm, question.task.name, high, positions, turns)) is None:
+    if (answer := by_radius(question.arm, question.task.name, high, positions, turns)) is None:
         return None
-    legal, asked = found
-    p, i, k = np.nonzero(asked)
+    legal, open_ = answer
+    p, i, k = np.nonzero(open_)
     for start in range(0, len(p), BLOCK):
-        some = slice(start, start + BLOCK)
-        beside = _unturned_targets(question._replace(targets=question.targets[i[some]]), positions[p[some]])
-        turn = turns[k[some]]
-        goals = _turned(question.task, beside, turn, np.cos(turn), np.sin(turn))
-        legal[p[some], i[some], k[some]] = _any_legal(question, goals)
+        block = slice(start, start + BLOCK)
+        beside = _unturned_targets(question._replace(targets=question.targets[i[block]]), positions[p[block]])
+        turn = turns[k[block]]
+        goals = _turn_targets(question.task, beside, turn, np.cos(turn), np.sin(turn))
+        legal[p[block], i[block], k[block]] = _any_legal(question, goals)
     return legal
 
 
 def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
     """At which yaws targets (M,) are reached from places (M, 2), by one solve each: (M, K)."""
     legal = np.zeros((len(target), question.yaws), bool)
-    some = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
-    goals = _unturned_targets(question._replace(targets=question.targets[target[some]]), place[some])
-    left = np.arange(len(some))
+    near = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
+    goals = _unturned_targets(question._replace(targets=question.targets[target[near]]), place[near])
+    left = np.arange(len(near))
     if (parts := columns(question.arm, goals, question.task.name)) is not None:
         edges = [left[:0]]
         for part in parts:
-            legal[some[part.rows]] = _turned_legal(question, part.values, part.valid)
+            legal[near[part.rows]] = _turned_legal(question, part.values, part.valid)
             edges.append(part.rows.start + part.left)
         left = np.concatenate(edges)
     if len(left):
-        s, rows = question.solve(question.arm, goals[left], question.task.name), some[left]
+        s, rows = question.solve(question.arm, goals[left], question.task.name), near[left]
         legal[rows] = _turned_legal(question, list(s.q.transpose(2, 1, 0)), s.valid.T)
         edge = rows[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)]
         legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
@@ -230,7 +232,7 @@ def _turned_legal(question: Question, values: list[Array], valid: NDArray[np.boo
     allowed = valid
     for j in range(1, arm.n):
         allowed = allowed & some_copy_legal(arm, values[j], j)
-    first, length = arc(arm, values[0], 0, K, question.sense)
+    first, length = legal_arc(arm, values[0], 0, K, question.sense)
     return _covered_arcs(first, np.where(allowed, length, 0), K)
 
 
@@ -241,10 +243,10 @@ def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> N
     cosine, sine = np.cos(turns), np.sin(turns)
     at_once = max(BLOCK // K, 1)
     for start in range(0, len(target), at_once):
-        some = slice(start, start + at_once)
-        m, k = np.nonzero(_within_reach(question, target[some], place[some], turns))
-        beside = _unturned_targets(question._replace(targets=question.targets[target[some]]), place[some])
-        goals = _turned(question.task, beside[m], turns[k], cosine[k], sine[k])
+        block = slice(start, start + at_once)
+        m, k = np.nonzero(_within_reach(question, target[block], place[block], turns))
+        beside = _unturned_targets(question._replace(targets=question.targets[target[block]]), place[block])
+        goals = _turn_targets(question.task, beside[m], turns[k], cosine[k], sine[k])
         legal[start + m, k] = _any_legal(question, goals)
     return legal
 
@@ -283,7 +285,7 @@ def _within_reach(question: Question, target: NDArray[np.intp], place: Array, tu
 
 def _covered_arcs(first: NDArray[np.intp], length: NDArray[np.intp], count: int) -> NDArray[np.bool_]:
     """Which places of circles of `count` lie on one of their arcs at least: (B, M), (B, M) -> (M, count)."""
-    until = _until(count)
+    until = _prefix_bits(count)
     words = np.zeros((first.shape[1], until.shape[1]), np.uint64)
     for begin, end in zip(first, first + length, strict=True):
         words |= until.take(begin, axis=0) ^ until.take(end, axis=0)
@@ -292,31 +294,31 @@ def _covered_arcs(first: NDArray[np.intp], length: NDArray[np.intp], count: int)
 
 
 @lru_cache(maxsize=4)
-def _until(count: int) -> NDArray[np.uint64]:
+def _prefix_bits(count: int) -> NDArray[np.uint64]:
     """A bit for each place on the way from 0 to a place, of a circle gone round twice: (2 count + 1, words).
 
     Places passed twice are 0 again, so that an arc is what its end has and its beginning has not, or the other way.
     """
-    once = packed(np.arange(count) < np.arange(count + 1)[:, None])
+    once = pack_bits(np.arange(count) < np.arange(count + 1)[:, None])
     return np.concatenate([once, once[-1] ^ once[1:]])
 
 
 def _on_one_branch(question: Question, position: Array, yaws: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """At which of some yaws (K,) one branch carries all targets."""
     arm, K = question.arm, question.yaws
-    if question.arcs:
+    if question.by_arcs:
         s = isolated(arm, targets_from(question, position, 0.0), question.task.name)
-        whole, low, high = place_branches.ranges(s, s.valid)
-        allowed = whole & place_branches.some_copy_legal(arm, low, high, range(1, arm.n))
-        first, length = place_branches.arc(arm, low[:, 0], high[:, 0], K, question.sense)
+        carries, low, high = place_branches.branch_ranges(s, s.valid)
+        allowed = carries & place_branches.some_copy_legal(arm, low, high, range(1, arm.n))
+        first, length = place_branches.branch_arc(arm, low[:, 0], high[:, 0], K, question.sense)
         places = (np.arange(K) - first[:, None]) % K < np.where(allowed, length, 0)[:, None]
         return np.asarray(yaws & places.any(axis=0))
-    out = np.zeros(K, bool)
+    carried = np.zeros(K, bool)
     for k in np.flatnonzero(yaws).tolist():
         s, free = free_from(question, position, k * question.step, legal_only=False)
-        whole, low, high = place_branches.ranges(s, free)
-        out[k] = (whole & place_branches.some_copy_legal(arm, low, high, range(arm.n))).any()
-    return out
+        carries, low, high = place_branches.branch_ranges(s, free)
+        carried[k] = (carries & place_branches.some_copy_legal(arm, low, high, range(arm.n))).any()
+    return carried
 
 
 def legal_from(question: Question, position: Array, turn: float) -> NDArray[np.bool_]:
@@ -337,13 +339,15 @@ def free_from(
     if question.obstacles.keep_out and legal.any():
         place, q = (float(position[0]), float(position[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
         arm, joints = question.full_arm or HeldArm(question.arm, {})
-        legal = legal & free(arm, question.obstacles, place, turn, unlock(arm, joints, q))
+        legal = legal & free_at_place(arm, question.obstacles, place, turn, unlock(arm, joints, q))
     return s, np.asarray(legal)
 
 
 def targets_from(question: Question, position: Array, turn: float) -> Array:
     """The targets in the frame of an arm at a place (2,), or each from a place (N, 2) of its own, and a yaw."""
-    return _turned(question.task, _unturned_targets(question, position), np.array(turn), np.cos(turn), np.sin(turn))
+    return _turn_targets(
+        question.task, _unturned_targets(question, position), np.array(turn), np.cos(turn), np.sin(turn)
+    )
 
 
 def _unturned_targets(question: Question, position: Array) -> Array:
@@ -355,7 +359,7 @@ def _unturned_targets(question: Question, position: Array) -> Array:
     return targets
 
 
-def _turned(task: Task, targets: Array, turn: Array, c: Array, s: Array) -> Array:
+def _turn_targets(task: Task, targets: Array, turn: Array, c: Array, s: Array) -> Array:
     """Targets, in place, in a frame turned about z; turn, its cosine and sine: () or (N,)."""
     if task.orientation == "full":
         _turn_back(targets[:, 0], targets[:, 1], c[..., None], s[..., None])

@@ -46,40 +46,40 @@ def by_radius(
     """Which targets (N, m), at heights above the places, are reached from places (P, 2) at yaws (K,): (P, N, K), and
     which of the rest have to be asked; None for an arm without a closed form."""
     N, K = len(targets), len(turns)
-    legal, asked = np.zeros((N, len(place) * K), bool), np.zeros((N, len(place) * K), bool)
+    legal, open_cases = np.zeros((N, len(place) * K), bool), np.zeros((N, len(place) * K), bool)
     c, s = np.cos(turns), np.sin(turns)
     x, y = arm.link[0][:2, 3]
     foot_x = (place[:, :1] + (c * x - s * y)).ravel()
     foot_y = (place[:, 1:] + (s * x + c * y)).ravel()
     yaw = np.tile(turns, len(place))
-    middle, up = _middle(arm, 0), 1.0 if arm.link[0][2, 2] > 0 else -1.0
+    middle, up = _range_middle(arm, 0), 1.0 if arm.link[0][2, 2] > 0 else -1.0
     for start in range(0, N, AT_ONCE):
-        some = targets[start : start + AT_ONCE]
-        if (table := _radii(arm, task, some)) is None:
+        block = targets[start : start + AT_ONCE]
+        if (table := _radii(arm, task, block)) is None:
             return None
-        for i, target in enumerate(some):
+        for i, target in enumerate(block):
             dx, dy = target[0] - foot_x, target[1] - foot_y
             cell = np.minimum(np.sqrt(dx * dx + dy * dy) * (1.0 / table.spacing), RADII).astype(np.int32)
             open_ = np.append((table.open[i] >= 0.0).any(axis=0), False)
             near = np.flatnonzero(open_.take(cell))
-            at = cell.take(near)
-            seen = np.arctan2(dy.take(near), dx.take(near))
-            seen -= yaw.take(near)
-            seen *= up
-            seen -= middle
+            cells = cell.take(near)
+            angle = np.arctan2(dy.take(near), dx.take(near))
+            angle -= yaw.take(near)
+            angle *= up
+            angle -= middle
             yes, maybe = np.zeros(len(near), bool), np.zeros(len(near), bool)
             for first, sure, most in zip(table.first[i], table.sure[i], table.open[i], strict=True):
                 if (most < 0.0).all():
                     continue
-                away = first.take(at)
-                away += seen
+                away = first.take(cells)
+                away += angle
                 away -= TURN * np.rint(away * (1.0 / TURN))
                 away = np.abs(away, out=away)
-                yes |= away <= sure.take(at)
-                maybe |= away <= most.take(at)
-            legal[start + i, near], asked[start + i, near] = yes, maybe & ~yes
+                yes |= away <= sure.take(cells)
+                maybe |= away <= most.take(cells)
+            legal[start + i, near], open_cases[start + i, near] = yes, maybe & ~yes
     shape = (N, len(place), K)
-    return legal.reshape(shape).transpose(1, 0, 2), asked.reshape(shape).transpose(1, 0, 2)
+    return legal.reshape(shape).transpose(1, 0, 2), open_cases.reshape(shape).transpose(1, 0, 2)
 
 
 def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
@@ -89,9 +89,9 @@ def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
     goals = np.repeat(targets, count, axis=0)
     goals[:, :2] = arm.link[0][:2, 3]
     goals[:, 0] += np.tile(np.arange(count) * apart, T)
-    if (found := columns(arm, goals, task, kept=True)) is None:
+    if (blocks := columns(arm, goals, task, kept=True)) is None:
         return None
-    parts = list(found)
+    parts = list(blocks)
     values = [np.concatenate([part.values[j] for part in parts], axis=1).reshape(-1, T, count) for j in range(arm.n)]
     miss = np.concatenate([part.miss for part in parts], axis=1).reshape(-1, T, count)
     valid = np.concatenate([part.valid for part in parts], axis=1).reshape(-1, T, count)
@@ -99,33 +99,33 @@ def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
     left[np.concatenate([part.rows.start + part.left for part in parts])] = True
     # nan, of a branch that is nowhere near, is neither sure nor out of the question: it is asked
     gap = np.sqrt(miss)
-    out = _least(gap) > _moved(gap) + apart / arm.reach
+    never = _lesser_end(gap) > _cell_motion(gap) + apart / arm.reach
     sure = valid[..., :-1] & valid[..., 1:]
     for j in range(1, arm.n):
         if not arm.prismatic[j] and whole_turn(arm, j):
             continue
-        room, moved = _room(arm, values[j], j), _moved(values[j], not arm.prismatic[j])
-        sure &= _least(room) > moved
-        out |= _least(-room) > moved
+        room, moved = _limit_distance(arm, values[j], j), _cell_motion(values[j], not arm.prismatic[j])
+        sure &= _lesser_end(room) > moved
+        never |= _lesser_end(-room) > moved
     doubted = left.reshape(T, count)
     doubted = doubted[:, :-1] | doubted[:, 1:]
-    sure, out = sure & ~doubted, out & ~doubted
-    half, moved = _half(arm, 0), _moved(values[0], True)
+    sure, never = sure & ~doubted, never & ~doubted
+    half, moved = _half_range(arm, 0), _cell_motion(values[0], True)
     rows = (1, 0, 2)
     return Radii(
         apart,
         values[0][..., :-1].transpose(rows),
         np.where(sure, half - moved, -1.0).transpose(rows),
-        np.where(out, -1.0, np.where(np.isnan(moved), np.inf, half + moved)).transpose(rows),
+        np.where(never, -1.0, np.where(np.isnan(moved), np.inf, half + moved)).transpose(rows),
     )
 
 
-def _least(ends: Array) -> Array:
+def _lesser_end(ends: Array) -> Array:
     """The lesser of what stands at a cell's two ends."""
     return np.minimum(ends[..., :-1], ends[..., 1:])
 
 
-def _moved(value: Array, turns: bool = False) -> Array:
+def _cell_motion(value: Array, turns: bool = False) -> Array:
     """How far a value may move within a cell: as far as in that cell or in those beside it."""
     step = np.diff(value, axis=-1)
     if turns:
@@ -135,17 +135,17 @@ def _moved(value: Array, turns: bool = False) -> Array:
     return np.asarray(np.maximum(np.maximum(wide[..., :-2], wide[..., 2:]), step))
 
 
-def _middle(arm: Arm, joint: int) -> float:
+def _range_middle(arm: Arm, joint: int) -> float:
     return 0.0 if whole_turn(arm, joint) else 0.5 * float(arm.lower[joint] + arm.upper[joint])
 
 
-def _half(arm: Arm, joint: int) -> float:
+def _half_range(arm: Arm, joint: int) -> float:
     return np.inf if whole_turn(arm, joint) else 0.5 * float(arm.upper[joint] - arm.lower[joint]) + SLACK
 
 
-def _room(arm: Arm, value: Array, joint: int) -> Array:
+def _limit_distance(arm: Arm, value: Array, joint: int) -> Array:
     """How far from its limits a joint is; negative outside."""
     if arm.prismatic[joint]:
         return np.asarray(np.minimum(value - arm.lower[joint], arm.upper[joint] - value))
-    away = value - _middle(arm, joint)
-    return np.asarray(_half(arm, joint) - np.abs(away - TURN * np.rint(away / TURN)))
+    away = value - _range_middle(arm, joint)
+    return np.asarray(_half_range(arm, joint) - np.abs(away - TURN * np.rint(away / TURN)))

@@ -140,14 +140,14 @@ class Grid:
         p = self.positions(rings, azimuth)
         if self.task.orientation == "full":
             T = np.zeros((len(p), 4, 4))
-            T[:, :3, :3] = self._turned(azimuth) @ self._shortest[direction] @ rotation_about(2, roll)
+            T[:, :3, :3] = self._cell_frames(azimuth) @ self._shortest_rotations[direction] @ rotation_about(2, roll)
             T[:, :3, 3], T[:, 3, 3] = p, 1.0
             return T
         parts = [p[:, : self.task.position]]
         if self.task.orientation == "axis":
-            parts.append(np.einsum("sij,sj->si", self._turned(azimuth), self.vectors[direction]))
+            parts.append(np.einsum("sij,sj->si", self._cell_frames(azimuth), self.vectors[direction]))
         elif self.task.name in ("xy_theta", "xyz_yaw"):
-            x = self._turned(azimuth)[:, :, 0]
+            x = self._cell_frames(azimuth)[:, :, 0]
             parts.append((np.arctan2(x[:, 1], x[:, 0]) + self.angles[direction])[:, None])
         elif _is_pitch(self.task):
             parts.append(self.angles[direction][:, None])
@@ -155,14 +155,14 @@ class Grid:
             parts.append(roll[:, None])
         return np.concatenate(parts, axis=1)
 
-    def _turned(self, azimuth: Array) -> Array:
+    def _cell_frames(self, azimuth: Array) -> Array:
         """The cell's frame in the frame of targets: (S, 3, 3)."""
         if self.down_is_apart:
             return np.broadcast_to(np.eye(3), (len(azimuth), 3, 3))
         return np.asarray(self.frame[:3, :3] @ rotation_about(2, azimuth))
 
     @cached_property
-    def _shortest(self) -> Array:
+    def _shortest_rotations(self) -> Array:
         """The shortest rotations that take +z to `vectors`: (N, 3, 3)."""
         x, y, z = self.vectors.T
         R = np.empty((len(z), 3, 3))
@@ -185,8 +185,8 @@ def _pitch_down(arm: Arm, task: Task) -> float:
     joint = int(np.flatnonzero(task.sums[0])[0])
     moved = q.copy()
     moved[joint] += 0.1
-    z, other = fk(arm, q)[:3, 2], fk(arm, moved)[:3, 2]
-    axis = np.cross(z, other)
+    z, z_moved = fk(arm, q)[:3, 2], fk(arm, moved)[:3, 2]
+    axis = np.cross(z, z_moved)
     down = np.array([0.0, 0.0, -1.0])
     size = np.linalg.norm(axis)
     if size < 0.09 or abs(axis[2]) > 1e-6 * size:

@@ -24,7 +24,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import actual
 from armkin.reachability import kept_chunks
-from armkin.reachability.cell_answers import TURN, Question, answered
+from armkin.reachability.cell_answers import TURN, Question, cell_columns
 from armkin.reachability.reach_cells import Grid
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def reach(
     return Reach(
         question.grid,
         columns,
-        "arcs" if question.arcs else "poses",
+        "arcs" if question.by_arcs else "poses",
         len(rings) * question.grid.azimuths,
         len(rings) * question.grid.azimuths * question.grid.orientations,
         run.solves,
@@ -160,9 +160,9 @@ def reach(
 def chunks(question: Question) -> Iterator[Chunk]:
     """All rings, some at a time; the same ones for every engine."""
     rings = question.grid.rings
-    each = max(SOLVES // _cost(question) // question.solves_a_ring, 1)
-    for number, start in enumerate(range(0, len(rings), each)):
-        yield Chunk(number, rings[start : start + each])
+    rings_each = max(SOLVES // _cost(question) // question.solves_a_ring, 1)
+    for number, start in enumerate(range(0, len(rings), rings_each)):
+        yield Chunk(number, rings[start : start + rings_each])
 
 
 def _cost(question: Question) -> int:
@@ -173,14 +173,14 @@ def _cost(question: Question) -> int:
     return 1 if solver(actual(arm), task.name)[1].pairs is not None else SLOWER
 
 
-def work(question: Question, chunk: Chunk) -> tuple[int, Table]:
+def answer_chunk(question: Question, chunk: Chunk) -> tuple[int, Table]:
     """The columns of a chunk: a pure function, wherever it runs."""
     grid, M = question.grid, question.grid.azimuths
-    each = max(BLOCK // question.solves_a_ring, 1)
-    parts = [answered(question, chunk.rings[i : i + each]) for i in range(0, len(chunk.rings), each)]
+    rings_each = max(BLOCK // question.solves_a_ring, 1)
+    parts = [cell_columns(question, chunk.rings[i : i + rings_each]) for i in range(0, len(chunk.rings), rings_each)]
     cells = len(chunk.rings) * M
-    at = np.repeat(chunk.rings, M, axis=0)
-    p = grid.positions(at, np.tile(np.arange(M) * (TURN / M), len(chunk.rings)))
+    ring = np.repeat(chunk.rings, M, axis=0)
+    p = grid.positions(ring, np.tile(np.arange(M) * (TURN / M), len(chunk.rings)))
     table: Table = {f"{name}_mm": np.ascontiguousarray(p[:, i]) + 0.0 for i, name in enumerate("xyz")}
     for name in list(UNITS)[3:]:
         table[name] = np.concatenate([part[name] for part in parts]) if name in parts[0] else np.full(cells, np.nan)
@@ -206,27 +206,29 @@ class _Run:
 
     def answer_all(self, all_chunks: list[Chunk]) -> dict[str, Array]:
         """Answer all chunks; the columns, unless they are in a file and too many."""
-        kept: dict[int, Table] = {}
+        kept_tables: dict[int, Table] = {}
         cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
         keep = self.parts is None or cells <= KEEP
         with kept_chunks.hold_parts(self.parts, len(all_chunks)):
-            for number, columns in kept_chunks.tables(self.engine, work, self.question, all_chunks, self.parts):
+            for number, columns in kept_chunks.chunk_tables(
+                self.engine, answer_chunk, self.question, all_chunks, self.parts
+            ):
                 self._count(all_chunks[number], columns)
                 if keep:
-                    kept[number] = columns
+                    kept_tables[number] = columns
             if self.out is not None:
-                self._write(len(all_chunks), kept)
-        tables = [kept[number] for number in sorted(kept)]
+                self._write(len(all_chunks), kept_tables)
+        tables = [kept_tables[number] for number in sorted(kept_tables)]
         return {name: np.concatenate([np.asarray(t[name]) for t in tables]) for name in UNITS} if keep else {}
 
     def _count(self, chunk: Chunk, table: Table) -> None:
         grid = self.question.grid
-        there = np.asarray(table["share"]) > 0
+        reached = np.asarray(table["share"]) > 0
         r = np.repeat((chunk.rings[:, 0] + 0.5) * grid.step, grid.azimuths)
-        self.volume += float(r[there].sum()) * grid.step**2 * TURN / grid.azimuths
-        self.reached += int(there.sum())
+        self.volume += float(r[reached].sum()) * grid.step**2 * TURN / grid.azimuths
+        self.reached += int(reached.sum())
         self.solves += len(chunk.rings) * self.question.solves_a_ring
-        self.cells += len(there)
+        self.cells += len(reached)
         if self.progress is not None:
             self.progress(self.cells)
 
@@ -237,8 +239,8 @@ class _Run:
 
         def tables() -> Iterator[Any]:
             for number in range(count):
-                data = parts.read(number) if parts.held else npz.encoded(kept_tables[number])
-                yield io.BytesIO(data if format.name == "npz" else format.encoded(npz.decoded(data)))
+                encoded = parts.read(number) if parts.held else npz.encoded(kept_tables[number])
+                yield io.BytesIO(encoded if format.name == "npz" else format.encoded(npz.decoded(encoded)))
 
         with write_whole(self.out, "wb") as file:
             if format.name == "csv":
@@ -252,6 +254,6 @@ def _dependencies(question: Question) -> dict[str, Any]:
     """What the columns depend on."""
     grid, arm = question.grid, question.grid.arm
     names = ("step", "azimuths", "directions", "rolls", "tool_down")
-    asked = {("grid" if name == "step" else name): getattr(grid, name) for name in names}
+    settings = {("grid" if name == "step" else name): getattr(grid, name) for name in names}
     arm_is = {"robot file": arm.sha256, "scene": arm.scene_sha256, "joints": arm.n, "reach": arm.reach}
-    return {"command": "reach", "armkin": __version__, **arm_is, **asked, "measures": question.measures}
+    return {"command": "reach", "armkin": __version__, **arm_is, **settings, "measures": question.measures}

@@ -19,7 +19,7 @@ CHUNK = 1 << 16  # samples in memory at once
 MOST = 10**10  # about an hour on a desktop computer
 
 
-def span(arm: Arm) -> tuple[Array, Array]:
+def sampled_range(arm: Arm) -> tuple[Array, Array]:
     """Lower and upper end of what is sampled: (n,) twice [rad | mm].
 
     The limits; for an unlimited revolute joint one turn, -180 to 180 degrees. An unlimited
@@ -46,14 +46,14 @@ class Random:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for what, value in (("samples", self.count), ("seed", self.seed)):
+        for name, value in (("samples", self.count), ("seed", self.seed)):
             if isinstance(value, bool) or not isinstance(value, int | np.integer):
-                raise UsageError(f"{what}: {value!r} is no whole number")
+                raise UsageError(f"{name}: {value!r} is no whole number")
         if not 1 <= self.count <= MOST:
             raise UsageError(f"{self.count} samples: give 1 to {MOST:,}")
         if self.seed < 0:
             raise UsageError(f"seed {self.seed}: give 0 or more")
-        span(self.arm)
+        sampled_range(self.arm)
 
     @property
     def parts(self) -> int:
@@ -65,7 +65,7 @@ class Random:
         start = number * CHUNK
         bits = np.random.PCG64(self.seed)
         bits.advance(start * self.arm.n)  # a number takes one step of the generator
-        low, high = span(self.arm)
+        low, high = sampled_range(self.arm)
         shape = (min(CHUNK, self.count - start), self.arm.n)
         return np.asarray(low + (high - low) * np.random.Generator(bits).random(shape))
 
@@ -91,7 +91,7 @@ class Grid:
             raise UsageError(f"a grid needs at least 1 point on every joint, not {min(self.points)}")
         if self.count > MOST:
             raise UsageError(f"the grid has {self.count:,} points; {MOST:,} at most")
-        span(self.arm)
+        sampled_range(self.arm)
 
     @property
     def count(self) -> int:
@@ -105,7 +105,7 @@ class Grid:
 
     def part(self, number: int) -> Array:
         """The poses of a chunk, (up to CHUNK, n) [rad | mm]."""
-        low, high = span(self.arm)
+        low, high = sampled_range(self.arm)
         step = np.zeros(self.arm.n)
         first = low.copy()
         for i, k in enumerate(self.points):
@@ -122,6 +122,6 @@ class Grid:
 Sampling = Random | Grid
 
 
-def grid(arm: Arm, points: Sequence[int]) -> Grid:
+def joint_grid(arm: Arm, points: Sequence[int]) -> Grid:
     """A grid of so many points a joint; a single number counts for every joint."""
     return Grid(arm, tuple(points) * arm.n if len(points) == 1 else tuple(points))

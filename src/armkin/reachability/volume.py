@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
-from armkin.reachability.sampling import span
+from armkin.reachability.sampling import sampled_range
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -67,25 +67,25 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     surface) has the volume 0. samples: of the survey that asks; for fewer than 5,000 the volume, too, is
     found from proportionally fewer poses, and its error says so.
     """
-    normal, freedoms = motion(arm)
+    normal, freedoms = tip_freedoms(arm)
     dimensions = 3 if normal is None else 2
     if freedoms < dimensions:
-        what = {0: "does not move", 1: "stays on a curve", 2: "stays on a surface"}[freedoms]
-        return Extent(dimensions, 0.0, 0.0, f"exact: the tip {what}")
+        freedom = {0: "does not move", 1: "stays on a curve", 2: "stays on a surface"}[freedoms]
+        return Extent(dimensions, 0.0, 0.0, f"exact: the tip {freedom}")
     section = _Section(arm, normal)
     rng = np.random.default_rng(seed)
-    look = _Cells(section, *section.widest(), 64)
+    look = _Cells(section, *section.outer_corners(), 64)
     chunk = max(_LEAST_CHUNK, min(_CHUNK, _CHUNK * samples // _ALL))
-    _fill(look, rng, 2, 2, chunk)
+    _fill_cells(look, rng, 2, 2, chunk)
     margin = _MARGIN * (look.most - look.least)
     low, high = look.least - margin, look.most + margin
     if section.revolute:
         low[0] = max(low[0], 0.0)
     side = min(_SIDE, math.isqrt(4 * _SIDE**2 * chunk // _CHUNK))  # of cells finer than that most stay empty
     cells = _Cells(section, low, high, _LINE if dimensions == 2 else side)
-    _fill(cells, rng, _UNIFORM, _GROWN, chunk)
+    _fill_cells(cells, rng, _UNIFORM, _GROWN, chunk)
     levels = [cells]
-    while (coarse := levels[-1].merged()) is not None:
+    while (coarse := levels[-1].merge_cells()) is not None:
         levels.append(coarse)
     brackets = np.array([level.bracket() for level in levels])
     middles = brackets.mean(axis=1)
@@ -103,9 +103,9 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     )
 
 
-def motion(arm: Arm) -> tuple[Array | None, int]:
+def tip_freedoms(arm: Arm) -> tuple[Array | None, int]:
     """The normal of the plane that the tip moves in (None: space), and the tip's freedoms."""
-    low, high = span(arm)
+    low, high = sampled_range(arm)
     q = low + (high - low) * np.random.default_rng(1).random((64, arm.n))
     J = jacobian(arm, q)[:, :3] * (high - low)  # [mm] over a joint's whole range
     tolerance = 1e-9 * arm.reach
@@ -121,7 +121,7 @@ class _Section:
     def __init__(self, arm: Arm, normal: Array | None) -> None:
         self.arm = arm
         self.revolute = not arm.prismatic[0]
-        self.low, self.high = span(arm)
+        self.low, self.high = sampled_range(arm)
         self.sweep = float(self.high[0] - self.low[0])  # [rad | mm]
         self.closed = self.revolute and self.sweep >= 2 * math.pi * (1 - 1e-12)
         to_axis = np.linalg.inv(arm.link[0])
@@ -133,7 +133,7 @@ class _Section:
             across = np.cross(self._R @ normal, [0.0, 0.0, 1.0])
         self._across = across
 
-    def widest(self) -> tuple[Array, Array]:
+    def outer_corners(self) -> tuple[Array, Array]:
         """Corners of a section that no tip can leave."""
         reach = self.arm.reach * (1 + 1e-9)
         low, high = np.array([-reach, -reach]), np.array([reach, reach])
@@ -185,13 +185,13 @@ class _Cells:
         if self.stretches > 1:
             part = ((start - self.first_start) / self.stretch).astype(np.int64)
             flat = flat * self.stretches + np.clip(part, 0, self.stretches - 1)
-        new = start < self.start_low[flat] - self._notable
-        new |= start > self.start_high[flat] + self._notable
+        is_new = start < self.start_low[flat] - self._notable
+        is_new |= start > self.start_high[flat] + self._notable
         np.minimum.at(self.start_low, flat, start)
         np.maximum.at(self.start_high, flat, start)
-        return np.asarray(new)
+        return np.asarray(is_new)
 
-    def merged(self) -> _Cells | None:
+    def merge_cells(self) -> _Cells | None:
         """What was found, in cells twice as wide along every side; None from 32 cells a side down."""
         if self.shape[0] <= 32:
             return None
@@ -202,7 +202,7 @@ class _Cells:
         coarse.start_high = self.start_high.reshape(pairs).max(axis=inner).ravel()
         return coarse
 
-    def swept(self) -> Array:
+    def swept_lengths(self) -> Array:
         """Length swept at each cell: (cells...) [rad | mm]."""
         low = self.start_low.reshape(-1, self.stretches)
         high = self.start_high.reshape(-1, self.stretches)
@@ -211,22 +211,22 @@ class _Cells:
         first = np.full(len(low), np.inf)
         gaps = np.zeros(len(low))
         for k in range(self.stretches):
-            found = np.isfinite(low[:, k])
-            gap = np.where(found, low[:, k], 0.0) - np.where(np.isfinite(before), before, np.inf) - sweep
-            gaps += np.where(found, np.maximum(gap, 0.0), 0.0)
+            occupied = np.isfinite(low[:, k])
+            gap = np.where(occupied, low[:, k], 0.0) - np.where(np.isfinite(before), before, np.inf) - sweep
+            gaps += np.where(occupied, np.maximum(gap, 0.0), 0.0)
             first = np.where(np.isfinite(first), first, low[:, k])
-            before = np.where(found, high[:, k], before)
-        found = np.isfinite(first)
-        first, before = np.where(found, first, 0.0), np.where(found, before, 0.0)
+            before = np.where(occupied, high[:, k], before)
+        occupied = np.isfinite(first)
+        first, before = np.where(occupied, first, 0.0), np.where(occupied, before, 0.0)
         if self.section.revolute:  # a circle: what is not in a gap, the last one reaching around to the first
             total = 2 * math.pi - gaps - np.maximum(first + 2 * math.pi - before - sweep, 0.0)
         else:
             total = before - first + sweep - gaps
-        return np.where(found, total, 0.0).reshape(self.shape)
+        return np.where(occupied, total, 0.0).reshape(self.shape)
 
     def bracket(self) -> tuple[float, float]:
         """Lower and upper figure of the volume or area."""
-        most = self.swept()
+        most = self.swept_lengths()
         # At r = 0 there is no border: the section ends there because the axis does.
         axis = "edge" if self.section.revolute and self.low[0] == 0.0 else "constant"
         least = most
@@ -245,7 +245,7 @@ class _Cells:
         return float(least.sum()) * cell, float(most.sum()) * cell
 
 
-def _fill(cells: _Cells, rng: np.random.Generator, uniform: int, grown: int, size: int) -> None:
+def _fill_cells(cells: _Cells, rng: np.random.Generator, uniform: int, grown: int, size: int) -> None:
     """Sample the other joints: at random first, then around the poses that last found something new."""
     arm, low, high = cells.section.arm, cells.section.low, cells.section.high
     limited = np.isfinite(arm.lower) & np.isfinite(arm.upper)
@@ -260,5 +260,5 @@ def _fill(cells: _Cells, rng: np.random.Generator, uniform: int, grown: int, siz
             q = seeds + step * width * rng.standard_normal((size, arm.n))
         q = np.where(limited, np.clip(q, low, high), q)
         q[:, 0] = 0.0
-        new = cells.add(q)
-        pool = np.concatenate([q[new], pool])[:_POOL]
+        is_new = cells.add(q)
+        pool = np.concatenate([q[is_new], pool])[:_POOL]

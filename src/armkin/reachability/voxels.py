@@ -31,21 +31,23 @@ class Layer(NamedTuple):
     def table(self, column: Array) -> Array:
         """A column of the cells as an image (rows upwards, columns to the right); nan where there is no cell."""
         across, up = (self.places - self.places.min(axis=0)).T
-        out = np.full((up.max() + 1, across.max() + 1), np.nan)
-        out[up, across] = column[self.row]
-        return out
+        image = np.full((up.max() + 1, across.max() + 1), np.nan)
+        image[up, across] = column[self.row]
+        return image
 
 
-def section(grid: Grid) -> Layer:
+def section_layer(grid: Grid) -> Layer:
     """The plane y = 0 of the reach frame: places (a, c)."""
-    a, c = _square(grid)
-    return _layer(grid, a, c, np.stack([(a + 0.5) * grid.step, 0.0 * a, c * grid.step], axis=1))
+    a, c = _square_indices(grid)
+    return _layer_of_places(grid, a, c, np.stack([(a + 0.5) * grid.step, 0.0 * a, c * grid.step], axis=1))
 
 
-def level(grid: Grid, c: int) -> Layer:
+def level_layer(grid: Grid, c: int) -> Layer:
     """The plane z = c grid of the reach frame: places (a, b)."""
-    a, b = _square(grid)
-    return _layer(grid, a, b, np.stack([(a + 0.5) * grid.step, b * grid.step, 0.0 * a + c * grid.step], axis=1))
+    a, b = _square_indices(grid)
+    return _layer_of_places(
+        grid, a, b, np.stack([(a + 0.5) * grid.step, b * grid.step, 0.0 * a + c * grid.step], axis=1)
+    )
 
 
 def rows_at(grid: Grid, points: Array) -> NDArray[np.intp]:
@@ -58,18 +60,18 @@ def rows_at(grid: Grid, points: Array) -> NDArray[np.intp]:
     most_i, low = rings[:, 0].max(), rings[:, 1].min()
     ring = np.full((most_i + 1, rings[:, 1].max() - low + 1), -1, np.intp)
     ring[rings[:, 0], rings[:, 1] - low] = np.arange(len(rings))
-    there = (i <= most_i) & (j >= low) & (j - low < ring.shape[1])
-    found = np.where(there, ring[np.where(there, i, 0), np.where(there, j - low, 0)], -1)
-    return np.asarray(np.where(found < 0, -1, found * grid.azimuths + k))
+    inside = (i <= most_i) & (j >= low) & (j - low < ring.shape[1])
+    ring_numbers = np.where(inside, ring[np.where(inside, i, 0), np.where(inside, j - low, 0)], -1)
+    return np.asarray(np.where(ring_numbers < 0, -1, ring_numbers * grid.azimuths + k))
 
 
-def _square(grid: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _square_indices(grid: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     most = int(grid.rings[:, 0].max()) + 1
     a, b = np.meshgrid(np.arange(-most, most), np.arange(-most, most + 1), indexing="ij")
     return a.ravel(), b.ravel()
 
 
-def _layer(grid: Grid, first: NDArray[np.intp], second: NDArray[np.intp], centres: Array) -> Layer:
+def _layer_of_places(grid: Grid, first: NDArray[np.intp], second: NDArray[np.intp], centres: Array) -> Layer:
     row = rows_at(grid, centres)
-    there = row >= 0
-    return Layer(np.stack([first, second], axis=1)[there], row[there], centres[there])
+    inside = row >= 0
+    return Layer(np.stack([first, second], axis=1)[inside], row[inside], centres[inside])

@@ -15,11 +15,11 @@ from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import position as position_of
-from armkin.keep_out.clearance import clear
+from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import actual
 from armkin.reachability import cloud_file as clouds
-from armkin.reachability.dexterity import MEASURES, measure
-from armkin.reachability.sampling import Random, Sampling, grid
+from armkin.reachability.dexterity import MEASURES, measure_function
+from armkin.reachability.sampling import Random, Sampling, joint_grid
 from armkin.reachability.volume import Extent, extent
 
 if TYPE_CHECKING:
@@ -113,8 +113,8 @@ def workspace(
     job = Job(sampling, tuple(measures), position or partial(position_of, arm), out is not None or keep > 0)
     tally = _Tally(arm, sampling.count, len(measures), keep, seed)
     with ExitStack() as stack:
-        write = None if out is None else stack.enter_context(clouds.cloud(out, arm, sampling.count, measures))
-        for part in in_order(Engine(workers, cluster), work, job, range(sampling.parts)):
+        write = None if out is None else stack.enter_context(clouds.open_cloud(out, arm, sampling.count, measures))
+        for part in in_order(Engine(workers, cluster), survey_chunk, job, range(sampling.parts)):
             tally.add(part)
             if write is not None:
                 write(part.q, part.tip, part.values)
@@ -150,25 +150,25 @@ class Part(NamedTuple):
     values: list[Array]
 
 
-def work(job: Job, number: int) -> Part:
+def survey_chunk(job: Job, number: int) -> Part:
     """One chunk of the samples: a pure function, wherever it runs."""
     arm, q = job.sampling.arm, job.sampling.part(number)
     tip = job.position(q)
-    values = [measure(arm, name)(q) for name in job.measures]
+    values = [measure_function(arm, name)(q) for name in job.measures]
     distance = np.linalg.norm(tip - arm.base[:3, 3], axis=1)
-    some = slice(None if job.rows else 0)
+    rows = slice(None if job.rows else 0)
     return Part(
         samples=len(q),
-        free=int(clear(arm, q).sum()) if arm.keep_out else 0,
+        free=int(hits_nothing(arm, q).sum()) if arm.keep_out else 0,
         low=tip.min(axis=0),
         high=tip.max(axis=0),
         nearest=float(distance.min()),
         farthest=float(distance.max()),
         least=np.array([value.min() for value in values]),
         most=np.array([value.max() for value in values]),
-        q=q[some],
-        tip=tip[some],
-        values=[value[some] for value in values],
+        q=q[rows],
+        tip=tip[rows],
+        values=[value[rows] for value in values],
     )
 
 
@@ -177,7 +177,7 @@ def _sampling(arm: Arm, samples: int | None, grid_points: Sequence[int] | None, 
         return Random(arm, 100_000 if samples is None else samples, seed)
     if samples is not None:
         raise UsageError("samples (random) and a grid: give one of the two")
-    return grid(arm, grid_points)
+    return joint_grid(arm, grid_points)
 
 
 class _Tally:
@@ -206,7 +206,7 @@ class _Tally:
     def result(self, names: Sequence[str], size: Extent | None, seconds: float) -> Workspace:
         """What they come to; names: of their measures, size: the volume or area."""
         n = self.arm.n
-        kept = np.concatenate(self._chosen_samples) if self._chosen_samples else np.empty((0, n + 3 + len(names)))
+        samples = np.concatenate(self._chosen_samples) if self._chosen_samples else np.empty((0, n + 3 + len(names)))
         return Workspace(
             arm=self.arm,
             samples=self.samples,
@@ -218,8 +218,8 @@ class _Tally:
                 name: (float(low), float(high)) for name, low, high in zip(names, self.least, self.most, strict=True)
             },
             seconds=seconds,
-            joints=kept[:, :n],
-            tips=kept[:, n : n + 3],
-            values={name: kept[:, n + 3 + k] for k, name in enumerate(names)},
+            joints=samples[:, :n],
+            tips=samples[:, n : n + 3],
+            values={name: samples[:, n + 3 + k] for k, name in enumerate(names)},
             free=self.free if self.arm.keep_out else None,
         )

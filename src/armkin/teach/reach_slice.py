@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import distance
-from armkin.keep_out.clearance import clear
+from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import actual
 from armkin.reachability import voxels
 from armkin.reachability.reach_cells import Grid
@@ -43,7 +43,7 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
         grid = Grid(real_arm, step, 2, DIRECTIONS, 1, False)
         values_held = _held_values(real_arm, free)
         shares, values = _reached_shares(grid, free, values_held), len(values_held)
-    plane = voxels.section(grid)
+    plane = voxels.section_layer(grid)
     share = shares[plane.row]
     reached = share > 0
     return {
@@ -80,6 +80,6 @@ def _reached_shares(grid: Grid, free: Redundancy, values: Array) -> Array:
         s = ik(free.rest, moved(arm, free, target[left], np.full(len(left), value)), free.task.name, examine=False)
         good = s.within_limits
         if arm.keep_out:
-            good = good & clear(arm, np.insert(np.where(good[:, :, None], s.q, np.nan), j, value, axis=2))
+            good = good & hits_nothing(arm, np.insert(np.where(good[:, :, None], s.q, np.nan), j, value, axis=2))
         reached[left] = good.any(axis=1)
     return np.asarray(reached.reshape(-1, count).mean(axis=1))

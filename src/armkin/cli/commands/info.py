@@ -69,9 +69,9 @@ def _keep_outs(arm: Arm) -> KeepOuts:
     """Bodies, pairs that do not count, hits at home; nothing without keep-outs."""
     if not arm.keep_out:
         return {}
-    from armkin.keep_out.keep_out_json import report
+    from armkin.keep_out.keep_out_json import keep_out_fields
 
-    return report(arm)  # type: ignore[return-value]
+    return keep_out_fields(arm)  # type: ignore[return-value]
 
 
 def _joint(joint: Joint) -> dict[str, Any]:

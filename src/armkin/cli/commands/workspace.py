@@ -78,7 +78,7 @@ def workspace(
 
     arm = arguments.load(robot, scene, tool)
     if out is not None:
-        cloud_file.check(out)
+        cloud_file.check_cloud(out)
     if plot is None and color is not None:
         raise UsageError("--color is for the picture; add --plot FILE")
     shade = color or "manipulability"

@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task
-from armkin.keep_out.clearance import clear
+from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import Arm
 
 
@@ -104,7 +104,7 @@ class Solutions:
     @cached_property
     def clear(self) -> Bool:
         """(..., B) branches that hit no keep-out, limits apart; all, where the arm has no keep-outs."""
-        return clear(self.arm, self.q) & self.valid if self.arm.keep_out else self.valid
+        return hits_nothing(self.arm, self.q) & self.valid if self.arm.keep_out else self.valid
 
     @cached_property
     def order(self) -> Int:

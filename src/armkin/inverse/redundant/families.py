@@ -32,7 +32,7 @@ from armkin.inverse.redundant.other_joints import Follower, Ik
 from armkin.inverse.redundant.traced_families import Traced, traced
 from armkin.inverse.solvers.redundant import Redundancy, moved, nearly_closed
 from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
-from armkin.keep_out.clearance import clear
+from armkin.keep_out.clearance import hits_nothing
 from armkin.model import units
 from armkin.model.arm import Arm, actual
 from armkin.model.limits import outside
@@ -263,11 +263,11 @@ def _with_near(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> A
 def _with_free_postures(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
     """The nearest postures (P, n) of legal pieces that hit nothing, to `FREE`; where there is none, q as it is."""
     out, pieces = q.copy(), curves.pieces
-    for p in np.flatnonzero(pieces.legal & ~clear(arm, q)):
+    for p in np.flatnonzero(pieces.legal & ~hits_nothing(arm, q)):
         a, b = pieces.first[p], pieces.last[p]
         t = np.linspace(a, b, max(int((b - a) / FREE) + 2, 2))[1:-1]
         there, legal = curves.at(rows_of(pieces, np.full(len(t), p)), t)
-        good = legal & clear(arm, np.nan_to_num(there))
+        good = legal & hits_nothing(arm, np.nan_to_num(there))
         if good.any():
             out[p] = there[np.where(good, motion(arm, there, near[p]), np.inf).argmin()]
     return out

@@ -28,7 +28,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_near, read_targets
-from armkin.keep_out.clearance import clear
+from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import Arm
 from armkin.model.limits import outside
 
@@ -68,7 +68,7 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
     for rows in slices(len(goal), AT_ONCE):
         found += _of_chunk(ik, arm, task, goal[rows], each[rows])
     if arm.keep_out:
-        found = [minima[np.argsort(~clear(arm, minima), kind="stable")] for minima in found]
+        found = [minima[np.argsort(~hits_nothing(arm, minima), kind="stable")] for minima in found]
     B = max(map(len, found), default=0)
     out = empty(len(goal), B, arm.n)
     out.q[...], out.branch[...], out.status[...], out.complete[...] = np.nan, -1, Status.UNREACHABLE, False

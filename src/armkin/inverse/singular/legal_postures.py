@@ -19,7 +19,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import components, surfaces
 from armkin.inverse.singular.curves import Curves
 from armkin.inverse.tasks.task import Task
-from armkin.keep_out.clearance import clear
+from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
@@ -85,12 +85,12 @@ def with_free_postures(goals: Goals, out: Batch) -> Batch:
     its self-motion that is neither, if there is one to 0.1 degrees.
     """
     arm, task, target, near = goals
-    good = clear(arm, out.q) & out.within
+    good = hits_nothing(arm, out.q) & out.within
     for k, b in np.argwhere((out.status == Status.SINGULAR)[:, None] & out.valid & ~good):
         on_it = followed(arm, task, out.q[k, b], target[k])
         rows, inside = nearest_row(arm, on_it, near[k])
         free = np.flatnonzero(inside)
-        free = free[clear(arm, rows[free])]
+        free = free[hits_nothing(arm, rows[free])]
         if len(free):
             unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
             nearest = free[np.argmin((np.abs(rows[free] - near[k]) * unit).sum(axis=1))]

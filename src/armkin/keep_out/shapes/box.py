@@ -34,10 +34,10 @@ class Box:
         lead = a.shape[1:]
         start, way = (self._in_box_axes(part.reshape(3, -1)) for part in (a, b - a))
         start -= (self.axes.T @ self.centre)[:, None]
-        out = np.sqrt(_outer_distance(start, way, self.half))
-        if (inside := np.flatnonzero(out == 0.0)).size:
-            out[inside] = _inner_distance(start[:, inside], way[:, inside], self.half)
-        return out.reshape(lead)
+        distances = np.sqrt(_outer_distance(start, way, self.half))
+        if (inside := np.flatnonzero(distances == 0.0)).size:
+            distances[inside] = _inner_distance(start[:, inside], way[:, inside], self.half)
+        return distances.reshape(lead)
 
     def of_points(self, p: Array) -> Array:
         """Signed distance of points: (3, ...) -> (...)."""
@@ -85,9 +85,9 @@ def _outer_distance(start: Array, way: Array, half: Array) -> Array:
         crossings = np.concatenate([(h - start) / way, (-h - start) / way])  # (6, M) where planes are crossed
     np.clip(np.nan_to_num(crossings, copy=False, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0, out=crossings)
     low, high = np.zeros(start.shape[1]), np.ones(start.shape[1])
-    slope_low, slope_high = (_slope(t, start, way, h) for t in (low, high))
+    slope_low, slope_high = (_half_slope(t, start, way, h) for t in (low, high))
     for t in crossings:
-        slope = _slope(t, start, way, h)
+        slope = _half_slope(t, start, way, h)
         nearer = (slope <= 0.0) & (t > low)
         low, slope_low = np.where(nearer, t, low), np.where(nearer, slope, slope_low)
         nearer = (slope >= 0.0) & (t < high)
@@ -101,7 +101,7 @@ def _outer_distance(start: Array, way: Array, half: Array) -> Array:
     return least
 
 
-def _slope(t: Array, start: Array, way: Array, h: Array) -> Array:
+def _half_slope(t: Array, start: Array, way: Array, h: Array) -> Array:
     """Half the derivative of the squared distance along the segments: t (M,) -> (M,)."""
     p = start + t * way
     slope: Array = np.einsum("km,km->m", p - np.clip(p, -h, h), way)
@@ -111,11 +111,11 @@ def _slope(t: Array, start: Array, way: Array, h: Array) -> Array:
 def _inner_distance(start: Array, way: Array, half: Array) -> Array:
     """Least signed distance over segments that touch the box: (M,), not positive."""
     signs = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])[:, None]
-    at, by = signs * np.tile(start, (2, 1)) - np.tile(half, 2)[:, None], signs * np.tile(way, (2, 1))
+    height, slope = signs * np.tile(start, (2, 1)) - np.tile(half, 2)[:, None], signs * np.tile(way, (2, 1))
     first, second = np.triu_indices(6, 1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        meets = (at[second] - at[first]) / (by[first] - by[second])
+        meets = (height[second] - height[first]) / (slope[first] - slope[second])
     ends = np.broadcast_to([[0.0], [1.0]], (2, start.shape[1]))
     t = np.clip(np.nan_to_num(np.concatenate([ends, meets]), nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
-    deepest: Array = (at[:, None] + t * by[:, None]).max(axis=0).min(axis=0)
+    deepest: Array = (height[:, None] + t * slope[:, None]).max(axis=0).min(axis=0)
     return np.minimum(deepest, 0.0)

@@ -66,4 +66,4 @@ def tube(begin: Array, end: Array, radius: float) -> Array:
         rings += [centre + radius * (np.cos(h) * circle + np.sin(h) * z) for h in heights]
     grid = np.array(rings)
     a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
-    return np.concatenate([np.stack(one, axis=2).reshape(-1, 3, 3) for one in ((a, b, c), (a, c, d))])
+    return np.concatenate([np.stack(triangle, axis=2).reshape(-1, 3, 3) for triangle in ((a, b, c), (a, c, d))])

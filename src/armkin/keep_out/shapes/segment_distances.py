@@ -22,23 +22,23 @@ def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
         crossing = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)  # nan, of parallel ones, is not
         # from each end to the other segment: where the parameter is clipped
         candidates = (
-            (0.0, _unit(vw / vv)),
-            (1.0, _unit((vw + uv) / vv)),
-            (_unit(-uw / uu), 0.0),
-            (_unit((uv - uw) / uu), 1.0),
+            (0.0, _clip_to_segment(vw / vv)),
+            (1.0, _clip_to_segment((vw + uv) / vv)),
+            (_clip_to_segment(-uw / uu), 0.0),
+            (_clip_to_segment((uv - uw) / uu), 1.0),
         )
-    least = _squared(w, u, v, np.where(crossing, s, 0.0), np.where(crossing, t, candidates[0][1]))
+    least = _squared_distance(w, u, v, np.where(crossing, s, 0.0), np.where(crossing, t, candidates[0][1]))
     for s_end, t_end in candidates:
-        least = np.minimum(least, _squared(w, u, v, s_end, t_end))
+        least = np.minimum(least, _squared_distance(w, u, v, s_end, t_end))
     return np.sqrt(least)
 
 
-def _unit(x: Array) -> Array:
+def _clip_to_segment(x: Array) -> Array:
     """Clipped to [0, 1]; of a segment without length the beginning."""
     return np.clip(np.where(np.isfinite(x), x, 0.0), 0.0, 1.0)
 
 
-def _squared(w: Array, u: Array, v: Array, s: Array | float, t: Array | float) -> Array:
+def _squared_distance(w: Array, u: Array, v: Array, s: Array | float, t: Array | float) -> Array:
     apart = w + s * u - t * v
     return _dot(apart, apart)
 

@@ -13,7 +13,7 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.keep_out.clearance import hits, whole_arm
 from armkin.keep_out.motion_geometry import Cubics, Way
-from armkin.keep_out.motion_proof import Proof, prove
+from armkin.keep_out.motion_proof import Proof, prove_motion
 from armkin.keep_out.motion_proof import hit_samples as find_hits
 from armkin.model import units
 from armkin.model.lock_joints import unlock
@@ -95,7 +95,7 @@ def _control_points(stretch: Stretch) -> Array:
 
 
 def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> TrajectoryProof | None:
-    """What a proof finds of a trajectory; None for an arm without keep-outs. tight: see `prove`."""
+    """What a proof finds of a trajectory; None for an arm without keep-outs. tight: see `prove_motion`."""
     arm = trajectory.arm
     full_arm, _ = whole_arm(arm, trajectory.start[None])
     if not full_arm.keep_out:
@@ -106,7 +106,7 @@ def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Trajecto
     escaping: tuple[int, ...] = ()
     for first, way in _geometries(trajectory):
         full_way = _UnlockedWay(arm, way)
-        proof = prove(bodies, full_way, tight=tight, ignored_pairs=allowed)
+        proof = prove_motion(bodies, full_way, tight=tight, ignored_pairs=allowed)
         postures += proof.postures
         if allowed is None:
             escaping = proof.escaping
