@@ -35,6 +35,7 @@ class _Curves:
         self.find = find
         self.planes, self.nodes, grid = answered(find, known, q)
         self.partner = np.full(2 * len(self.nodes.row), -1)
+        self.traced = np.zeros(len(self.partner), bool)  # a half that comes to nothing would do so again
         behind = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
         following = np.take_along_axis(grid, behind[:, :, None], axis=1)
         both = (grid >= 0) & (following >= 0)
@@ -45,6 +46,7 @@ class _Curves:
         first = len(self.nodes.row)
         self.nodes = stacked([self.nodes, nodes])
         self.partner = np.append(self.partner, np.full(2 * len(nodes.row), -1))
+        self.traced = np.append(self.traced, np.zeros(2 * len(nodes.row), bool))
         return np.arange(first, first + len(nodes.row))
 
     def _join(self, a: Int, b: Int) -> None:
@@ -111,6 +113,8 @@ class _Curves:
     def trace(self) -> None:
         """Open halves, step by step to where they leave their slab."""
         ray = self.open()
+        ray = ray[~self.traced[ray]]
+        self.traced[ray] = True
         passed, end, plane = self._steps(ray)
         there, every = np.flatnonzero(plane >= 0), np.arange(len(ray))
         row, slab = self.nodes.row[ray >> 1], self.slab(ray)
@@ -225,7 +229,7 @@ def _joined(find: Follower, known: Int, q: Array) -> Chains:
     """Curves of all targets that an answer on a plane, or one of q (M, n) of targets known (M,), is on."""
     curves = _Curves(find, known, q)
     for _ in range(ROUNDS):
-        if not len(curves.open()):
+        if curves.traced[curves.open()].all():
             break
         curves.join_pairs()
         curves.trace()
