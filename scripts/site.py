@@ -22,7 +22,7 @@ from typing import Any
 
 import armkin
 from armkin.calibration.calibrate_arm import Calibration
-from armkin.cli.app import load, run
+from armkin.cli.app import load_command, run
 from armkin.cli.commands import COMMANDS
 from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import Best, Rounding
@@ -101,7 +101,7 @@ def commands() -> Iterator[str]:
     """Every command's help."""
     yield "# Commands\n\nWhat `armkin COMMAND --help` prints.\n"
     for name, sentence in COMMANDS.items():
-        command: Any = load(name)
+        command: Any = load_command(name)
         yield f"## {name}\n\n{sentence}\n\n```text"
         yield command.get_help(command.make_context(f"armkin {name}", [], resilient_parsing=True))
         yield "```\n"

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import armkin
-from armkin.cli.app import load
+from armkin.cli.app import load_command
 from armkin.cli.negative_numbers import options_first
 from command_line import run
 
@@ -25,7 +25,7 @@ def test_every_public_name() -> None:
 
 @pytest.mark.parametrize("command", BEFORE["options"])
 def test_every_option(command: str) -> None:
-    known = {name for p in load(command).params for name in (*p.opts, *p.secondary_opts)} | {"--help"}
+    known = {name for p in load_command(command).params for name in (*p.opts, *p.secondary_opts)} | {"--help"}
     assert {options_first([option], [])[0] for option in BEFORE["options"][command]} <= known
 
 

@@ -15,7 +15,7 @@ import pytest
 
 import armkin
 from armkin.cli import answers
-from armkin.cli.app import load
+from armkin.cli.app import load_command
 from armkin.cli.commands import COMMANDS
 from command_line import ROOT, run
 
@@ -156,7 +156,7 @@ def test_a_wrong_answer_is_noticed(value: Any) -> None:
 
 
 def test_every_command_with_json_has_a_type_and_a_case() -> None:
-    with_json = {name for name in COMMANDS if any("--json" in p.opts for p in load(name).params)}
+    with_json = {name for name in COMMANDS if any("--json" in p.opts for p in load_command(name).params)}
     assert with_json == answers.ANSWERS.keys()
     tried = {kind for kind, _ in CASES} | {answers.Flash}  # tests/flash: it needs an image
     assert {kind for kinds in answers.ANSWERS.values() for kind in kinds} == tried

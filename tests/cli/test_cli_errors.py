@@ -13,7 +13,7 @@ import pytest
 
 from armkin import errors
 from armkin.cli import advice
-from armkin.cli.app import load
+from armkin.cli.app import load_command
 from armkin.cli.commands import COMMANDS
 from command_line import run
 
@@ -94,7 +94,7 @@ def test_errors_survive_pickling() -> None:
 def test_a_program_reads_other_advice_than_a_terminal() -> None:
     error = errors.RedundantArmError("7 joints", advice="hold 1 with armkin.lock", joints=["J1", "J2"], surplus=1)
     assert str(error) == "7 joints: hold 1 with armkin.lock"
-    assert advice.message(error).startswith("7 joints: fix 1 of J1, J2 with --lock JOINT=VALUE")
+    assert advice.message_with_advice(error).startswith("7 joints: fix 1 of J1, J2 with --lock JOINT=VALUE")
 
 
 def test_every_kind_that_has_advice_is_raised_somewhere() -> None:
@@ -104,7 +104,7 @@ def test_every_kind_that_has_advice_is_raised_somewhere() -> None:
 
 
 def test_no_text_of_the_core_names_an_option() -> None:
-    options = {word for name in COMMANDS for p in load(name).params for word in p.opts if word.startswith("--")}
+    options = {word for name in COMMANDS for p in load_command(name).params for word in p.opts if word.startswith("--")}
     found = [
         f"{path.relative_to(SOURCE)}:{node.lineno}: {word}"
         for path in sorted(SOURCE.rglob("*.py"))

@@ -271,14 +271,14 @@ def test_a_bug_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
     def bug(*_: object) -> None:
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(arguments, "load", bug)
+    monkeypatch.setattr(arguments, "load_arm", bug)
     result = run("fk", DOF, 1, 2, 3)
     assert (result.code, result.out) == (1, "")
     assert "internal error: ZeroDivisionError" in result.err
     assert "Traceback" not in result.err
     monkeypatch.setenv("ARMKIN_TRACEBACK", "1")
     assert "Traceback" in run("fk", DOF, 1, 2, 3).err
-    monkeypatch.setattr(arguments, "load", lambda *_: (_ for _ in ()).throw(MemoryError))
+    monkeypatch.setattr(arguments, "load_arm", lambda *_: (_ for _ in ()).throw(MemoryError))
     assert "not enough memory" in run("fk", DOF, 1, 2, 3).err
 
 

@@ -76,7 +76,7 @@ def test_a_watched_terminal_is_drawn_where_something_changes(monkeypatch: pytest
     screen = io.StringIO()
     monkeypatch.setattr(screen, "isatty", lambda: True)
     monkeypatch.setattr(sys, "stdout", screen)
-    status._watch(iter(["at 1\n"] * 50 + ["at 2\n"]))
+    status._print_changes(iter(["at 1\n"] * 50 + ["at 2\n"]))
     assert screen.getvalue().count("at 1") == 1
     assert screen.getvalue().count("at 2") <= 2  # and once more at the end
 

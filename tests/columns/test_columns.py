@@ -162,7 +162,7 @@ def test_processes_without_rows_leave_nothing(tmp_path: Path) -> None:
 def stop_after(pieces: int, monkeypatch: pytest.MonkeyPatch, error: BaseException) -> list[int]:
     """Let a run end when so many pieces are kept; returns the numbers of the pieces that are answered."""
     answered: list[int] = []
-    work = batch_answers.work
+    work = batch_answers.answer_piece
 
     def counted(job: Any, piece: Any) -> Any:
         if len(answered) == pieces:
@@ -170,7 +170,7 @@ def stop_after(pieces: int, monkeypatch: pytest.MonkeyPatch, error: BaseExceptio
         answered.append(piece.number)
         return work(job, piece)
 
-    monkeypatch.setattr(batch_answers, "work", counted)
+    monkeypatch.setattr(batch_answers, "answer_piece", counted)
     return answered
 
 

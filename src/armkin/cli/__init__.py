@@ -52,12 +52,12 @@ def main() -> NoReturn:
     try:
         # All is written and closed by then. Leaving the ordinary way would take numpy, pydantic and Typer apart
         # object by object, a fifth of the time of a short command.
-        os._exit(_run())
+        os._exit(_run_command_line())
     except KeyboardInterrupt:
         os._exit(130)  # before `run` could take care of it, or after
 
 
-def _run() -> int:
+def _run_command_line() -> int:
     import signal
 
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell's background job ignores it

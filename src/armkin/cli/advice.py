@@ -40,7 +40,7 @@ def next_step(error: ArmkinError) -> str:
     return error.advice
 
 
-def message(error: ArmkinError) -> str:
+def message_with_advice(error: ArmkinError) -> str:
     """An error's message with its next step."""
     step = next_step(error)
     if not step:
@@ -51,13 +51,13 @@ def message(error: ArmkinError) -> str:
     return f"{error.message}{': ' if lines > 1 or isinstance(error, _ONE_LINE) else chr(10)}{step}"
 
 
-def _redundant(error: ArmkinError) -> str:
+def _redundant_advice(error: ArmkinError) -> str:
     joints = ", ".join(error.fields["joints"])
     fix = f"fix {error.fields['surplus']} of {joints} with --lock JOINT=VALUE"
     return f"{fix}, or try values with --sweep JOINT=LOW:HIGH:COUNT"
 
 
-def _incomplete(error: ArmkinError) -> str:
+def _missing_keys_advice(error: ArmkinError) -> str:
     """Where the lines to add are shown; what a shipped robot lacks is added to a copy of its file."""
     if (step := _NEEDED.get(error.fields.get("needs", ""))) is not None:
         return step
@@ -70,7 +70,7 @@ def _incomplete(error: ArmkinError) -> str:
     return f"{copy}\nor rehearse with --accel 60, for example" if error.fields.get("option") == "--accel" else copy
 
 
-def _lost(error: ArmkinError) -> str:
+def _lost_advice(error: ArmkinError) -> str:
     home = f"armkin home {error.fields['robot_file']} --port {error.fields['port']}"
     assume = "add --assume-home (the arm stands in its home pose; --assume Q,...: there)"
     return f"{home}, or {assume}" if error.fields["homing"] else f"put the arm in its home pose and {assume}"
@@ -84,7 +84,7 @@ _NEEDED = {
 }
 _ONE_LINE = (RedundantArmError, PortInUseError, NoHomingError, UnfinishedError)
 _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
-    RedundantArmError: _redundant,
+    RedundantArmError: _redundant_advice,
     NoBranchError: lambda error: "ik --all-branches lists all branches, also those outside limits",
     NoHomingError: lambda error: (
         "add --rest-at-home if these joints stand in their home pose"
@@ -97,7 +97,7 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
         else f"armkin home {error.fields['robot_file']} --rest-at-home, with these joints in their home pose"
     ),
     PortInUseError: lambda error: f"wait for it, or armkin stop --port {error.fields['port']}",
-    PositionLostError: _lost,
+    PositionLostError: _lost_advice,
     HeldError: lambda error: (
         "the same command with --resume goes on, any other starts there"
         if error.fields.get("resumable")
@@ -108,5 +108,5 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     GripperLostError: lambda error: "armkin grip ROBOT open --assume open (or closed, or a value) says where it stands",
     GripperKnownError: lambda error: "leave --assume out",
     UnfinishedError: lambda error: "the same command with --resume goes on; without these parts another one may begin",
-    UsageError: _incomplete,  # the last: NoHomingError and others are such, too
+    UsageError: _missing_keys_advice,  # the last: NoHomingError and others are such, too
 }

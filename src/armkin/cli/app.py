@@ -85,24 +85,24 @@ class Commands(TyperGroup):
             return name, None, args[1:]
         if name not in COMMANDS:
             raise exit_codes.no_command(name, args[1:])
-        return name, load(name), args[1:]
+        return name, load_command(name), args[1:]
 
 
 @cache
-def load(name: str) -> Any:
+def load_command(name: str) -> Any:
     """Import a command's module and let Typer read its function; once in a process that runs many command lines."""
     word = f"{name}_" if iskeyword(name) else name  # Python has `import` for itself
     function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
     single = typer.Typer(add_completion=False, rich_markup_mode=None)
-    single.command(name, cls=Command, context_settings=_SETTINGS)(link_trace.traceable(function))
+    single.command(name, cls=Command, context_settings=_SETTINGS)(link_trace.add_trace_option(function))
     return typer.main.get_command(single)
 
 
 app = typer.Typer(cls=Commands, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin")
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
         from armkin import __version__
 
         with output.destination(None) as write:
@@ -113,28 +113,28 @@ def _version(wanted: bool) -> None:
 @app.callback(no_args_is_help=False)
 def armkin(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Robot arms from a YAML table to real motion. Millimetres and degrees throughout."""
 
 
 @cache
-def _group() -> Any:
+def _command_group() -> Any:
     """The group with all its commands."""
     return typer.main.get_command(app)
 
 
 def run(arguments: list[str]) -> int:
     """Run a command line, without the program's name, and return its exit code; no exception leaves here."""
-    before = {number: signal.signal(number, _terminate) for number in _ending()}
+    before = {number: signal.signal(number, _terminate) for number in _ending_signals()}
     if arguments[:1] in ([], ["help"]):  # armkin help fk
         arguments = [*arguments[1:2], "--help"]
     output.for_programs("--json" in arguments, [*arguments, os.environ.get("ARMKIN_PORT", "")])
     try:
-        code = _exit_code(lambda: _group()(arguments, prog_name="armkin", standalone_mode=False))
+        code = _exit_code(lambda: _command_group()(arguments, prog_name="armkin", standalone_mode=False))
         # What a failed command has printed stays printed: the rows of a batch before the malformed one.
-        return _exit_code(_flush) or code
+        return _exit_code(_flush_output) or code
     finally:
         output.flush()
         for number, handler in before.items():
@@ -155,22 +155,22 @@ def _exit_code(command: Callable[[], Any]) -> int:
         return exit_codes.exit_code(error)
 
 
-def _flush() -> None:
+def _flush_output() -> None:
     if sys.stdout is not None:
         sys.stdout.flush()
 
 
-def _ending() -> list[int]:
+def _ending_signals() -> list[int]:
     """The signals that end a command, but for those that its parent has it ignore, as `nohup` does."""
-    known = (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP"))
-    return [number for number in known if number is not None and signal.getsignal(number) != signal.SIG_IGN]
+    numbers = (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP"))
+    return [number for number in numbers if number is not None and signal.getsignal(number) != signal.SIG_IGN]
 
 
 def _terminate(signum: int, frame: FrameType | None) -> None:
     """SIGTERM and SIGHUP end the command as Ctrl-C does, through its ``finally``s, with their own exit codes."""
     if put_off(signum, frame):
         return
-    for number in _ending():
+    for number in _ending_signals():
         signal.signal(number, signal.SIG_IGN)  # once is enough
     sys.exit(128 + signum)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from armkin import files
 from armkin.cli import output, unit_notes
-from armkin.cli.number_parsing import NOT_FINITE, comma_separated, is_number, number, numbers, place
+from armkin.cli.number_parsing import NOT_FINITE, comma_separated, is_number, number, numbers, place_numbers
 from armkin.errors import FileError, UsageError
 from armkin.model import units
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def load(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
+def load_arm(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
     """The arm of a robot file, or of a shipped robot, in its scene; tool: what `--tool` says."""
     from armkin.keep_out.load_with_scene import load
     from armkin.robot_file.catalogue import locate
@@ -33,14 +33,14 @@ def load(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
     files.protect_input(locate(robot))
     if scene is not None:
         files.protect_input(scene)
-    arm = load(robot, scene, tool=None if tool is None else _six(tool))
+    arm = load(robot, scene, tool=None if tool is None else _tool_numbers(tool))
     unit_notes.robot_file(arm)
     return arm
 
 
-def _six(tool: str) -> list[float]:
+def _tool_numbers(tool: str) -> list[float]:
     """`--tool X,Y,Z[,R,P,Y]` as six numbers [mm, deg]."""
-    return [*place(tool, "--tool"), 0.0, 0.0, 0.0][:6]
+    return [*place_numbers(tool, "--tool"), 0.0, 0.0, 0.0][:6]
 
 
 def percent(text: str, option: str) -> float:
@@ -62,13 +62,13 @@ def standard_input(most: int, instead: str = "") -> bytes:
         raise FileError("standard input is closed")
     files.protect_input(0)
     try:
-        data = sys.stdin.buffer.read(most + 1)
+        content = sys.stdin.buffer.read(most + 1)
     except (OSError, ValueError) as error:
         raise FileError(f"standard input: cannot read: {getattr(error, 'strerror', None) or error}") from None
-    if len(data) > most:
+    if len(content) > most:
         size = f"{most // 1_000_000} MB" if most >= 1_000_000 else f"{most // 1000} kB"
         raise UsageError(f"more than {size} on standard input{instead}")
-    return data
+    return content
 
 
 def required_robot(robot: str | None) -> str:
@@ -80,7 +80,7 @@ def required_robot(robot: str | None) -> str:
 
 def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
     """One value for each joint [deg | mm], or the name of a pose."""
-    if words is not None and len(words) == 1 and (named := _pose(arm, words[0], "")) is not None:
+    if words is not None and len(words) == 1 and (named := _named_pose(arm, words[0], "")) is not None:
         return named
     values = numbers(words or (), arm.joint_names, arm.name)
     unit_notes.joint_values(arm, values)
@@ -89,7 +89,7 @@ def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
 
 def joint_list(arm: Arm, text: str, option: str) -> list[float]:
     """One value for each joint [deg | mm], comma-separated, or the name of a pose."""
-    named = _pose(arm, text, f"{option}: ")
+    named = _named_pose(arm, text, f"{option}: ")
     if named is not None:
         return named
     values = comma_separated(text, arm.joint_names, option)
@@ -97,7 +97,7 @@ def joint_list(arm: Arm, text: str, option: str) -> list[float]:
     return values
 
 
-def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
+def _named_pose(arm: Arm, word: str, context: str) -> list[float] | None:
     """The joint values of a named pose [deg | mm]; None for a word that is no name."""
     poses = units.poses_out(arm)
     if word in poses:
@@ -107,7 +107,7 @@ def _pose(arm: Arm, word: str, where: str) -> list[float] | None:
     close = get_close_matches(word, poses, 1)
     hint = f"did you mean {close[0]}?" if close else f"its poses: {', '.join(poses)}"
     example = " ".join(arm.joint_names)
-    raise UsageError(f"{where}{arm.name} has no pose '{word}'; {hint} (or give joint values: {example})")
+    raise UsageError(f"{context}{arm.name} has no pose '{word}'; {hint} (or give joint values: {example})")
 
 
 def target(arm: Arm, task: Task, words: Sequence[str] | None) -> list[float]:
@@ -118,34 +118,34 @@ def target(arm: Arm, task: Task, words: Sequence[str] | None) -> list[float]:
         if "got" in error.fields:
             error.message += _other_task(arm, task, error.fields["got"])
         raise
-    unit_notes.target(arm, task.labels, values)
+    unit_notes.note_target(arm, task.labels, values)
     return values
 
 
 _MEANING = {"phi": "phi is the tool's pitch, the sum of the parallel joints' angles"}
 
 
-def _other_task(arm: Arm, task: Task, got: int) -> str:
+def _other_task(arm: Arm, task: Task, count: int) -> str:
     """What a label means that is no coordinate, and the task that takes as many numbers as were given."""
     from armkin.inverse.tasks.choose_task import task_for
     from armkin.inverse.tasks.task import LABELS
 
-    told = [words for label, words in _MEANING.items() if label in task.labels]
+    hints = [words for label, words in _MEANING.items() if label in task.labels]
     for name, labels in LABELS.items():
-        if len(labels) == got and name != task.name:
+        if len(labels) == count and name != task.name:
             with suppress(UsageError):
-                told.append(f"--task {task_for(arm, name).name} takes {' '.join(labels)}")
+                hints.append(f"--task {task_for(arm, name).name} takes {' '.join(labels)}")
                 break
-    return "".join(f"; {words}" for words in told)
+    return "".join(f"; {words}" for words in hints)
 
 
 def target_list(arm: Arm, task: Task, text: str, words: Sequence[str] | None = None) -> list[float]:
     """The numbers of `--target X,Y,Z` [mm, deg]; words: words that stand behind the option, numbers for its target."""
     if words and is_number(text) and all(map(is_number, words)):
-        whole = ",".join([text, *words])
-        raise UsageError(f"--target: separate the numbers with commas: --target {whole}")
+        joined = ",".join([text, *words])
+        raise UsageError(f"--target: separate the numbers with commas: --target {joined}")
     values = comma_separated(text, task.labels, f"--target (task {task.name})")
-    unit_notes.target(arm, task.labels, values)
+    unit_notes.note_target(arm, task.labels, values)
     return values
 
 
@@ -158,8 +158,8 @@ def check_commas(arm: Arm, task: str | None, text: str, words: Sequence[str]) ->
 
 def one_alone(workers: int, cluster: str | None, resume: bool) -> None:
     """One row is not shared, and there is nothing to go on with."""
-    for option, given in (("--workers", workers > 1), ("--cluster", cluster is not None), ("--resume", resume)):
-        if given:
+    for option, is_given in (("--workers", workers > 1), ("--cluster", cluster is not None), ("--resume", resume)):
+        if is_given:
             raise UsageError(f"{option} belongs to --batch: one row is not shared")
 
 

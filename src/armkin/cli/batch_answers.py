@@ -46,11 +46,15 @@ class Tally:
     first_bad: int = 0  # the number of the first of them
     skipped: int = 0  # rows without values
 
-    def add(self, other: Tally) -> None:
+    def add(self, chunk_tally: Tally) -> None:
         """Count another chunk, too."""
-        firsts = [first for first in (self.first_bad, other.first_bad) if first]
+        firsts = [first for first in (self.first_bad, chunk_tally.first_bad) if first]
         self.first_bad = min(firsts, default=0)
-        self.rows, self.bad, self.skipped = self.rows + other.rows, self.bad + other.bad, self.skipped + other.skipped
+        self.rows, self.bad, self.skipped = (
+            self.rows + chunk_tally.rows,
+            self.bad + chunk_tally.bad,
+            self.skipped + chunk_tally.skipped,
+        )
 
     def conclude(self, unsolvable: bool) -> None:
         """Warn of rows outside the limits; raise NoSolutionError for rows without a best branch."""
@@ -103,7 +107,7 @@ def _well_formed(piece: Piece, malformed: list[UsageError]) -> Iterator[Chunk]:
         malformed.append(error)
 
 
-def _encoder(job: Job) -> Callable[[Table], bytes]:
+def _table_encoder(job: Job) -> Callable[[Table], bytes]:
     """What makes bytes of a table."""
     format = format_of(f"x{job.format}")
     if not (job.compiled and format.is_text):
@@ -113,37 +117,37 @@ def _encoder(job: Job) -> Callable[[Table], bytes]:
     return partial(format.encoded, lines=lines)
 
 
-def work(job: Job, piece: Piece) -> Done:
+def answer_piece(job: Job, piece: Piece) -> Done:
     """Answer one piece of the input: a pure function, wherever it runs."""
-    tally, data, heading = Tally(), list[bytes](), list[str]()
-    encoded, malformed = _encoder(job), list[UsageError]()
+    tally, encoded_parts, heading = Tally(), list[bytes](), list[str]()
+    encoded, malformed = _table_encoder(job), list[UsageError]()
     for chunk in _well_formed(piece, malformed):
         if job.as_json:
-            data.append(_lines(job.questions, chunk, tally))
+            encoded_parts.append(_json_lines(job.questions, chunk, tally))
         else:
             table, good = job.questions.table(chunk)
             heading = list(table)
-            _count(tally, chunk, good)
-            data.append(encoded(table))
+            _count_bad_rows(tally, chunk, good)
+            encoded_parts.append(encoded(table))
     problem = malformed[0] if malformed else None
     if piece.columns is not None:
         tally.skipped = piece.columns.skipped
     elif piece.values is not None and problem is None:
         tally.skipped = len(piece.values) - tally.rows
     near = getattr(job.questions, "near", None)
-    done = Done(piece.number, piece.digest(), b"".join(data), heading, tally, problem, near)
+    finished = Done(piece.number, piece.digest(), b"".join(encoded_parts), heading, tally, problem, near)
     if job.parts is None or problem is not None:
-        return done
-    job.parts.keep(done.number, done.about(), done.data)
-    return done._replace(data=b"", stored=True)
+        return finished
+    job.parts.keep(finished.number, finished.about(), finished.data)
+    return finished._replace(data=b"", stored=True)
 
 
-def _lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
+def _json_lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
     """A chunk's answers as JSON Lines."""
     lines = []
     for start in range(0, len(chunk.values), _AT_ONCE):
-        some = slice(start, start + _AT_ONCE)
-        part = Chunk(chunk.numbers[some], chunk.values[some])
+        span = slice(start, start + _AT_ONCE)
+        part = Chunk(chunk.numbers[span], chunk.values[span])
         for number, answer in zip(part.numbers, questions.objects(part), strict=True):
             bad = answer["best"] is None if questions.unsolvable else bool(answer["violations"])
             tally.add(Tally(1, int(bad), number if bad else 0))
@@ -151,7 +155,7 @@ def _lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
     return "\n".join([*lines, ""]).encode()
 
 
-def _count(tally: Tally, chunk: Chunk, good: Any) -> None:
+def _count_bad_rows(tally: Tally, chunk: Chunk, good: Any) -> None:
     bad = (~good).nonzero()[0]
     tally.add(Tally(len(good), len(bad), int(chunk.numbers[int(bad[0])]) if len(bad) else 0))
 
@@ -199,29 +203,29 @@ class Batch:
 
     def _stream(self, format: Format, job: Job, pieces: Rows, tally: Tally) -> None:
         """To a pipe, piece by piece; what is no text when all is there."""
-        kept: list[bytes] = []
-        with _binary(self.out) as write, output.progress("rows", pieces.count) as tick:
-            for done in in_order(self.engine, work, job, pieces):
+        binary_parts: list[bytes] = []
+        with _binary_writer(self.out) as write, output.progress("rows", pieces.count) as tick:
+            for finished in in_order(self.engine, answer_piece, job, pieces):
                 if format.is_text:
-                    write(_headed(done, job, format, tally) + done.data)
-                elif done.tally.rows:
-                    kept.append(done.data)
-                tally.add(done.tally)
+                    write(_heading_bytes(finished, job, format, tally) + finished.data)
+                elif finished.tally.rows:
+                    binary_parts.append(finished.data)
+                tally.add(finished.tally)
                 tick(tally.rows)
-                if done.problem is not None:
-                    raise done.problem
+                if finished.problem is not None:
+                    raise finished.problem
             if not tally.rows:
                 raise pieces.empty(tally.skipped)
-            if kept:
-                whole = io.BytesIO()
-                format.write_parts(whole, lambda: map(io.BytesIO, kept))
-                write(whole.getvalue())
+            if binary_parts:
+                joined = io.BytesIO()
+                format.write_parts(joined, lambda: map(io.BytesIO, binary_parts))
+                write(joined.getvalue())
 
 
-def _headed(done: Done, job: Job, format: Format, tally: Tally) -> bytes:
+def _heading_bytes(finished: Done, job: Job, format: Format, tally: Tally) -> bytes:
     """The heading of a CSV, before its first rows."""
-    first = format.name == "csv" and not job.as_json and done.tally.rows and not tally.rows
-    return (csv_line(done.heading) + "\n").encode() if first else b""
+    first = format.name == "csv" and not job.as_json and finished.tally.rows and not tally.rows
+    return (csv_line(finished.heading) + "\n").encode() if first else b""
 
 
 def _is_file(path: str) -> bool:
@@ -230,10 +234,10 @@ def _is_file(path: str) -> bool:
 
 
 @contextmanager
-def _binary(out: str | None) -> Iterator[Callable[[bytes], object]]:
+def _binary_writer(out: str | None) -> Iterator[Callable[[bytes], object]]:
     if out is None or out == "-":
         with output.destination(out) as write:
-            yield lambda data: write(data.decode())
+            yield lambda encoded: write(encoded.decode())
         return
 
     with files.write_whole(out, "wb") as file:
@@ -247,8 +251,8 @@ class _ToFile:
         self.batch, self.format, self.job, self.tally = batch, format, job, tally
         self.path = str(batch.out)
         files.check(self.path)
-        asked = {"armkin": __version__, "format": format.name, "json": batch.as_json, "input size": size}
-        self.parts = Parts(self.path, {**batch.settings, **asked})
+        identity = {"armkin": __version__, "format": format.name, "json": batch.as_json, "input size": size}
+        self.parts = Parts(self.path, {**batch.settings, **identity})
         self.first: Done | None = None  # the only piece so far: it may be the last
         self.count = 0
 
@@ -262,12 +266,12 @@ class _ToFile:
         job = self.job._replace(parts=self.parts) if pool else self.job
         try:
             with output.progress("rows", pieces.count) as tick:
-                for done in in_order(self.batch.engine, work, job, self._missing(pieces)):
-                    self._keep(done)
+                for finished in in_order(self.batch.engine, answer_piece, job, self._missing_pieces(pieces)):
+                    self._keep_piece(finished)
                     tick(self.tally.rows)
             if not self.tally.rows:
                 raise pieces.empty(self.tally.skipped)
-            self._write()
+            self._write_file()
         except BaseException as error:
             of_no_use = isinstance(error, UsageError) or not self.parts.some
             if of_no_use and not self.batch.resume and self.parts.held:
@@ -276,7 +280,7 @@ class _ToFile:
         finally:
             self.parts.leave()
 
-    def _missing(self, pieces: Iterable[Piece]) -> Iterator[Piece]:
+    def _missing_pieces(self, pieces: Iterable[Piece]) -> Iterator[Piece]:
         """The pieces that no earlier run has finished; those that one has are counted."""
         for piece in pieces:
             self.count = piece.number + 1
@@ -294,24 +298,24 @@ class _ToFile:
             if about["near"] is not None:
                 self.job.questions.near = about["near"]  # type: ignore[attr-defined]
 
-    def _keep(self, done: Done) -> None:
-        if done.problem is not None:
-            raise done.problem
-        if self.first is None and done.number == 0 and not self.parts.held:
-            self.first = done
-        elif not done.stored:
+    def _keep_piece(self, finished: Done) -> None:
+        if finished.problem is not None:
+            raise finished.problem
+        if self.first is None and finished.number == 0 and not self.parts.held:
+            self.first = finished
+        elif not finished.stored:
             if not self.parts.held:
                 self.parts.begin()
                 assert self.first is not None
                 self.parts.keep(0, self.first.about(), self.first.data)
-            self.parts.keep(done.number, done.about(), done.data)
-        self.tally.add(done.tally)
+            self.parts.keep(finished.number, finished.about(), finished.data)
+        self.tally.add(finished.tally)
 
-    def _write(self) -> None:
+    def _write_file(self) -> None:
         held = self.parts.held
         try:
             with files.write_whole(self.path, "wb") as file:
-                self._put(file)
+                self._put_parts(file)
         except FileError as error:
             if held:
                 raise UnfinishedError(
@@ -323,7 +327,7 @@ class _ToFile:
         if held:
             self.parts.remove()
 
-    def _put(self, file: IO[bytes]) -> None:
+    def _put_parts(self, file: IO[bytes]) -> None:
         if self.parts.held:
             headings = (about["heading"] for i in range(self.count) if (about := self.parts.about(i)) is not None)
             heading: list[str] = next((names for names in headings if names), [])

@@ -35,8 +35,8 @@ class Piece(NamedTuple):
 
     def digest(self) -> str:
         """What tells this input from another."""
-        data = self.lines if self.values is None else self.values.tobytes()
-        return hashlib.sha256(data).hexdigest()
+        content = self.lines if self.values is None else self.values.tobytes()
+        return hashlib.sha256(content).hexdigest()
 
 
 class Rows:
@@ -67,7 +67,7 @@ class Rows:
         text = not self.source.lower().endswith((".npz", ".parquet"))
         if not text or not os.path.isfile(self.source):
             return None
-        with csv_to_numbers.opened(self.source) as file:
+        with csv_to_numbers.open_source(self.source) as file:
             return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
 
     def __iter__(self) -> Iterator[Piece]:
@@ -99,8 +99,8 @@ class Rows:
     def _of_text(self, source: str) -> Iterator[Piece]:
         learner = Columns(self.names, self.purpose, self.named)  # learns the heading, for the pieces after it
         number, first = 0, 1
-        with csv_to_numbers.opened(source) as file:
-            for block in csv_to_numbers.blocks(file, source):
+        with csv_to_numbers.open_source(source) as file:
+            for block in csv_to_numbers.text_blocks(file, source):
                 columns = copy.copy(learner)
                 columns.skipped = 0
                 yield Piece(number, first, csv_to_numbers.name_of(source), self.names, block, columns)
@@ -111,19 +111,19 @@ class Rows:
                         learner.row(line, i)
                     except UsageError:
                         break
-                number, first = number + 1, first + csv_to_numbers.count(block)
+                number, first = number + 1, first + csv_to_numbers.line_count(block)
 
 
 def parse_piece(piece: Piece) -> Iterator[Chunk]:
     """The rows of a piece; a malformed one raises UsageError, after those before it were given out."""
     if piece.values is not None:
-        yield from _checked(piece, piece.values)
+        yield from _finite_rows(piece, piece.values)
         return
     assert piece.columns is not None
     yield from csv_to_numbers.chunk_of(piece.lines, piece.first, piece.columns, piece.source)
 
 
-def _checked(piece: Piece, values: Array) -> Iterator[Chunk]:
+def _finite_rows(piece: Piece, values: Array) -> Iterator[Chunk]:
     """Rows of finite numbers; rows without any are passed over."""
     import numpy as np
 
@@ -131,10 +131,12 @@ def _checked(piece: Piece, values: Array) -> Iterator[Chunk]:
     keep = np.asarray(~absent.all(axis=1))
     bad = np.argwhere(~(np.abs(values) <= LARGEST) & keep[:, None])
     end = int(bad[0, 0]) if len(bad) else len(values)
-    some = np.flatnonzero(keep[:end])
-    if len(some):
-        whole = len(some) == len(values)
-        yield Chunk(range(first, first + end), values) if whole else Chunk((first + some).tolist(), values[some])
+    present = np.flatnonzero(keep[:end])
+    if len(present):
+        is_whole = len(present) == len(values)
+        yield (
+            Chunk(range(first, first + end), values) if is_whole else Chunk((first + present).tolist(), values[present])
+        )
     if len(bad):
         row, column = bad[0].tolist()
         value = values[row, column]

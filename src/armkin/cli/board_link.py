@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _FASTEST = 4_000_000  # what USB adapters make; a bus has 1,000,000
 
 
-def _rate(text: str | None) -> int | None:
+def _baud_rate(text: str | None) -> int | None:
     return None if text is None else whole_number(text, "--baud", 1, _FASTEST)
 
 
@@ -34,7 +34,7 @@ Baud = Annotated[
         "--baud",
         metavar="N",
         parser=str,
-        callback=_rate,
+        callback=_baud_rate,
         help="Baud rate of the port. [default: what the kind of board uses]",
     ),
 ]
@@ -79,7 +79,7 @@ class Link:
 
 
 @contextmanager
-def backend(
+def open_backend(
     board: Board, port: str | None, baud: int | None, *, simulated: str = AT_HOME, reset: bool = True
 ) -> Iterator[Backend]:
     """The arm on a board of any kind behind a port, given back at the end; a signal stops the arm first.
@@ -93,13 +93,13 @@ def backend(
     port = port_name(port, board, baud, reset=reset)
     if port == SIM:
         output.note(simulated)
-    with stoppable() as stop, open_board(board, port, baud=baud, stop=stop, reset=reset) as one:
+    with stoppable() as stop, open_board(board, port, baud=baud, stop=stop, reset=reset) as machine:
         if port != SIM:
-            _once_a_day(port, one.differences)
+            _once_a_day(port, machine.differences)
         try:
-            yield one
+            yield machine
         except StoppedError:
-            output.warn(f"stopped: {one.standing_text()}{_goes_on(one)}")
+            output.warn(f"stopped: {machine.standing_text()}{_goes_on(machine)}")
             raise
 
 
@@ -122,19 +122,19 @@ def _goes_on(machine: Backend) -> str:
 
 def can_resume(options: Mapping[str, object]) -> None:
     """Raise UsageError for what makes no sense beside --resume: option -> whether it is given."""
-    for option, given in options.items():
-        if given:
+    for option, is_given in options.items():
+        if is_given:
             raise UsageError(f"--resume and {option}: a motion that was held goes on from where the arm stands")
 
 
 @contextmanager
-def progress(plans: Sequence[Planned], note: Callable[[float], None]) -> Iterator[Progress]:
+def motion_progress(plans: Sequence[Planned], note: Callable[[float], None]) -> Iterator[Progress]:
     """A bar for the plans' time on a terminal, and the note of a motion under way."""
     with output.progress("ms of motion", round(1000 * sum(plan.duration for plan in plans))) as tick:
 
-        def tell(done: float, _: float) -> None:
-            note(done)
-            tick(round(1000 * done))
+        def tell(elapsed: float, _: float) -> None:
+            note(elapsed)
+            tick(round(1000 * elapsed))
 
         yield tell
 
@@ -197,11 +197,13 @@ def standing_joints(arm: Arm, text: str, option: str) -> Array:
     return q
 
 
-def prepare(arm: Arm, machine: Backend, text: str | None, assume: Array | None) -> None:
+def prepare_motion(arm: Arm, machine: Backend, text: str | None, assume: Array | None) -> None:
     """Get the board ready to move; says so if it takes the arm to stand somewhere on the operator's word."""
     if machine.prepare(assume=assume) and text is not None:
-        where = "in its home pose" if text == "home" else f"in its pose {text}" if text in arm.poses else f"at {text}"
-        output.note(f"the board takes the arm to stand {where}")
+        place_text = (
+            "in its home pose" if text == "home" else f"in its pose {text}" if text in arm.poses else f"at {text}"
+        )
+        output.note(f"the board takes the arm to stand {place_text}")
 
 
 def where_text(arm: Arm, answer: Mapping[str, Any]) -> str:
@@ -213,8 +215,8 @@ def where_text(arm: Arm, answer: Mapping[str, Any]) -> str:
         return f"{arm.name}: its position is lost{f' ({why})' if why else ''}\n"
     head = [f"{name}/{unit}" for name, unit in zip(motor_names(arm), pulse_units(arm), strict=True)]
     tables = [
-        render.row("joints", render.joint_headings(arm), [render.fixed(value) for value in answer["joints"]]),
+        render.row("joints", render.joint_headings(arm), [render.fixed_text(value) for value in answer["joints"]]),
         render.row("pulses", head, [str(value) for value in answer["pulses"]]),
-        render.row("tool", ["x/mm", "y/mm", "z/mm"], [render.fixed(value) for value in answer["position_mm"]]),
+        render.row("tool", ["x/mm", "y/mm", "z/mm"], [render.fixed_text(value) for value in answer["position_mm"]]),
     ]
     return "\n".join([f"{arm.name}: position {answer['position']}", *tables, ""])

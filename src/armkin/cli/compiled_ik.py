@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def prepare(arm: Arm, task: str | None = None) -> None:
+def build_library(arm: Arm, task: str | None = None) -> None:
     """Build the machine code, before there are processes, which then have it, too."""
     armkin.compile(arm, task)
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Complete = Callable[[typer.Context, str], list[str]]
 
 
-def _quiet(offers: Callable[[typer.Context], Iterable[str]]) -> Complete:
+def _without_errors(offers: Callable[[typer.Context], Iterable[str]]) -> Complete:
     """A completion of the offers that begin with what was typed; errors offer nothing."""
 
     @wraps(offers)
@@ -35,13 +35,13 @@ def _quiet(offers: Callable[[typer.Context], Iterable[str]]) -> Complete:
     return complete
 
 
-def _arm(ctx: typer.Context) -> Arm:
+def _arm_of(ctx: typer.Context) -> Arm:
     from armkin.keep_out.load_with_scene import load
 
     return load(str(ctx.params["robot"]))
 
 
-@_quiet
+@_without_errors
 def robots(ctx: typer.Context) -> Iterable[str]:
     """Shipped robots."""
     from armkin.robot_file import catalogue
@@ -49,37 +49,37 @@ def robots(ctx: typer.Context) -> Iterable[str]:
     return catalogue.names()
 
 
-@_quiet
+@_without_errors
 def poses(ctx: typer.Context) -> Iterable[str]:
     """Named poses, in place of joint values."""
-    return [] if ctx.params.get("q") else _arm(ctx).poses
+    return [] if ctx.params.get("q") else _arm_of(ctx).poses
 
 
-@_quiet
+@_without_errors
 def joints(ctx: typer.Context) -> Iterable[str]:
     """Joints of the robot."""
-    return _arm(ctx).joint_names
+    return _arm_of(ctx).joint_names
 
 
-@_quiet
+@_without_errors
 def assignments(ctx: typer.Context) -> Iterable[str]:
     """Joints of the robot, to be given a value."""
-    return [f"{name}=" for name in _arm(ctx).joint_names]
+    return [f"{name}=" for name in _arm_of(ctx).joint_names]
 
 
-@_quiet
+@_without_errors
 def branches(ctx: typer.Context) -> Iterable[str]:
     """Names of the robot's branches, written without blanks: left/elbow-up."""
     from armkin.inverse.tasks.choose_task import task_for
     from armkin.inverse.tasks.task import targets_of
 
-    arm = _arm(ctx)
+    arm = _arm_of(ctx)
     task = task_for(arm, ctx.params.get("task"))
     goal = targets_of(task, armkin.fk(arm, arm.home)[None], arm.home[None])
     return [name.replace(", ", "/").replace(" ", "-") for name in armkin.ik(arm, goal, task.name).names]
 
 
-@_quiet
+@_without_errors
 def tasks(ctx: typer.Context) -> Iterable[str]:
     """Names of the tasks."""
     from armkin.inverse.tasks.task import LABELS
@@ -87,7 +87,7 @@ def tasks(ctx: typer.Context) -> Iterable[str]:
     return LABELS
 
 
-@_quiet
+@_without_errors
 def ports(ctx: typer.Context) -> Iterable[str]:
     """Serial ports, and the board in the process."""
     from armkin.board.ports import list_ports

@@ -51,7 +51,7 @@ class Columns:
         text = _text_of(line, "utf-8-sig" if number == 1 else "utf-8")
         if not text or text.startswith("#"):
             return None
-        cells = _cells(text)
+        cells = _split_cells(text)
         if len(cells) == 1 and cells[0] in self.named:
             self.first_row_read = True
             return list(self.named[cells[0]])
@@ -92,7 +92,7 @@ class Columns:
         text = text.removesuffix(b"\n")
         width = len(self.heading) if self.places is not None else len(self.names)
         if not text.translate(None, _PLAIN):
-            values = _regular(text, width)
+            values = _regular_numbers(text, width)
             if values is not None and self.places is not None:
                 values = values[:, self.places]
         elif self.places is not None and b'"' not in text and len(max(lines := text.split(b"\n"), key=len)) < LONGEST:
@@ -104,19 +104,19 @@ class Columns:
     def _read_heading(self, cells: list[str]) -> bool:
         """Take a line for a heading if it names one of the columns."""
         lower = [cell.lower() for cell in cells]
-        found = {name: _places(lower, name.lower()) for name in self.names}
-        if not any(found.values()):
+        places_of = {name: _column_places(lower, name.lower()) for name in self.names}
+        if not any(places_of.values()):
             self._refuse_another(cells)
             return False
-        double = [name for name, places in found.items() if len(places) > 1]
+        double = [name for name, places in places_of.items() if len(places) > 1]
         if double:
             raise UsageError(f"the heading has two columns {double[0]}")
-        missing = [name for name, places in found.items() if not places]
+        missing = [name for name, places in places_of.items() if not places]
         if missing:
             names = ", ".join(missing)
             raise UsageError(f"the heading has no column{'s' * (len(missing) > 1)} {names}; it has {', '.join(cells)}")
         self.heading = cells
-        self.places = [places[0] for places in found.values()]
+        self.places = [places[0] for places in places_of.values()]
         return True
 
     def _refuse_another(self, cells: list[str]) -> None:
@@ -143,12 +143,12 @@ def _all_rows(
 ) -> Iterator[Chunk]:
     columns = Columns(names, purpose, named)
     first, empty = 1, True
-    with opened(source) as file:
-        for block in blocks(file, source):
+    with open_source(source) as file:
+        for block in text_blocks(file, source):
             for chunk in chunk_of(block, first, columns, source):
                 empty = False
                 yield chunk
-            first += count(block)
+            first += line_count(block)
     if columns.skipped:
         output.warn(f"{columns.skipped} row{'s' * (columns.skipped > 1)} without {','.join(names)} skipped")
     if empty:
@@ -161,8 +161,8 @@ def streamed_rows(
 ) -> Iterator[tuple[int, list[float]]]:
     """Rows of a CSV file one by one, each as soon as it can be read: its number and its values."""
     columns = Columns(names, purpose, named)
-    with opened(source) as file:
-        for number, line in enumerate(iter(lambda: _line(file, source), b""), 1):
+    with open_source(source) as file:
+        for number, line in enumerate(iter(lambda: _read_line(file, source), b""), 1):
             try:
                 row = columns.row(line, number)
             except UsageError as error:
@@ -172,7 +172,7 @@ def streamed_rows(
 
 
 @contextlib.contextmanager
-def opened(source: str) -> Iterator[IO[bytes]]:
+def open_source(source: str) -> Iterator[IO[bytes]]:
     """A file, or standard input for "-", as bytes."""
     if source == "-":
         if sys.stdin is None:
@@ -188,7 +188,7 @@ def opened(source: str) -> Iterator[IO[bytes]]:
         yield file
 
 
-def _regular(text: bytes, width: int) -> Array | None:
+def _regular_numbers(text: bytes, width: int) -> Array | None:
     """The numbers (N, width) of lines without anything else in them; None if they are not all that wide."""
     import numpy as np
 
@@ -241,61 +241,61 @@ def _by_arrow(text: bytes, width: int) -> Array | None:
     read = table.ReadOptions(column_names=names, use_threads=False, block_size=len(text) + 1)
     convert = table.ConvertOptions(column_types=dict.fromkeys(names, pyarrow.float64()))
     try:
-        found = table.read_csv(pyarrow.BufferReader(text), read, convert_options=convert)
+        columns = table.read_csv(pyarrow.BufferReader(text), read, convert_options=convert)
     except pyarrow.ArrowInvalid:
         return None
-    if any(column.null_count for column in found.columns):
+    if any(column.null_count for column in columns.columns):
         return None
-    return np.column_stack([column.to_numpy() for column in found.columns])
+    return np.column_stack([column.to_numpy() for column in columns.columns])
 
 
-def blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
+def text_blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
     """The text in blocks of ROWS lines, each as soon as it can be read; a line of LONGEST characters ends it."""
     held: list[bytes] = []
     lines = open_ = 0  # lines that end in what is held, and characters behind them
-    while some := _read(file, source):
-        ends = some.count(b"\n")
+    while text := _read_available(file, source):
+        ends = text.count(b"\n")
         while lines + ends >= ROWS:
-            cut = _end_of_lines(some, ROWS - lines)
-            yield b"".join([*held, some[:cut]])
-            some, ends, held, lines, open_ = some[cut:], ends - (ROWS - lines), [], 0, 0
-        held.append(some)
-        lines, open_ = lines + ends, len(some) - some.rfind(b"\n") - 1 if ends else open_ + len(some)
+            cut = _end_of_lines(text, ROWS - lines)
+            yield b"".join([*held, text[:cut]])
+            text, ends, held, lines, open_ = text[cut:], ends - (ROWS - lines), [], 0, 0
+        held.append(text)
+        lines, open_ = lines + ends, len(text) - text.rfind(b"\n") - 1 if ends else open_ + len(text)
         if open_ >= LONGEST:  # no use in reading on
             break
     if last := b"".join(held):
         yield last
 
 
-def _read(file: IO[bytes], source: str) -> bytes:
+def _read_available(file: IO[bytes], source: str) -> bytes:
     """What can be read now; nothing at the end."""
     try:
         return bytes(file.read1(SIZE))  # type: ignore[attr-defined]
     except (OSError, ValueError) as error:  # ValueError: closed
-        raise _unread(source, error) from None
+        raise _read_error(source, error) from None
 
 
 def _end_of_lines(text: bytes, lines: int) -> int:
     """Where so many lines have ended."""
-    at = 0
+    end = 0
     for _ in range(lines):
-        at = text.index(b"\n", at) + 1
-    return at
+        end = text.index(b"\n", end) + 1
+    return end
 
 
-def count(block: bytes) -> int:
+def line_count(block: bytes) -> int:
     """How many lines a block has."""
     return block.count(b"\n") + (not block.endswith(b"\n"))
 
 
-def _line(file: IO[bytes], source: str) -> bytes:
+def _read_line(file: IO[bytes], source: str) -> bytes:
     try:
         return file.readline(LONGEST)
     except (OSError, ValueError) as error:  # ValueError: closed
-        raise _unread(source, error) from None
+        raise _read_error(source, error) from None
 
 
-def _unread(source: str, error: Exception) -> FileError:
+def _read_error(source: str, error: Exception) -> FileError:
     return FileError(f"{name_of(source)}: cannot read: {getattr(error, 'strerror', None) or error}")
 
 
@@ -311,24 +311,24 @@ def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator
     index: list[int] = []
     good: list[list[float]] = []
     problem: UsageError | None = None
-    at, number, tried = 0, first, False
-    while at < len(text):
+    begin, number, tried = 0, first, False
+    while begin < len(text):
         if columns.first_row_read and not tried:  # what the columns are is known: the rest in one go, if it is plain
-            tried, values = True, columns.all_plain(text[at:])
+            tried, values = True, columns.all_plain(text[begin:])
             if values is not None:
-                rest = range(number, number + len(values))
-                yield Chunk([*index, *rest], np.concatenate([good, values])) if good else Chunk(rest, values)
+                rows_left = range(number, number + len(values))
+                yield Chunk([*index, *rows_left], np.concatenate([good, values])) if good else Chunk(rows_left, values)
                 return
-        end = text.find(b"\n", at) + 1 or len(text)
+        end = text.find(b"\n", begin) + 1 or len(text)
         try:
-            row = columns.row(text[at:end], number)
+            row = columns.row(text[begin:end], number)
         except UsageError as error:
             problem = error.within(f"{name_of(source)}: row {number}", row=number)
             break
         if row is not None:
             index.append(number)
             good.append(row)
-        at, number = end, number + 1
+        begin, number = end, number + 1
     if good:
         yield Chunk(index, np.array(good))
     if problem is not None:
@@ -346,7 +346,7 @@ def _text_of(line: bytes, encoding: str) -> str:
     return text
 
 
-def _cells(text: str) -> list[str]:
+def _split_cells(text: str) -> list[str]:
     """The cells of one line; quotes hold commas."""
     if '"' not in text:
         return [cell.strip() for cell in text.split(",")]
@@ -356,7 +356,7 @@ def _cells(text: str) -> list[str]:
         raise UsageError("this is no CSV of numbers") from None
 
 
-def _places(heading: Sequence[str], name: str) -> list[int]:
+def _column_places(heading: Sequence[str], name: str) -> list[int]:
     """See `armkin.columns.input_columns.places`."""
     from armkin.columns.input_columns import places  # here, as it needs numpy
 

@@ -46,8 +46,8 @@ def port_name(port: str | None, board: Board, baud: int | None, *, reset: bool =
     from armkin.board.stop_signals import stoppable
 
     with stoppable() as stop:
-        found = [name for name in board.likely() if board.answers(name, baud, stop, reset=reset)]
-    return only_port(found, board.called, board.hint)
+        answering = [name for name in board.likely() if board.answers(name, baud, stop, reset=reset)]
+    return only_port(answering, board.called, board.hint)
 
 
 def only_port(ports: Sequence[str], called: str, hint: str = "armkin ports lists them", *, asked: bool = True) -> str:
@@ -55,12 +55,12 @@ def only_port(ports: Sequence[str], called: str, hint: str = "armkin ports lists
 
     asked: whether a board answered there; else a port's adapter looks like one, and sim is none.
     """
-    one, many = ("answers", "boards answer") if asked else ("is plugged in", "ports look like one")
+    verb, plural = ("answers", "boards answer") if asked else ("is plugged in", "ports look like one")
     if len(ports) == 1:
-        output.note(f"using {ports[0]}, the only port where {called} {one}")
+        output.note(f"using {ports[0]}, the only port where {called} {verb}")
         return ports[0]
-    where = f"{len(ports)} {many} ({', '.join(ports)})" if ports else f"no port where {called} {one} was found"
+    count_text = f"{len(ports)} {plural} ({', '.join(ports)})" if ports else f"no port where {called} {verb} was found"
     sim = "; sim is a board in this process" if asked else ""
     raise UsageError(
-        f"--port is missing, and {where}\n{hint}, ARMKIN_PORT names one for every command{sim}",
+        f"--port is missing, and {count_text}\n{hint}, ARMKIN_PORT names one for every command{sim}",
     )

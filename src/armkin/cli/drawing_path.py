@@ -8,7 +8,7 @@ import typer
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.number_parsing import LARGEST, number, place
+from armkin.cli.number_parsing import LARGEST, number, place_numbers
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ GripBy = Annotated[
 ]
 
 
-def moves(
+def drawing_moves(
     arm: Arm,
     file: str | None,
     task: str | None,
@@ -44,19 +44,19 @@ def moves(
     from armkin import path_file
     from armkin.motion.drawings import drawing
 
-    given = {"--at": at, "--scale": scale, "--feed": feed, "--lift": lift, "--grip-by": grip_by}
+    options = {"--at": at, "--scale": scale, "--feed": feed, "--lift": lift, "--grip-by": grip_by}
     if file is None or path_file.foreign(file) is None:
-        if (first := next((name for name, value in given.items() if value is not None), None)) is not None:
+        if (first := next((name for name, value in options.items() if value is not None), None)) is not None:
             raise UsageError(f"{first} belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
         return None
     if at is None:
         raise UsageError(f"{file} needs --at X,Y,Z, for example --at 300,0,50: where its zero lies in the arm's frame")
     if grip_by not in (None, "M3", "M106"):
         raise UsageError(f"--grip-by: '{grip_by}' is neither M3 nor M106")
-    zero = place(at, "--at")
-    factor = 1.0 if scale is None else _bounded(scale, "--scale", (1e-6, 1e6), "from 1e-6 to 1e6")
-    speed = None if feed is None else _bounded(feed, "--feed", (1e-3, LARGEST), "at least 0.001")
-    height = 5.0 if lift is None else _bounded(lift, "--lift", (0.0, LARGEST), "at least 0")
+    zero = place_numbers(at, "--at")
+    factor = 1.0 if scale is None else _bounded_number(scale, "--scale", (1e-6, 1e6), "from 1e-6 to 1e6")
+    speed = None if feed is None else _bounded_number(feed, "--feed", (1e-3, LARGEST), "at least 0.001")
+    height = 5.0 if lift is None else _bounded_number(lift, "--lift", (0.0, LARGEST), "at least 0")
     files.protect_input(file)
     made = drawing(arm, file, zero, task=task, scale=factor, feed=speed, lift=height, grip_by=grip_by)
     for text in made.notes:
@@ -64,7 +64,7 @@ def moves(
     return made
 
 
-def _bounded(text: str, option: str, bounds: tuple[float, float], allowed: str) -> float:
+def _bounded_number(text: str, option: str, bounds: tuple[float, float], allowed: str) -> float:
     """A number within bounds; allowed: these in words."""
     value = number(text, option)
     if not bounds[0] <= value <= bounds[1]:

@@ -36,7 +36,7 @@ def exit_code(error: BaseException) -> int:
         from armkin.cli import advice
 
         code = next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
-        output.error(advice.message(error), error.kind, code, error.fields, advice.next_step(error))
+        output.error(advice.message_with_advice(error), error.kind, code, error.fields, advice.next_step(error))
         return code
     if isinstance(error, ClosedPipe):
         return _closed_pipe()
@@ -45,7 +45,7 @@ def exit_code(error: BaseException) -> int:
     if isinstance(error, MemoryError):
         output.error("not enough memory; ask for less at once", "memory", RUNTIME)
         return RUNTIME
-    return _unexpected(error)
+    return _unexpected_code(error)
 
 
 def no_command(name: str, words: list[str]) -> errors.UsageError:
@@ -65,8 +65,8 @@ def _os_error(error: OSError) -> int:
     """An error of the system that nobody foresaw; of those, stdout's are the usual ones."""
     if is_closed_pipe(error):
         return _closed_pipe()
-    where = error.filename if error.filename is not None else "standard output"
-    output.error(f"{where}: {error.strerror or error}", "system", RUNTIME, {"file": str(where)})
+    file_name = error.filename if error.filename is not None else "standard output"
+    output.error(f"{file_name}: {error.strerror or error}", "system", RUNTIME, {"file": str(file_name)})
     _drop_stdout()
     return RUNTIME
 
@@ -96,12 +96,14 @@ def _similar_options(error: Any, context: Any) -> list[str]:
     word = getattr(error, "option_name", None)
     if not isinstance(word, str) or context is None:
         return []
-    known = [name for p in context.command.params for name in (*p.opts, *p.secondary_opts) if name.startswith("--")]
-    begun = [name for name in known if len(word) > 3 and name.startswith(f"{word}-")]
+    option_names = [
+        name for p in context.command.params for name in (*p.opts, *p.secondary_opts) if name.startswith("--")
+    ]
+    begun = [name for name in option_names if len(word) > 3 and name.startswith(f"{word}-")]
     return list(getattr(error, "possibilities", None) or begun)
 
 
-def _unexpected(error: BaseException) -> int:
+def _unexpected_code(error: BaseException) -> int:
     """Typer's own complaints about the command line, and our bugs."""
     if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
         from armkin.cli.number_parsing import is_number

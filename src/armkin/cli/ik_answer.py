@@ -48,7 +48,7 @@ def answer_of(
         "joint_units": units.names(arm),
         "branch_count": chosen.total,
         "branches_within_limits": chosen.within_limits,
-        "branches": [_branch(request, branch, turns) for branch in listed],
+        "branches": [_branch_json(request, branch, turns) for branch in listed],
         "best": best,
         "closest": closest,
         "free_joints": chosen.free,
@@ -65,7 +65,7 @@ def nearest_to(
     """The nearest poses of those targets that no legal branch reaches, all at once."""
     from armkin.inverse import choose_branch
 
-    rows = [k for k, one in enumerate(answers) if one.best is None and not one.within_limits]
+    rows = [k for k, answer in enumerate(answers) if answer.best is None and not answer.within_limits]
     return dict(zip(rows, choose_branch.closest(request, targets[rows]), strict=True)) if rows else {}
 
 
@@ -112,7 +112,7 @@ def _near_to(arm: Arm, branch: choose_branch.Branch) -> Any:
     return {"clearance_mm": branch.clearance, "hits": list(branch.hits)} if arm.keep_out else {}
 
 
-def _branch(request: choose_branch.Request, branch: choose_branch.Branch, turns: bool) -> Branch:
+def _branch_json(request: choose_branch.Request, branch: choose_branch.Branch, turns: bool) -> Branch:
     arm = request.arm
     row: Branch = {
         "joints": branch.joints,

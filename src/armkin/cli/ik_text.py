@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from armkin.cli import render
-from armkin.cli.render import fixed
+from armkin.cli.render import fixed_text
 from armkin.model.target_numbers import label_units
 
 if TYPE_CHECKING:
@@ -16,43 +16,43 @@ if TYPE_CHECKING:
 def text(arm: Arm, answer: Ik) -> str:
     """The answer for people: a table of branches, or the nearest pose."""
     headings = render.joint_headings(arm)
-    goal = render.labelled(answer["target_labels"], answer["target"], label_units(answer["target_labels"]))
+    goal = render.label_values(answer["target_labels"], answer["target"], label_units(answer["target_labels"]))
     rows = [["", "branch", *headings, "motion", ""]]
     for i, branch in enumerate(answer["branches"]):
         bad = ", ".join(violation["joint"] for violation in branch["violations"])
         mark = "*" if i == answer["best"] and len(answer["branches"]) > 1 else ""
         notes = [
-            _family(branch),
-            _turned(branch["residual_deg"]),
+            _family_text(branch),
+            _turned_text(branch["residual_deg"]),
             f"outside limits: {bad}" if bad else "",
             render.hits_in_words(branch),
         ]
         note = "; ".join(filter(None, notes))
-        rows.append([mark, branch["name"], *map(fixed, branch["joints"]), fixed(branch["motion"]), note])
+        rows.append([mark, branch["name"], *map(fixed_text, branch["joints"]), fixed_text(branch["motion"]), note])
         for copy in branch.get("turns", ())[1:]:
-            rows.append(["", "  or", *map(fixed, copy), "", ""])
+            rows.append(["", "  or", *map(fixed_text, copy), "", ""])
     nearest = answer["closest"]
     if nearest and not answer["branches_within_limits"]:
-        miss = f"{fixed(nearest['distance_mm'])} mm away"
-        if turned := _turned(nearest["angle_deg"]):
+        miss = f"{fixed_text(nearest['distance_mm'])} mm away"
+        if turned := _turned_text(nearest["angle_deg"]):
             miss += f", {turned}"
-        rows.append(["", "closest", *map(fixed, nearest["joints"]), "", miss])
+        rows.append(["", "closest", *map(fixed_text, nearest["joints"]), "", miss])
     last = len(headings) + 3
     table = f"{render.table(rows, left_aligned=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
     return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
 
 
-def _family(branch: Branch) -> str:
+def _family_text(branch: Branch) -> str:
     """Along which values of the redundant joint a branch moves."""
     if "family" not in branch:
         return ""
-    low, high = map(fixed, branch["family"]["interval"])
+    low, high = map(fixed_text, branch["family"]["interval"])
     return f"{branch['family']['joint']} from {low} to {high}"
 
 
-def _turned(angle_deg: float) -> str:
+def _turned_text(angle_deg: float) -> str:
     """By how much a rotation is off the target's, where it is more than rounding."""
-    return f"turned by {fixed(angle_deg)} deg" if angle_deg > 1e-6 else ""
+    return f"turned by {fixed_text(angle_deg)} deg" if angle_deg > 1e-6 else ""
 
 
 def _summary(answer: Ik) -> str:
@@ -66,4 +66,4 @@ def _summary(answer: Ik) -> str:
     if count > len(answer["branches"]):
         text += " (--all-branches lists all)"
     sure = "no real branch is missing" if answer["complete"] else "there may be more branches"
-    return f"{text}\n" + render.wrapped(f"solved as {answer['method']} ({answer['why']}): {sure}")
+    return f"{text}\n" + render.wrap_text(f"solved as {answer['method']} ({answer['why']}): {sure}")

@@ -26,12 +26,12 @@ NoScene = Annotated[
 _SHOWN = 4001  # postures of a motion in which hits that are ignored are looked for
 
 
-def moving(robot: str, scene: str | None, ignore: bool = False, tool: str | None = None) -> Arm:
+def load_moving_arm(robot: str, scene: str | None, ignore: bool = False, tool: str | None = None) -> Arm:
     """The arm of a command that moves it; radii that are assumed are named."""
-    return marked(arguments.load(robot, scene, tool), ignore)
+    return mark_ignored(arguments.load_arm(robot, scene, tool), ignore)
 
 
-def marked(arm: Arm, ignore: bool) -> Arm:
+def mark_ignored(arm: Arm, ignore: bool) -> Arm:
     """The same arm, its motions not proved if keep-outs are ignored; radii that are assumed are named."""
     if not arm.keep_out:
         return arm
@@ -71,10 +71,10 @@ def check_start(machine: Backend, arm: Arm, no_scene: bool) -> None:
         return
     from armkin.keep_out.clearance import hits, hits_text
 
-    [(_, found)] = hits(arm, machine.joints()[None])
-    if found:
+    [(_, hit)] = hits(arm, machine.joints()[None])
+    if hit:
         more = "" if arm.ignores_keep_out else ": it may move out, and no farther in"
-        output.note(f"the arm stands in a hit: it {hits_text(found)}{more}")
+        output.note(f"the arm stands in a hit: it {hits_text(hit)}{more}")
 
 
 def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
@@ -85,14 +85,14 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
     from armkin.keep_out.clearance import hits_text
 
     deepest: dict[tuple[str, str], float] = {}
-    for one in trajectories:
-        if not one.arm.keep_out or not one.arm.ignores_keep_out:
+    for trajectory in trajectories:
+        if not trajectory.arm.keep_out or not trajectory.arm.ignores_keep_out:
             return
-        held = guard(one.arm)
-        apart = held.clearances(one.q(np.linspace(0.0, one.duration, _SHOWN))).min(axis=0, initial=np.inf)
+        held = guard(trajectory.arm)
+        apart = held.clearances(trajectory.q(np.linspace(0.0, trajectory.duration, _SHOWN))).min(axis=0, initial=np.inf)
         for k in np.flatnonzero(apart < 0).tolist():
             deepest[held.pair_names(k)] = max(deepest.get(held.pair_names(k), 0.0), float(-apart[k]))
     if deepest:
         ordered = sorted(deepest.items(), key=lambda item: -item[1])
-        words = hits_text([{"body": body, "with": other, "depth_mm": mm} for (body, other), mm in ordered])
+        words = hits_text([{"body": body, "with": obstacle, "depth_mm": mm} for (body, obstacle), mm in ordered])
         output.warn(f"--ignore-keep-out: this motion {words}")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def record(
+def record_zeros(
     board: Board,
     robot: str,
     path: str,
@@ -38,14 +38,14 @@ def record(
     q = None if pose is None else units.joints_in(arm, arguments.joint_list(arm, pose, "--pose"))
     protect_input(path)
     try:
-        found = board.calibration(path, q)
+        calibration = board.calibration(path, q)
     except UsageError as error:
         if "middle" in error.fields:
             error.advice = "the middles of all ranges are another pose: --pose NAME|Q,... says it"
         raise
-    port = check(found)
+    port = check(calibration)
     if out is not None:
-        text = with_values(Path(locate(robot)).read_text(encoding="utf-8"), found.edits)
+        text = with_values(Path(locate(robot)).read_text(encoding="utf-8"), calibration.edits)
         parse(text, out)  # nothing is written that no command would take
         with output.destination(out) as write:
             write(text)
@@ -55,27 +55,27 @@ def record(
         **render.head(arm),
         "port": port,
         "counts": None,
-        "zero": list(found.zero),
-        "gripper_zero": None if found.gripper is None else found.gripper.middle,
-        "limits": [list(pair) for pair in found.limits],
-        "invert": [bool(motor.drive_mode) for motor in found.motors],
-        "gripper_ends": None if found.gripper_ends is None else list(found.gripper_ends),
+        "zero": list(calibration.zero),
+        "gripper_zero": None if calibration.gripper is None else calibration.gripper.middle,
+        "limits": [list(pair) for pair in calibration.limits],
+        "invert": [bool(motor.drive_mode) for motor in calibration.motors],
+        "gripper_ends": None if calibration.gripper_ends is None else list(calibration.gripper_ends),
     }
     with output.destination(None) as write:
-        write(f"{render.to_json(answer) if json else _table(arm, found)}\n")
+        write(f"{render.to_json(answer) if json else _changes_table(arm, calibration)}\n")
 
 
-def _table(arm: Arm, found: Any) -> str:
+def _changes_table(arm: Arm, calibration: Any) -> str:
     """What changes, a line a servo."""
     from armkin.motors import motor_names
 
     rows = [["joint", "zero", "was", "limits/deg", "counts"]]
     for name, zero, was, pair, motor in zip(
-        motor_names(arm), found.zero, arm.motors, found.limits, found.motors, strict=True
+        motor_names(arm), calibration.zero, arm.motors, calibration.limits, calibration.motors, strict=True
     ):
         counts = "reversed" if motor.drive_mode else ""
         rows.append([name, f"{zero:g}", f"{was.zero:g}", f"{pair[0]:.3f} to {pair[1]:.3f}", counts])
-    if found.gripper is not None and found.gripper_ends is not None and arm.gripper is not None:
-        ends = "open {:.3f}, closed {:.3f}".format(*found.gripper_ends)
-        rows.append(["gripper", f"{found.gripper.middle:g}", f"{arm.gripper.zero:g}", ends, ""])
+    if calibration.gripper is not None and calibration.gripper_ends is not None and arm.gripper is not None:
+        ends = "open {:.3f}, closed {:.3f}".format(*calibration.gripper_ends)
+        rows.append(["gripper", f"{calibration.gripper.middle:g}", f"{arm.gripper.zero:g}", ends, ""])
     return render.table(rows, left_aligned=(0, 4))

@@ -18,13 +18,15 @@ Log = Annotated[bool, typer.Option("--log", help=_TEXT)]
 Trace = Annotated[bool, typer.Option("--trace", "--log", help=_TEXT)]
 
 
-def traceable(command: Callable[..., Any]) -> Callable[..., Any]:
+def add_trace_option(command: Callable[..., Any]) -> Callable[..., Any]:
     """A command's function, with the option where it opens ports."""
     if "no_reset" not in signature(command).parameters:
         return command
     hints = get_type_hints(command, include_extras=True)
     plain = signature(command)
-    asked = plain.replace(parameters=[one.replace(annotation=hints[name]) for name, one in plain.parameters.items()])
+    resolved = plain.replace(
+        parameters=[parameter.replace(annotation=hints[name]) for name, parameter in plain.parameters.items()]
+    )
 
     @wraps(command)
     def run(*words: Any, log: bool = False, **options: Any) -> Any:
@@ -33,10 +35,10 @@ def traceable(command: Callable[..., Any]) -> Callable[..., Any]:
         with BoardLog():
             return command(*words, **options)
 
-    option = Log if "trace" in asked.parameters else Trace
+    option = Log if "trace" in resolved.parameters else Trace
     added = Parameter("log", Parameter.KEYWORD_ONLY, default=False, annotation=option)
     run.__annotations__ = {**hints, "log": option}
-    run.__signature__ = asked.replace(parameters=[*asked.parameters.values(), added])  # type: ignore[attr-defined]
+    run.__signature__ = resolved.replace(parameters=[*resolved.parameters.values(), added])  # type: ignore[attr-defined]
     return run
 
 

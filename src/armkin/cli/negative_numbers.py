@@ -17,16 +17,16 @@ def options_first(args: list[str], takes_value: Collection[str]) -> list[str]:
     """
     options: list[str] = []
     words: list[str] = []
-    rest = iter(args)
-    for word in rest:
+    words_left = iter(args)
+    for word in words_left:
         if word == "--":
-            words.extend(rest)
+            words.extend(words_left)
         elif word[:1] != "-" or word == "-" or _looks_like_number(word):
             words.append(word)
         else:
             options.extend(_SHORT_FOR.get(word, (word,)))
             if word in takes_value:
-                value = next(rest, None)
+                value = next(words_left, None)
                 if value is None:
                     return options  # the parser complains; "--" would be taken for the value
                 options.append(value)

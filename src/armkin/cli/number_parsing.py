@@ -33,10 +33,10 @@ def number(text: str, name: str, largest: float = LARGEST) -> float:
     return value
 
 
-def decimals(text: str) -> int:
+def decimal_count(text: str) -> int:
     """How many decimals a number is printed with.
 
-    >>> decimals("345.040"), decimals("390"), decimals("3.45040e2")
+    >>> decimal_count("345.040"), decimal_count("390"), decimal_count("3.45040e2")
     (3, 0, 3)
     """
     mantissa, _, exponent = text.strip().lower().partition("e")
@@ -80,7 +80,7 @@ def comma_separated(text: str, names: Sequence[str], purpose: str) -> list[float
     return numbers(words, names, purpose)
 
 
-def place(text: str, purpose: str) -> list[float]:
+def place_numbers(text: str, purpose: str) -> list[float]:
     """``X,Y,Z``, or with roll, pitch and yaw, as options take them: three numbers or six [mm, deg]."""
     names = ("x", "y", "z", "roll", "pitch", "yaw")
     return comma_separated(text, names[: 6 if text.count(",") > 2 else 3], purpose)
@@ -122,10 +122,10 @@ def of_pi(text: str) -> float | None:
     >>> of_pi("-pi/2"), of_pi("3pi/4"), of_pi("pie")
     (-90.0, 135.0, None)
     """
-    found = re.fullmatch(_PI, text.strip().lower())
-    if found is None or (found[3] is not None and int(found[3]) == 0):
+    match = re.fullmatch(_PI, text.strip().lower())
+    if match is None or (match[3] is not None and int(match[3]) == 0):
         return None
-    return float(f"{found[1]}1") * 180 * float(found[2] or 1) / float(found[3] or 1)
+    return float(f"{match[1]}1") * 180 * float(match[2] or 1) / float(match[3] or 1)
 
 
 def _separator_hint(words: Sequence[str], names: Sequence[str]) -> str:

@@ -63,14 +63,14 @@ Batch = Annotated[
 ]
 
 
-def _out(what: str, *allowed: str) -> Any:
+def _out_option(content: str, *allowed: str) -> Any:
     """`--out`, whose file's name ends as what is written to it, or has no ending."""
 
     def check(path: str | None) -> str | None:
         if path:
             from armkin import files
 
-            files.ending(path, what, allowed, may_lack=True)
+            files.ending(path, content, allowed, may_lack=True)
         return path
 
     return typer.Option(
@@ -82,10 +82,10 @@ def _out(what: str, *allowed: str) -> Any:
     )
 
 
-TextOut = Annotated[str | None, _out("an answer is", *output.TEXT)]
-SchemaOut = Annotated[str | None, _out("a schema is", ".json")]
-RobotOut = Annotated[str | None, _out("a robot file is", ".yaml", ".yml")]
-RowsOut = Annotated[str | None, _out("rows of joint values are", ".csv")]
+TextOut = Annotated[str | None, _out_option("an answer is", *output.TEXT)]
+SchemaOut = Annotated[str | None, _out_option("a schema is", ".json")]
+RobotOut = Annotated[str | None, _out_option("a robot file is", ".yaml", ".yml")]
+RowsOut = Annotated[str | None, _out_option("rows of joint values are", ".csv")]
 Out = Annotated[
     str | None,
     typer.Option("--out", "-o", metavar="FILE|-", help="Write to a file, which appears whole or not at all."),
@@ -101,7 +101,7 @@ BatchOut = Annotated[
 ]
 
 
-def _drawable(path: str | None) -> str | None:
+def _check_drawable(path: str | None) -> str | None:
     """Say what a picture lacks before the work, not after it."""
     if path is not None:
         from armkin.plot import canvas
@@ -113,7 +113,7 @@ def _drawable(path: str | None) -> str | None:
 
 Picture = Annotated[
     str | None,
-    typer.Option("--plot", metavar="FILE", callback=_drawable, help="A picture as .png or .svg."),
+    typer.Option("--plot", metavar="FILE", callback=_check_drawable, help="A picture as .png or .svg."),
 ]
 Speed = Annotated[str, typer.Option("--speed", metavar="PERCENT", help="Of every joint's max_speed.")]
 Resume = Annotated[bool, typer.Option("--resume", help="With --batch and --out: go on where an interrupted run ended.")]
@@ -125,26 +125,26 @@ Cluster = Annotated[
 ]
 
 
-def _built(wanted: bool) -> bool:
+def _announce_build(is_asked: bool) -> bool:
     """Say on a terminal that something is built, which takes seconds the first time."""
-    if wanted and sys.stderr is not None and sys.stderr.isatty():
+    if is_asked and sys.stderr is not None and sys.stderr.isatty():
         from armkin.compiled import toolchain
 
         toolchain.announce = lambda: output.note("compiling for this computer, once for each arm: some seconds")
-    return wanted
+    return is_asked
 
 
 Compiled = Annotated[
     bool,
     typer.Option(
         "--compiled",
-        callback=_built,
+        callback=_announce_build,
         help="Compute by machine code that this computer's C compiler builds: faster, for batches.",
     ),
 ]
 
 
-def _workers(text: str) -> int:
+def _worker_count(text: str) -> int:
     return whole_number(text, "--workers", 1, 1000)
 
 
@@ -154,7 +154,7 @@ Workers = Annotated[
         "--workers",
         metavar="N",
         parser=str,
-        callback=_workers,
+        callback=_worker_count,
         help="How many processes share the work; the answers are the same.",
     ),
 ]

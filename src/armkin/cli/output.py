@@ -39,7 +39,7 @@ def destination(path: str | None, content: str = "", endings: Sequence[str] = ()
         yield sys.stdout.write
 
 
-def check(path: str | None, content: str, *endings: str) -> None:
+def check_destination(path: str | None, content: str, *endings: str) -> None:
     """Raise before long work what `destination` would of a file's name, or that it does not end as what is written."""
     if path not in (None, "", "-"):
         from armkin import files
@@ -58,13 +58,13 @@ def answer_stream(path: str | None) -> Iterator[Write]:
         yield write
 
 
-def for_programs(wanted: bool, words: Iterable[str] = ()) -> None:
+def for_programs(as_json: bool, words: Iterable[str] = ()) -> None:
     """Begin a command. Under --json an error is one JSON object: notes and warnings wait, and go into it.
 
     words: the command line's; where a message quotes one that has line breaks in it, it stays one line.
     """
     global _waiting, _broken
-    _waiting = [] if wanted else None
+    _waiting = [] if as_json else None
     parts = {part for word in words for part in (word, word.partition("=")[2])}
     _broken = sorted((part for part in parts if part.strip() and len(f"{part}.".splitlines()) > 1), key=len)[::-1]
     if (used := sys.modules.get("armkin.files")) is not None:  # `armkin --help` needs no files
@@ -73,12 +73,12 @@ def for_programs(wanted: bool, words: Iterable[str] = ()) -> None:
 
 def warn(message: str) -> None:
     """Say something on stderr that does not change the exit code."""
-    _later("warning", message)
+    _say_or_keep("warning", message)
 
 
 def note(message: str) -> None:
     """Say something on stderr that is good to know."""
-    _later("note", message)
+    _say_or_keep("note", message)
 
 
 def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | None = None, advice: str = "") -> None:
@@ -92,19 +92,19 @@ def error(message: str, kind: str, exit_code: int, fields: Mapping[str, Any] | N
         return
     import json
 
-    found = {
+    answer = {
         "error": _one_line(message, "error"),
         "kind": kind,
         "exit_code": exit_code,
         **(fields or {}),
     }
     if advice:
-        found["next"] = advice
+        answer["next"] = advice
     for word in ("warning", "note"):
-        if said := [_one_line(text, word) for which, text in _waiting if which == word]:
-            found[f"{word}s"] = said
+        if lines := [_one_line(text, word) for kind_of_line, text in _waiting if kind_of_line == word]:
+            answer[f"{word}s"] = lines
     _waiting.clear()
-    _print(json.dumps(_plain_values(found)))
+    _print_line(json.dumps(_plain_values(answer)))
 
 
 def flush() -> None:
@@ -116,7 +116,7 @@ def flush() -> None:
 
 def _one_line(message: str, word: str) -> str:
     """A message for programs; what is a line of its own for people follows a semicolon, or a sentence's end."""
-    lines = [_printable(line.strip(), _LONGEST[word]) for line in message.splitlines() if line.strip()]
+    lines = [_printable_text(line.strip(), _LONGEST[word]) for line in message.splitlines() if line.strip()]
     text = "".join(lines[:1])
     for line in lines[1:]:
         text += f" {line}" if text[-1] in ".?!;:" else f"; {line}"
@@ -126,11 +126,11 @@ def _one_line(message: str, word: str) -> str:
 def _without_breaks(message: str) -> str:
     """A message whose quoted words have no line breaks of their own."""
     for word in _broken:
-        message = message.replace(word, _printable(word, len(word) * 10))
+        message = message.replace(word, _printable_text(word, len(word) * 10))
     return message
 
 
-def _later(word: str, message: str) -> None:
+def _say_or_keep(word: str, message: str) -> None:
     message = _without_breaks(message)
     if _waiting is None:
         _print_message(word, message)
@@ -152,32 +152,32 @@ def _plain_values(value: Any) -> Any:
 def _print_message(word: str, message: str) -> None:
     if sys.stderr is None:
         return
-    head = f"\x1b[{_COLOURS[word]}m{word}:\x1b[0m" if _coloured(sys.stderr) else f"{word}:"
+    head = f"\x1b[{_COLOURS[word]}m{word}:\x1b[0m" if _is_coloured(sys.stderr) else f"{word}:"
     # A file's name may hold anything: two lines of printable text, whatever it is.
-    lines = [_printable(line, _LONGEST[word]) for line in message.splitlines() if line.strip()]
+    lines = [_printable_text(line, _LONGEST[word]) for line in message.splitlines() if line.strip()]
     text = "\n".join(f"{head} {line}" if i == 0 else f"  {line}" for i, line in enumerate(lines))
-    _print(text)
+    _print_line(text)
 
 
-def _print(text: str) -> None:
+def _print_line(text: str) -> None:
     with suppress(OSError, UnicodeError):  # nobody listens: the exit code still tells
         print(text.encode("utf-8", "backslashreplace").decode(), file=sys.stderr, flush=True)
 
 
-def _printable(line: str, most: int) -> str:
+def _printable_text(line: str, most: int) -> str:
     """Without control characters, which a terminal would obey, and not longer than people read."""
     text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
     return text if len(text) <= most else f"{text[: most - 90]} ... {text[-80:]}"
 
 
-def _coloured(stream: TextIO) -> bool:
+def _is_coloured(stream: TextIO) -> bool:
     return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
 class Tick(Protocol):
     """How far a command has come: done, and of how many where that is known only then."""
 
-    def __call__(self, done: int, total: int | None = None) -> None: ...
+    def __call__(self, count: int, total: int | None = None) -> None: ...
 
 
 @contextmanager
@@ -188,27 +188,27 @@ def progress(task: str, total: int | Callable[[], int | None] | None = None) -> 
     total: or a function that finds it out, called on a terminal alone.
     """
     if sys.stderr is None or not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
-        yield lambda done, total=None: None
+        yield lambda count, total=None: None
         return
 
-    known = total() if callable(total) else total
+    known_total = total() if callable(total) else total
     began = last = time.monotonic()
     shown: Any = None
 
-    def tick(done: int, total: int | None = None) -> None:
-        nonlocal began, last, shown, known
-        known = total or known
-        now = time.monotonic()
-        if done == 0:
-            began = last = now
-        if now - last < 0.2 and done != known:
+    def tick(count: int, total: int | None = None) -> None:
+        nonlocal began, last, shown, known_total
+        known_total = total or known_total
+        present = time.monotonic()
+        if count == 0:
+            began = last = present
+        if present - last < 0.2 and count != known_total:
             return
-        last = now
+        last = present
         if shown is None:
             from armkin.cli.progress_bar import start_bar
 
             shown = start_bar(task)
-        shown.update(done, known, now - began)
+        shown.update(count, known_total, present - began)
 
     try:
         yield tick

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def text(plan: PathPlan, answer: dict[str, Any]) -> str:
     """The plan for people."""
-    parts = [_heads(plan, answer)]
+    parts = [_head_lines(plan, answer)]
     if answer["branches"]:
         rows = [["branch at the start", "carries/mm", ""]]
         rows += [[b["name"] or "unnamed", f"{b['carries_mm']:.3f}", b["ends_because"]] for b in answer["branches"]]
@@ -24,7 +24,7 @@ def text(plan: PathPlan, answer: dict[str, Any]) -> str:
     return "\n".join(line for part in parts for line in part) + "\n"
 
 
-def _heads(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
+def _head_lines(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     """How long it is and takes, what is held, and which branch carries which part of it."""
     from armkin.motion.branch_report import reason_text
 
@@ -39,11 +39,11 @@ def _heads(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
         lines.append(f"  held: {', '.join(f'{name} at {value:.4g}' for name, value in answer['held'].items())}")
     for run in answer["runs"]:
         names = ", then ".join(
-            f"{one['name'] or 'unnamed'}" + (f" from {one['s_mm']:.3f}" if k else "")
-            for k, one in enumerate(run["branches"])
+            f"{branch['name'] or 'unnamed'}" + (f" from {branch['s_mm']:.3f}" if k else "")
+            for k, branch in enumerate(run["branches"])
         )
         lines.append(f"  {run['s_mm'][0]:.3f} to {run['s_mm'][1]:.3f} mm: {names}")
-    ends = [f"  at {one.s:.3f} mm: {reason_text(plan.arm, one)}" for one in plan.reconfigurations]
+    ends = [f"  at {branch.s:.3f} mm: {reason_text(plan.arm, branch)}" for branch in plan.reconfigurations]
     return lines + list(dict.fromkeys(ends))  # several branches end there for one reason
 
 
@@ -61,7 +61,7 @@ def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     from armkin.motion.branch_report import deviation_text, wrist_pass_lines
 
     rows = [["share of", *plan.arm.joint_names]]
-    rows += [[key, *(f"{100 * share:.1f} %" for share in each.values())] for key, each in answer["limits"].items()]
+    rows += [[key, *(f"{100 * share:.1f} %" for share in shares.values())] for key, shares in answer["limits"].items()]
     lines = ["", render.table(rows), ""]
     worst = answer["nearest_singularity"]
     if worst is not None:

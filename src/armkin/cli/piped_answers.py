@@ -38,7 +38,7 @@ class Pose:
     pulses: list[int] | None
 
 
-def read(robot: str | None) -> PipedPoses:
+def read_poses(robot: str | None) -> PipedPoses:
     """What a command before the pipe has printed: one JSON object, or one a line.
 
     robot: a robot file given as well, which must be the same. Raises UsageError if there is nothing to send,
@@ -49,42 +49,42 @@ def read(robot: str | None) -> PipedPoses:
             "nothing to send: give joint values, --target X,Y,Z or --batch FILE,\n"
             "or pipe an answer in: armkin ik ROBOT 390 80 300 --json | armkin send --port PORT"
         )
-    text = _text()
+    text = _stdin_text()
     if not text.strip():
         raise UsageError("nothing to send: standard input is empty (did the command before the pipe fail?)")
-    answers = [_parsed(part) for part in _parts(text)]
+    answers = [_parse_answer(part) for part in _json_parts(text)]
     first = answers[0]
     _check_alike(answers, "robot files", "robot_file", "robot_sha256")
     if robot is not None and robot != first["robot_file"]:
         raise UsageError(f"{robot} is not {first['robot_file']}, the robot file of the answer on standard input")
     _check_alike(answers, "scenes", "scene", "scene_sha256")
     _check_alike(answers, "tools", "tool")
-    poses = [_pose(answer) for answer in answers]
+    poses = [_answer_pose(answer) for answer in answers]
     scene = first.get("scene"), first.get("scene_sha256")
-    return PipedPoses(first["robot_file"], first["robot_sha256"], poses, *scene, _tool(first.get("tool")))
+    return PipedPoses(first["robot_file"], first["robot_sha256"], poses, *scene, _tool_numbers(first.get("tool")))
 
 
-def _check_alike(answers: Sequence[dict[str, Any]], what: str, *keys: str) -> None:
+def _check_alike(answers: Sequence[dict[str, Any]], difference: str, *keys: str) -> None:
     if any(answer.get(key) != answers[0].get(key) for answer in answers for key in keys):
-        raise UsageError(f"the answers on standard input are of different {what}: send one at a time")
+        raise UsageError(f"the answers on standard input are of different {difference}: send one at a time")
 
 
-def _tool(tool: Any) -> list[float] | None:
+def _tool_numbers(tool: Any) -> list[float] | None:
     """An answer's tool as six numbers [mm, deg]."""
     if tool is None:
         return None
     if not (isinstance(tool, dict) and all(isinstance(tool.get(key), list) for key in _TOOL)):
         raise UsageError("the answer on standard input is damaged: its tool is no xyz and rpy")
-    return [number for key in _TOOL for number in _numbers(tool[key])]
+    return [number for key in _TOOL for number in _checked_numbers(tool[key])]
 
 
-def poses(
+def arm_and_poses(
     robot: str | None, words: Sequence[str] | None, scene: str | None = None, tool: str | None = None
 ) -> tuple[Arm, list[list[float]]]:
     """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
-    if not words and (found := joint_values(robot, scene, tool)) is not None:
-        return found
-    arm = arguments.load(arguments.required_robot(robot), scene, tool)
+    if not words and (piped := joint_values(robot, scene, tool)) is not None:
+        return piped
+    arm = arguments.load_arm(arguments.required_robot(robot), scene, tool)
     return arm, [arguments.joints(arm, words)]
 
 
@@ -96,16 +96,16 @@ def joint_values(
     robot: a robot given as well, which must be the same. None if there is a robot and nothing on standard
     input. Answers of ik without a branch within limits are skipped, with a warning.
     """
-    found = answers(robot, scene, tool)
-    if found is None:
+    piped = answers(robot, scene, tool)
+    if piped is None:
         return None
-    arm, parsed = found
+    arm, parsed = piped
     return arm, joints_of(arm, parsed)
 
 
 def joints_of(arm: Arm, parsed: Sequence[dict[str, Any]]) -> list[list[float]]:
     """Joint values [deg | mm] of answers; those without a branch within limits are skipped, with a warning."""
-    values = [_joints(answer, arm) for answer in parsed if not _is_unsolved(answer)]
+    values = [_answer_joints(answer, arm) for answer in parsed if not _is_unsolved(answer)]
     if len(values) < len(parsed):
         skipped = f"{len(parsed) - len(values)} of {len(parsed)} answers have no branch within limits"
         if not values:
@@ -118,17 +118,17 @@ def answers(
     robot: str | None, scene: str | None = None, tool: str | None = None
 ) -> tuple[Arm, list[dict[str, Any]]] | None:
     """The arm, and the answers on standard input as data; None if there is a robot and nothing on standard input."""
-    text = _text()
+    text = _stdin_text()
     if not text.strip():
         arguments.required_robot(robot)
         return None
     try:
-        parsed = [_parsed(part) for part in _parts(text)]
+        parsed = [_parse_answer(part) for part in _json_parts(text)]
     except UsageError:
         if robot is None or text.lstrip()[:1] == "{":
             raise
         raise UsageError("standard input is no JSON; for rows of CSV add --batch -") from None
-    arm = arguments.load(robot or parsed[0]["robot_file"], scene, tool)
+    arm = arguments.load_arm(robot or parsed[0]["robot_file"], scene, tool)
     for answer in parsed:
         if answer["robot_sha256"] != arm.sha256:
             name = answer["robot_file"]
@@ -140,7 +140,7 @@ def answers(
     return arm, parsed
 
 
-def _text() -> str:
+def _stdin_text() -> str:
     """Standard input; nothing if that is a terminal."""
     if sys.stdin is None or sys.stdin.isatty():
         return ""
@@ -154,19 +154,19 @@ def _is_unsolved(answer: dict[str, Any]) -> bool:
     return "branches" in answer and answer.get("best") is None
 
 
-def _joints(answer: dict[str, Any], arm: Arm) -> list[float]:
-    values = _pose(answer).joints
+def _answer_joints(answer: dict[str, Any], arm: Arm) -> list[float]:
+    values = _answer_pose(answer).joints
     if len(values) != arm.n:
         raise UsageError(f"the answer has {len(values)} joint values, {arm.name} has {arm.n} joints")
     return values
 
 
-def _parts(text: str) -> list[str]:
+def _json_parts(text: str) -> list[str]:
     lines = [line for line in text.splitlines() if line.strip()]
     return lines if all(line.startswith("{") and line.endswith("}") for line in lines) else [text]
 
 
-def _parsed(text: str) -> dict[str, Any]:
+def _parse_answer(text: str) -> dict[str, Any]:
     import json
 
     try:
@@ -180,7 +180,7 @@ def _parsed(text: str) -> dict[str, Any]:
     return answer
 
 
-def _pose(answer: dict[str, Any]) -> Pose:
+def _answer_pose(answer: dict[str, Any]) -> Pose:
     if "branches" in answer:
         best = answer.get("best")
         branches = answer["branches"]
@@ -189,14 +189,14 @@ def _pose(answer: dict[str, Any]) -> Pose:
         if type(best) is not int or not isinstance(branches, list) or not 0 <= best < len(branches):
             raise UsageError("the answer on standard input is damaged: its best branch is not there")
         branch = branches[best]
-        return Pose(_numbers(branch.get("joints") if isinstance(branch, dict) else None), None)
+        return Pose(_checked_numbers(branch.get("joints") if isinstance(branch, dict) else None), None)
     pulses = answer.get("pulses")
     if pulses is not None and not (isinstance(pulses, list) and all(type(p) is int for p in pulses)):
         raise UsageError("the answer on standard input is damaged: its pulses are not whole numbers")
-    return Pose(_numbers(answer.get("joints")), pulses)
+    return Pose(_checked_numbers(answer.get("joints")), pulses)
 
 
-def _numbers(values: Any) -> list[float]:
+def _checked_numbers(values: Any) -> list[float]:
     if not isinstance(values, list) or not values or not all(type(v) in (int, float) for v in values):
         raise UsageError("the answer on standard input has no joints to send")
     try:

@@ -20,10 +20,10 @@ class Bar:
         self._task: TaskID = self._drawn.add_task("", total=None, progress_text="")
         self._drawn.start()
 
-    def update(self, done: int, total: int | None, seconds: float) -> None:
+    def update(self, count: int, total: int | None, seconds: float) -> None:
         """So many are done, of so many, after so long."""
         self._drawn.update(
-            self._task, completed=done, total=total, progress_text=progress_text(self.task, done, total, seconds)
+            self._task, completed=count, total=total, progress_text=progress_text(self.task, count, total, seconds)
         )
         self._drawn.refresh()
 
@@ -37,7 +37,7 @@ def start_bar(task: str) -> Bar:
     return Bar(task, Console(file=sys.stderr, highlight=False))
 
 
-def progress_text(task: str, done: int, total: int | None, seconds: float) -> str:
+def progress_text(task: str, count: int, total: int | None, seconds: float) -> str:
     """Count, rate and time left in words.
 
     >>> progress_text("rows", 250_000, 1_000_000, 5.0)
@@ -45,13 +45,13 @@ def progress_text(task: str, done: int, total: int | None, seconds: float) -> st
     >>> progress_text("rows", 250_000, None, 5.0)
     '250,000 rows, 50,000/s, 0:00:05'
     """
-    rate = done / max(seconds, 1e-3)
+    rate = count / max(seconds, 1e-3)
     if not total:
-        return f"{done:,} {task}, {rate:,.0f}/s, {_clock(seconds)}"
-    left = f", {_clock((total - done) / rate)} left" if 0 < done <= total else ""
-    return f"{100 * done // total} %  {done:,} of {total:,} {task}, {rate:,.0f}/s{left}"
+        return f"{count:,} {task}, {rate:,.0f}/s, {_clock_text(seconds)}"
+    left = f", {_clock_text((total - count) / rate)} left" if 0 < count <= total else ""
+    return f"{100 * count // total} %  {count:,} of {total:,} {task}, {rate:,.0f}/s{left}"
 
 
-def _clock(seconds: float) -> str:
-    whole = round(seconds)
-    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+def _clock_text(seconds: float) -> str:
+    whole_seconds = round(seconds)
+    return f"{whole_seconds // 3600}:{whole_seconds // 60 % 60:02d}:{whole_seconds % 60:02d}"

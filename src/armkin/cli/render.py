@@ -18,17 +18,17 @@ _TERMINAL = 80  # columns
 
 def head(arm: Arm) -> Head:
     """What every JSON object begins with: the robot, its file as given and the file's hash; the scene's, too."""
-    found: Head = {"robot": arm.name, "robot_file": arm.path, "robot_sha256": arm.sha256}
-    found.update(scene_and_tool(arm))
-    return found
+    answer: Head = {"robot": arm.name, "robot_file": arm.path, "robot_sha256": arm.sha256}
+    answer.update(scene_and_tool(arm))
+    return answer
 
 
 def scene_and_tool(arm: Arm) -> Any:
     """The keys of an answer that was made in a scene, or with another tool than the robot file's; none without."""
-    found: dict[str, Any] = {"scene": arm.scene, "scene_sha256": arm.scene_sha256} if arm.scene else {}
+    answer: dict[str, Any] = {"scene": arm.scene, "scene_sha256": arm.scene_sha256} if arm.scene else {}
     if arm.tool is not None:
-        found["tool"] = {"xyz": list(arm.tool[:3]), "rpy": list(arm.tool[3:])}
-    return found
+        answer["tool"] = {"xyz": list(arm.tool[:3]), "rpy": list(arm.tool[3:])}
+    return answer
 
 
 def violations(arm: Arm, values: Array, q: Array) -> list[list[Violation]]:
@@ -80,17 +80,17 @@ def to_json(value: Any) -> str:
     return json.dumps(value, allow_nan=False)
 
 
-def fixed(value: float, digits: int = 4) -> str:
+def fixed_text(value: float, digits: int = 4) -> str:
     """A number for people: fixed decimals, and never -0.0000.
 
-    >>> fixed(-0.00001), fixed(398.39234)
+    >>> fixed_text(-0.00001), fixed_text(398.39234)
     ('0.0000', '398.3923')
     """
     text = f"{value:.{digits}f}"
     return text[1:] if text.startswith("-") and not text.strip("-0.") else text
 
 
-def short(value: float) -> str:
+def short_text(value: float) -> str:
     """A number as a file's author would write it: no needless zeros, at most ten digits."""
     return f"{value:.10g}" if value else "0"
 
@@ -127,22 +127,22 @@ def row(title: str, names: Sequence[str], values: Sequence[str]) -> str:
 
 def pose_line(arm: Arm, values: Sequence[float]) -> str:
     """The arm and its joint values on one line: ``three_dof: q1 = -30, q2 = 5, q3 = -5 deg``."""
-    return f"{arm.name}: {labelled(arm.joint_names, values, units.names(arm))}"
+    return f"{arm.name}: {label_values(arm.joint_names, values, units.names(arm))}"
 
 
-def wrapped(text: str, first: str = "", indent: str = "") -> str:
+def wrap_text(text: str, first: str = "", indent: str = "") -> str:
     """Running text in lines of a page's width; first, indent: what the first and the other lines begin with."""
     from textwrap import fill
 
     return fill(" ".join(text.split()), 90, initial_indent=first, subsequent_indent=indent)
 
 
-def labelled(names: Sequence[str], values: Sequence[float], each_unit: Sequence[str]) -> str:
+def label_values(names: Sequence[str], values: Sequence[float], each_unit: Sequence[str]) -> str:
     """``x = 390, y = 80, z = 300 mm``: a unit where the next number's differs."""
     parts = []
     for i, (name, value, unit) in enumerate(zip(names, values, each_unit, strict=True)):
         last = i + 1 == len(names) or each_unit[i + 1] != unit
-        parts.append(f"{name} = {short(value)}" + (f" {unit}" if last and unit else ""))
+        parts.append(f"{name} = {short_text(value)}" + (f" {unit}" if last and unit else ""))
     return ", ".join(parts)
 
 

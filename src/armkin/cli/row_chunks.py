@@ -20,12 +20,12 @@ class Chunk(NamedTuple):
     numbers: Sequence[int]
     values: Array
 
-    def numbered(self) -> NDArray[np.integer]:
+    def numbers_array(self) -> NDArray[np.integer]:
         """The numbers (N,)."""
         import numpy as np
 
-        there = self.numbers
-        return np.arange(there.start, there.stop) if isinstance(there, range) else np.array(there)
+        numbers = self.numbers
+        return np.arange(numbers.start, numbers.stop) if isinstance(numbers, range) else np.array(numbers)
 
 
 def one_row(values: Sequence[float]) -> Chunk:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import armkin
 from armkin.cli import arguments, lock_and_sweep, piped_answers
 from armkin.cli.csv_to_numbers import streamed_rows
-from armkin.cli.number_parsing import decimals
+from armkin.cli.number_parsing import decimal_count
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
 from armkin.model.target_numbers import label_units, targets_in
@@ -30,49 +30,58 @@ class TargetOptions(NamedTuple):
     near: str | None = None
 
 
-def goals(
+def read_goals(
     robot: str | None,
     q: list[str] | None,
-    wanted: TargetOptions,
+    target_options: TargetOptions,
     batch: str | None,
     scene: str | None,
     tool: str | None,
 ) -> tuple[Arm, Goals | Stream]:
     """The arm and where it shall go; what is outside its limits is refused here, before a port is opened."""
-    target = wanted.target
-    given = [name for name, what in (("Q...", q), ("--target", target), ("--batch", batch)) if what]
+    target = target_options.target
+    sources = [name for name, value in (("Q...", q), ("--target", target), ("--batch", batch)) if value]
     if target is not None and q and robot is not None and batch is None:
-        arguments.check_commas(arguments.load(robot), wanted.task, target, q)
-    if len(given) > 1:
-        raise UsageError(f"{' and '.join(given)}: give one of them")
-    if target is None and any(option not in (None, []) for option in wanted):
+        arguments.check_commas(arguments.load_arm(robot), target_options.task, target, q)
+    if len(sources) > 1:
+        raise UsageError(f"{' and '.join(sources)}: give one of them")
+    if target is None and any(option not in (None, []) for option in target_options):
         raise UsageError("--branch, --task, --near and --lock belong to --target")
-    if not given:
+    if not sources:
         return _from_pipe(robot, scene, tool)
     if robot is None:
-        raise UsageError(f"{given[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
-    arm = arguments.load(robot, scene, tool)
+        raise UsageError(f"{sources[0]} needs a robot file: armkin send robots/three_dof.yaml ...")
+    arm = arguments.load_arm(robot, scene, tool)
     if target is not None:
-        return arm, _of_target(arm, target, wanted)
+        return arm, _of_target(arm, target, target_options)
     if batch is not None:
         return arm, _of_rows(arm, batch)
-    return arm, _checked(arm, [], [arguments.joints(arm, q)])
+    return arm, _checked_goals(arm, [], [arguments.joints(arm, q)])
 
 
-def _of_target(arm: Arm, target: str, wanted: TargetOptions) -> Goals:
+def _of_target(arm: Arm, target: str, target_options: TargetOptions) -> Goals:
     """`--target`, which is solved when it is known where the arm stands."""
     import numpy as np
 
     from armkin.inverse.answers.rounding import printed
     from armkin.inverse.tasks.choose_task import task_for
 
-    what = task_for(arm, wanted.task)
-    values = np.array([arguments.target_list(arm, what, target)])
-    close = None if wanted.near is None else arguments.joint_list(arm, wanted.near, "--near")
-    shown = [[decimals(word) for word in target.split(",")]]
-    rounding = printed(label_units(what.labels), values, arm.reach, shown)
-    held = lock_and_sweep.locks(arm, wanted.lock)
-    return Goals(None, [1], targets_in(what.labels, values), what.name, wanted.branch, held, close, rounding)
+    chosen_task = task_for(arm, target_options.task)
+    values = np.array([arguments.target_list(arm, chosen_task, target)])
+    close = None if target_options.near is None else arguments.joint_list(arm, target_options.near, "--near")
+    shown = [[decimal_count(word) for word in target.split(",")]]
+    rounding = printed(label_units(chosen_task.labels), values, arm.reach, shown)
+    held = lock_and_sweep.locked_values(arm, target_options.lock)
+    return Goals(
+        None,
+        [1],
+        targets_in(chosen_task.labels, values),
+        chosen_task.name,
+        target_options.branch,
+        held,
+        close,
+        rounding,
+    )
 
 
 def _of_rows(arm: Arm, batch: str) -> Goals | Stream:
@@ -85,7 +94,7 @@ def _of_rows(arm: Arm, batch: str) -> Goals | Stream:
     numbered = list(rows)
     if not numbered:
         raise UsageError(f"{batch} has no rows: it needs one of {','.join(arm.joint_names)} per waypoint")
-    return _checked(arm, [number for number, _ in numbered], [values for _, values in numbered])
+    return _checked_goals(arm, [number for number, _ in numbered], [values for _, values in numbered])
 
 
 _NEIGHBOURS = 2.5  # pulses beside the exact value that `pulses --best` may choose
@@ -111,9 +120,9 @@ class Goals:
             return self.joints
         from armkin.inverse import choose_branch
 
-        at = units.joints_out(arm, near).tolist() if self.near is None else self.near
+        reference = units.joints_out(arm, near).tolist() if self.near is None else self.near
         request = choose_branch.Request(
-            arm=arm, task=self.task, near=at, branch=self.branch, held=self.held, ignore=arm.ignores_keep_out
+            arm=arm, task=self.task, near=reference, branch=self.branch, held=self.held, ignore=arm.ignores_keep_out
         )
         [answer] = choose_branch.solve(request, self.target, self.rounding)  # type: ignore[arg-type]
         if answer.best is None and answer.within_limits and answer.refused is None:
@@ -124,7 +133,7 @@ class Goals:
         return answer.branches[answer.best].q[None]
 
 
-def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -> Goals:
+def _checked_goals(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -> Goals:
     from armkin.model.limits import check_limits
 
     joints = units.joints_in(arm, values)
@@ -141,8 +150,8 @@ def _checked(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -
 def _from_pipe(robot: str | None, scene: str | None, tool: str | None) -> tuple[Arm, Goals]:
     import numpy as np
 
-    answer = piped_answers.read(robot)
-    arm = arguments.load(answer.robot_file, scene, tool)
+    answer = piped_answers.read_poses(robot)
+    arm = arguments.load_arm(answer.robot_file, scene, tool)
     if answer.scene_sha256 is not None and answer.scene_sha256 != arm.scene_sha256:
         raise FileError(
             f"the answer on standard input was computed in the scene {answer.scene}; "
@@ -162,7 +171,7 @@ def _from_pipe(robot: str | None, scene: str | None, tool: str | None) -> tuple[
     for pose in answer.poses:
         if len(pose.joints) != arm.n:
             raise UsageError(f"the answer has {len(pose.joints)} joint values, {arm.name} has {arm.n} joints")
-        [exact] = _checked(arm, [], [pose.joints]).joints  # type: ignore[misc]
+        [exact] = _checked_goals(arm, [], [pose.joints]).joints  # type: ignore[misc]
         if pose.pulses is not None and armkin.pulses(arm, exact).tolist() != pose.pulses:
             exact = _of_pulses(arm, exact, pose.pulses)
         poses.append(exact)
@@ -183,15 +192,15 @@ def _of_pulses(arm: Arm, q: Array, counts: list[int]) -> Array:
     if max(map(abs, counts)) > _MOST_PULSES:
         raise UsageError(f"the answer on standard input is damaged: {max(counts, key=abs)} pulses")
     meant = armkin.joints(arm, counts)
-    off = np.abs(meant - q) / resolution(arm)
-    if (worst := int(off.argmax())) >= 0 and off[worst] > _NEIGHBOURS:
-        said, other = (float(units.joints_out(arm, values)[worst]) for values in (q, meant))
+    pulse_error = np.abs(meant - q) / resolution(arm)
+    if (worst := int(pulse_error.argmax())) >= 0 and pulse_error[worst] > _NEIGHBOURS:
+        shown, by_pulses = (float(units.joints_out(arm, values)[worst]) for values in (q, meant))
         name = arm.joint_names[worst]
         raise UsageError(
-            f"the answer contradicts itself: {name} = {said:.10g}, and its pulses mean {name} = {other:.10g}: "
+            f"the answer contradicts itself: {name} = {shown:.10g}, and its pulses mean {name} = {by_pulses:.10g}: "
             "compute it again",
             joint=name,
-            value=said,
-            by_pulses=other,
+            value=shown,
+            by_pulses=by_pulses,
         )
     return meant

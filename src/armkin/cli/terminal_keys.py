@@ -34,37 +34,37 @@ class Keys:
         """The next key: a character, ``+`` and ``-`` also for arrows, a line feed for Enter."""
         while not self._next_key:
             self._next_key = self._poll(0.5)
-        found, self._next_key = self._next_key, ""
-        return found
+        pressed, self._next_key = self._next_key, ""
+        return pressed
 
     def ask(self, question: str, answers: str) -> str:
         """One of some keys; what was pressed before the question is none."""
-        self._quiet()
+        self._wait_for_silence()
         output.note(f"{question} [{'/'.join(answers)}]")
-        while (found := self.key().lower()) not in answers:
+        while (pressed := self.key().lower()) not in answers:
             pass
-        return found
+        return pressed
 
     def held(self, key: str) -> Callable[[], bool] | None:
         """Whether a key is still held, asked again and again; None if it was pressed and let go at once."""
-        found = self._poll(_BEGINS)
-        if found != key:
-            self._next_key = found
+        pressed = self._poll(_BEGINS)
+        if pressed != key:
+            self._next_key = pressed
             return None
         last = time.monotonic()
 
         def more() -> bool:
             nonlocal last
-            found = self._poll(_POLL)
-            if found == key:
+            pressed = self._poll(_POLL)
+            if pressed == key:
                 last = time.monotonic()
-            elif found:
-                self._next_key = found
-            return found in ("", key) and time.monotonic() - last < _AGAIN
+            elif pressed:
+                self._next_key = pressed
+            return pressed in ("", key) and time.monotonic() - last < _AGAIN
 
         return more
 
-    def _quiet(self) -> None:
+    def _wait_for_silence(self) -> None:
         """Wait until no key comes: one that was held until now answers nothing."""
         self._next_key = ""
         while self._poll(_AGAIN):
@@ -77,7 +77,7 @@ def keys() -> Iterator[Keys]:
     if not (sys.stdin is not None and sys.stdin.isatty()):
         raise UsageError("begin asks at a terminal, and standard input is none: run it in one")
     if sys.platform == "win32":
-        yield Keys(_windows)
+        yield Keys(_poll_windows)
         return
     import termios
     import tty
@@ -85,12 +85,12 @@ def keys() -> Iterator[Keys]:
     before = termios.tcgetattr(sys.stdin)
     try:
         tty.setcbreak(sys.stdin)
-        yield Keys(_posix)
+        yield Keys(_poll_posix)
     finally:
         termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, before)
 
 
-def _posix(seconds: float) -> str:
+def _poll_posix(seconds: float) -> str:
     import select
 
     if not select.select([sys.stdin], [], [], seconds)[0]:
@@ -104,7 +104,7 @@ def _posix(seconds: float) -> str:
     return {"\r": "\n", "=": "+", "_": "-"}.get(read, read)
 
 
-def _windows(seconds: float) -> str:
+def _poll_windows(seconds: float) -> str:
     if sys.platform != "win32":
         return ""
     import msvcrt

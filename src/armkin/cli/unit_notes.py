@@ -60,7 +60,7 @@ def joint_values(arm: Arm, values: Sequence[float], source: str = "joint values"
     output.note(f"{source} are degrees, and these look like radians ({', '.join(f'{value:g}' for value in values)})")
 
 
-def target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> None:
+def note_target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> None:
     """A position within 2 mm of the base's origin, asked of an arm of ordinary size."""
     position = [value for label, value in zip(labels, values, strict=True) if label in "xyz"]
     if position and max(map(abs, position)) < _METRES and any(map(_has_digits, position)) and arm.reach > _BIG:

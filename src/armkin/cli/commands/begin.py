@@ -49,15 +49,15 @@ def begin(
         raise FileError(f"{out} is there already; give another name", file=out)
     link = board_link.Link(port, baud, None, resume=False, reset=not no_reset, no_scene=no_scene)
     session = _Session(robot, path, scene, link)
-    found = commissioning.Findings()
+    findings = commissioning.Findings()
     with keys() as person:
         try:
-            session.run(found, person)
+            session.run(findings, person)
         except ArmkinError:
-            session.write(found, out, person)
+            session.write(findings, out, person)
             raise
-        session.write(found, out, person)
-    if found.at_home is False:
+        session.write(findings, out, person)
+    if findings.at_home is False:
         output.warn(
             "the check was not passed: full_steps, microsteps, gear or pulley of a joint that comes back wrong, "
             "its max_accel, or its motor's current"
@@ -69,49 +69,49 @@ class _Session:
 
     def __init__(self, robot: str, path: str, scene: str | None, link: board_link.Link) -> None:
         self.path, self.scene, self.link, self.port = path, scene, link, link.port
-        arguments.load(robot, scene)  # what is wrong with the files is told first
-        self.text = _read(path)
+        arguments.load_arm(robot, scene)  # what is wrong with the files is told first
+        self.text = _read_text(path)
         self.assumptions_told = False
 
-    def run(self, found: Findings, person: Keys) -> None:
+    def run(self, findings: Findings, person: Keys) -> None:
         """All steps, in their order."""
         from armkin.board import commissioning
 
-        board, arm = self._board(found)
+        board, arm = self._corrected_board(findings)
         with self._open(board) as machine:
             self.port = machine.port.name  # the one that was found is asked again
             keep_outs.check_start(machine, arm, self.link.no_scene)
-            found.inverted |= commissioning.directions(board, person)
-        board, arm = self._board(found)
+            findings.inverted |= commissioning.directions(board, person)
+        board, arm = self._corrected_board(findings)
         with self._open(board):
-            found.zeros = commissioning.zeros(board, person, forget=bool(found.inverted))
-            if not found.zeros:
-                found.limits = commissioning.limits(board, person)
-                found.at_home = commissioning.first_move(board, person)
+            findings.zeros = commissioning.zeros(board, person, forget=bool(findings.inverted))
+            if not findings.zeros:
+                findings.limits = commissioning.limits(board, person)
+                findings.at_home = commissioning.first_move(board, person)
                 return
-        board, arm = self._board(found)
+        board, arm = self._corrected_board(findings)
         with self._open(board):
-            found.limits = commissioning.limits(board, person)
-            found.at_home = commissioning.first_move(board, person)
+            findings.limits = commissioning.limits(board, person)
+            findings.at_home = commissioning.first_move(board, person)
 
     def _open(self, board: Board) -> AbstractContextManager[Backend]:
-        return board_link.backend(board, self.port, self.link.baud, reset=self.link.reset)
+        return board_link.open_backend(board, self.port, self.link.baud, reset=self.link.reset)
 
-    def _board(self, found: Findings) -> tuple[Board, Arm]:
+    def _corrected_board(self, findings: Findings) -> tuple[Board, Arm]:
         """The board of the file as it is corrected so far."""
         from armkin.keep_out.load_with_scene import arm_in_scene
         from armkin.robot_file import parse
         from armkin.robot_file.scene_file import read
 
-        file = parse(self.corrected(found), self.path)
+        file = parse(self.corrected(findings), self.path)
         arm = arm_in_scene(file, None if self.scene is None else read(self.scene))
         if not self.assumptions_told:
-            keep_outs.marked(arm, ignore=False)
+            keep_outs.mark_ignored(arm, ignore=False)
         arm = board_link.arm_for_port(arm, self.port, quiet=self.assumptions_told)
         self.assumptions_told = True
         return board_link.board_of(arm, rehearsal=self.port == board_link.SIM), arm
 
-    def corrected(self, found: Findings) -> str:
+    def corrected(self, findings: Findings) -> str:
         """The file's text with what was found."""
         from armkin.robot_file import parse
         from armkin.robot_file.replace_values import with_values
@@ -119,24 +119,24 @@ class _Session:
 
         file = parse(self.text, self.path)
         motors = file.motor_list()
-        where: dict[tuple[str | int, ...], str] = {}
+        edits: dict[tuple[str | int, ...], str] = {}
         names = [joint.name for joint in file.joints]
         for k in range(len(motors)):
-            at = ("motors", k) if file.motors else ("joints", names.index(motors[k].name), "drive")
-            if k in found.inverted:
-                where[*at, "invert"] = flow(not motors[k].invert)
-            if k in found.zeros:
-                where[*at, "zero"] = flow(found.zeros[k])
-        for j, pair in found.limits.items():
-            where["joints", j, "limits"] = flow(list(pair))
-        return with_values(self.text, where)
+            keys = ("motors", k) if file.motors else ("joints", names.index(motors[k].name), "drive")
+            if k in findings.inverted:
+                edits[*keys, "invert"] = flow(not motors[k].invert)
+            if k in findings.zeros:
+                edits[*keys, "zero"] = flow(findings.zeros[k])
+        for j, pair in findings.limits.items():
+            edits["joints", j, "limits"] = flow(list(pair))
+        return with_values(self.text, edits)
 
-    def write(self, found: Findings, out: str | None, person: Keys) -> None:
+    def write(self, findings: Findings, out: str | None, person: Keys) -> None:
         """The corrected file, shown as a diff and asked for first."""
         from armkin.files import write_whole
         from armkin.robot_file import parse
 
-        made = self.corrected(found)
+        made = self.corrected(findings)
         target = out or self.path
         if made == self.text:
             output.note(f"nothing to correct in {self.path}")
@@ -150,14 +150,14 @@ class _Session:
         if person.ask(f"Write this to {target}? y yes, n no", "yn") == "n":
             output.note("nothing was written")
             return
-        if _read(self.path) != self.text:
+        if _read_text(self.path) != self.text:
             raise FileError(f"{self.path} has changed meanwhile: nothing was written", file=self.path)
         with write_whole(target, corrects=out is None) as file:
             file.write(made)
         output.note(f"wrote {target}")
 
 
-def _read(path: str) -> str:
+def _read_text(path: str) -> str:
     try:
         return Path(path).read_bytes().decode("utf-8")
     except (OSError, ValueError) as error:

@@ -58,28 +58,28 @@ def calibrate(
     robot file.
     """
     if suggest is None:
-        output.check(out, "a robot file is", ".yaml", ".yml")
+        output.check_destination(out, "a robot file is", ".yaml", ".yml")
     else:
-        output.check(out, "poses to measure are", ".json" if json else ".csv")
-    arm = arguments.load(robot)
+        output.check_destination(out, "poses to measure are", ".json" if json else ".csv")
+    arm = arguments.load_arm(robot)
     kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
     names = [*arm.joint_names, "x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
     numbers, rows = _measured_rows(measured, names, arm)
     if suggest is not None:
-        _suggest(arm, suggest, rows, kinds, json, out)
+        _print_suggestions(arm, suggest, rows, kinds, json, out)
         return
     if rows is None:
         raise UsageError(
             f"a CSV file with columns {','.join(names)} is missing; --suggest 30 says which poses to measure"
         )
-    found = _fitted(arm, rows, kinds, poses)
+    calibration = _fit_calibration(arm, rows, kinds, poses)
     if out is not None:
         with output.destination(out) as write:
-            write(_file(found, arm))
-    answer = _answer(arm, found, numbers, out)
+            write(_file_text(calibration, arm))
+    answer = _answer(arm, calibration, numbers, out)
     with output.destination(None) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
-    for line in found.held:
+    for line in calibration.held:
         output.note(f"not corrected: {line}")
     if out is None:
         output.note("--out NEW.yaml writes the corrected robot file")
@@ -95,7 +95,7 @@ def _measured_rows(source: str | None, names: list[str], arm: Arm) -> tuple[list
     return [number for chunk in chunks for number in chunk.numbers], np.concatenate([chunk.values for chunk in chunks])
 
 
-def _fitted(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Calibration:
+def _fit_calibration(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Calibration:
     """What rows (N, n + 3) or, with `poses`, (N, n + 6) [deg | mm] tell of the arm; kinds: left as they are."""
     q, tips = units.joints_in(arm, rows[:, : arm.n]), rows[:, arm.n :]
     if poses:
@@ -104,7 +104,7 @@ def _fitted(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Calibration
         return armkin.calibrate(arm, q, tips, fix=kinds, tick=tick)
 
 
-def _file(calibration: Calibration, arm: Arm) -> str:
+def _file_text(calibration: Calibration, arm: Arm) -> str:
     from armkin.robot_file.robot_file_text import text
 
     return text(
@@ -117,24 +117,24 @@ def _file(calibration: Calibration, arm: Arm) -> str:
     )
 
 
-def _suggest(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: bool, out: str | None) -> None:
+def _print_suggestions(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: bool, out: str | None) -> None:
     from armkin.calibration.calibrate_arm import next_poses
     from armkin.columns.csv_cells import csv_line
 
     before = None if rows is None else units.joints_in(arm, rows[:, : arm.n])
-    found = units.joints_out(arm, next_poses(arm, count, before, fix=kinds)).round(9).tolist()
+    suggested = units.joints_out(arm, next_poses(arm, count, before, fix=kinds)).round(9).tolist()
     with output.destination(out) as write:
         if json:
-            answer = {**render.head(arm), "joint_units": units.names(arm), "poses": found}
+            answer = {**render.head(arm), "joint_units": units.names(arm), "poses": suggested}
             write(f"{render.to_json(answer)}\n")
         else:
-            write("\n".join([csv_line(arm.joint_names), *map(csv_line, found), ""]))
+            write("\n".join([csv_line(arm.joint_names), *map(csv_line, suggested), ""]))
 
 
 def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | None) -> dict[str, Any]:
     import numpy as np
 
-    kept = np.delete(np.arange(len(calibration.before)), calibration.flagged)
+    used = np.delete(np.arange(len(calibration.before)), calibration.flagged)
     corrections = []
     for name, value, doubt, unit in calibration.corrections:
         shown, size = _UNITS[unit]
@@ -147,9 +147,9 @@ def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | N
         "corrected": calibration.kinds,
         **{
             key: {
-                "median_mm": float(np.median(errors[kept])),
-                "rms_mm": float(np.sqrt(np.mean(errors[kept] ** 2))),
-                "max_mm": float(errors[kept].max()),
+                "median_mm": float(np.median(errors[used])),
+                "rms_mm": float(np.sqrt(np.mean(errors[used] ** 2))),
+                "max_mm": float(errors[used].max()),
             }
             for key, errors in (("before", calibration.before), ("after", calibration.after))
         },
@@ -165,21 +165,25 @@ def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | N
 def _text(arm: Arm, answer: dict[str, Any]) -> str:
     rows = [["on rows not used", "before", "after", ""]]
     for key, name in (("median_mm", "median"), ("rms_mm", "rms"), ("max_mm", "largest")):
-        rows.append([name, render.fixed(answer["before"][key], 3), render.fixed(answer["after"][key], 3), "mm"])
+        rows.append(
+            [name, render.fixed_text(answer["before"][key], 3), render.fixed_text(answer["after"][key], 3), "mm"]
+        )
     corrected = "corrected: " + (", ".join(answer["corrected"]) or "nothing, the file is as good")
     lines = [f"{arm.name}: {answer['rows']} measured poses, {corrected}", "", render.table(rows, (0, 3)), ""]
     if answer["corrections"]:
         table = [["correction", "value", "+-", ""]]
         for entry in answer["corrections"]:
-            numbers = ("?" if entry[key] is None else render.fixed(entry[key], 3) for key in ("value", "deviation"))
+            numbers = (
+                "?" if entry[key] is None else render.fixed_text(entry[key], 3) for key in ("value", "deviation")
+            )
             table.append([entry["name"], *numbers, entry["unit"]])
         lines += [render.table(table, (0, 3)), ""]
         if answer["corrections"][0]["deviation"] is None:
             lines.append("+- is not stated from fewer than 20 rows")
     if flagged := answer["flagged"]:
-        said = ", ".join(f"{entry['row']} ({entry['off_mm']:.1f} mm)" for entry in flagged)
-        lines.append(render.wrapped(said, "rows left out: ", " " * 15))
+        rows_text = ", ".join(f"{entry['row']} ({entry['off_mm']:.1f} mm)" for entry in flagged)
+        lines.append(render.wrap_text(rows_text, "rows left out: ", " " * 15))
     if unseen := answer["unseen"]:
-        lines.append(render.wrapped(", ".join(unseen), "not seen in these rows: ", " " * 24))
+        lines.append(render.wrap_text(", ".join(unseen), "not seen in these rows: ", " " * 24))
     lines.append(f"noise of a measured coordinate: {answer['noise_mm']:.3f} mm")
     return "\n".join(lines) + "\n"

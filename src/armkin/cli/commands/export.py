@@ -65,19 +65,19 @@ def export(
     same arm, the same poses.
     """
     kinds: dict[str, tuple[bool, Callable[[Arm], None]]] = {
-        "--urdf": (urdf, lambda arm: _urdf(arm, out)),
-        "--dh": (dh, lambda arm: _table(arm, "standard", out)),
-        "--mdh": (mdh, lambda arm: _table(arm, "modified", out)),
-        "--screws": (screws, lambda arm: _table(arm, "screws", out)),
-        "--json": (json, lambda arm: _json(arm, out)),
-        "--c": (c, lambda arm: _c(arm, task, single, out)),
-        "--js": (js, lambda arm: _js(arm, task, out)),
-        "--html": (html, lambda arm: _html(arm, task, path, meshes, out)),
+        "--urdf": (urdf, lambda arm: _write_urdf(arm, out)),
+        "--dh": (dh, lambda arm: _write_table(arm, "standard", out)),
+        "--mdh": (mdh, lambda arm: _write_table(arm, "modified", out)),
+        "--screws": (screws, lambda arm: _write_table(arm, "screws", out)),
+        "--json": (json, lambda arm: _write_json(arm, out)),
+        "--c": (c, lambda arm: _write_c(arm, task, single, out)),
+        "--js": (js, lambda arm: _write_js(arm, task, out)),
+        "--html": (html, lambda arm: _write_html(arm, task, path, meshes, out)),
     }
-    asked = [name for name, (wanted, _) in kinds.items() if wanted]
-    if len(asked) != 1:
+    chosen = [name for name, (is_chosen, _) in kinds.items() if is_chosen]
+    if len(chosen) != 1:
         listed = ", ".join(kinds)
-        raise UsageError(f"export: say as what, one of {listed}" + (f"; got {' and '.join(asked)}" if asked else ""))
+        raise UsageError(f"export: say as what, one of {listed}" + (f"; got {' and '.join(chosen)}" if chosen else ""))
     if single and not c:
         raise UsageError("--float goes with --c alone")
     if path is not None and not html:
@@ -85,11 +85,11 @@ def export(
     if meshes is not None and not html:
         raise UsageError("--meshes goes with --html alone")
     if not c:
-        output.check(out, f"export {asked[0]} is", *_ENDINGS[asked[0]])
-    kinds[asked[0]][1](arguments.load(robot, scene))
+        output.check_destination(out, f"export {chosen[0]} is", *_ENDINGS[chosen[0]])
+    kinds[chosen[0]][1](arguments.load_arm(robot, scene))
 
 
-def _urdf(arm: Arm, out: str | None) -> None:
+def _write_urdf(arm: Arm, out: str | None) -> None:
     import numpy as np
 
     from armkin.export.urdf_writer import urdf
@@ -100,26 +100,28 @@ def _urdf(arm: Arm, out: str | None) -> None:
         output.note(f"velocity is 0 for {', '.join(slow)}: the robot file has no max_speed there")
 
 
-def _table(arm: Arm, convention: str, out: str | None) -> None:
+def _write_table(arm: Arm, convention: str, out: str | None) -> None:
     from armkin.export import conventions
     from armkin.robot_file.robot_file_text import text
 
-    data = conventions.screws(arm) if convention == "screws" else conventions.dh(arm, modified=convention == "modified")
-    lines = list(conventions.differences(arm, data))  # reads it: a number may be beyond what a robot file takes
+    document = (
+        conventions.screws(arm) if convention == "screws" else conventions.dh(arm, modified=convention == "modified")
+    )
+    lines = list(conventions.differences(arm, document))  # reads it: a number may be beyond what a robot file takes
     with output.destination(out) as write:
-        write(text(data))
+        write(text(document))
     for line in lines:
         output.note(line)
 
 
-def _json(arm: Arm, out: str | None) -> None:
+def _write_json(arm: Arm, out: str | None) -> None:
     from armkin.export.arm_json import numbers
 
     with output.destination(out) as write:
         write(f"{render.to_json({**render.head(arm), **numbers(arm)})}\n")
 
 
-def _js(arm: Arm, task: str | None, out: str | None) -> None:
+def _write_js(arm: Arm, task: str | None, out: str | None) -> None:
     from armkin.export.js.es_module import module
 
     with _without_lock("JavaScript"):
@@ -128,7 +130,7 @@ def _js(arm: Arm, task: str | None, out: str | None) -> None:
         write(text)
 
 
-def _html(arm: Arm, task: str | None, path: str | None, meshes: str | None, out: str | None) -> None:
+def _write_html(arm: Arm, task: str | None, path: str | None, meshes: str | None, out: str | None) -> None:
     from armkin.teach.one_file import arm_html
     from armkin.teach.urdf_meshes import meshes_json as read_meshes
 
@@ -156,7 +158,7 @@ def _without_lock(language: str) -> Iterator[None]:
         raise UsageError(f"{error.message}: no {language} for that; {advice}") from None
 
 
-def _c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
+def _write_c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
     """Three files: what was named, its header, and its test program."""
     from armkin.export.c.c_program import program
 

@@ -23,7 +23,7 @@ from armkin.cli.options import (
     Tool,
     Workers,
 )
-from armkin.cli.render import fixed
+from armkin.cli.render import fixed_text
 from armkin.cli.row_chunks import Chunk, one_row
 from armkin.model import units
 
@@ -50,9 +50,9 @@ def fk(
     """Where the tool is for given joint values."""
     if batch is not None:
         arguments.no_numbers(q)
-        arm, values = arguments.load(arguments.required_robot(robot), scene, tool), list[list[float]]()
+        arm, values = arguments.load_arm(arguments.required_robot(robot), scene, tool), list[list[float]]()
     else:
-        arm, values = _poses(robot, q, scene, tool)
+        arm, values = _arm_and_poses(robot, q, scene, tool)
         if len(values) == 1:
             arguments.one_alone(workers, cluster, resume)
             [answer] = _answers(arm, one_row(values[0]), frames, compiled)
@@ -64,7 +64,7 @@ def fk(
     from armkin.cli.batch_pieces import Rows
 
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
-    asked = {
+    identity = {
         "command": "fk",
         "robot file": arm.sha256,
         "scene": arm.scene_sha256,
@@ -73,7 +73,7 @@ def fk(
         "compiled": compiled,
     }
     questions = Questions(arm, frames, compiled)
-    Run(questions, out, json, workers, cluster, resume, asked).run(rows).conclude(questions.unsolvable)
+    Run(questions, out, json, workers, cluster, resume, identity).run(rows).conclude(questions.unsolvable)
 
 
 @dataclass(frozen=True)
@@ -90,24 +90,24 @@ class Questions:
         from armkin.columns import fk_columns
 
         T = armkin.compile(self.arm).fk(units.joints_in(self.arm, chunk.values)) if self.compiled else None
-        found = fk_columns.poses(self.arm, chunk.values, T)
-        return found, found["within_limits"]
+        columns = fk_columns.poses(self.arm, chunk.values, T)
+        return columns, columns["within_limits"]
 
     def objects(self, chunk: Chunk) -> Iterator[Fk]:
         """An object a row."""
         return _answers(self.arm, chunk, self.frames, self.compiled)
 
 
-def _poses(
+def _arm_and_poses(
     robot: str | None, q: list[str] | None, scene: str | None, tool: str | None
 ) -> tuple[Arm, list[list[float]]]:
-    """As `piped_answers.poses`; that module is imported for an answer on standard input alone, so fk starts sooner."""
+    """As `piped_answers.arm_and_poses`; that module is imported for standard input alone, so fk starts sooner."""
     if q:
-        arm = arguments.load(arguments.required_robot(robot), scene, tool)
+        arm = arguments.load_arm(arguments.required_robot(robot), scene, tool)
         return arm, [arguments.joints(arm, q)]
     from armkin.cli import piped_answers
 
-    return piped_answers.poses(robot, q, scene, tool)
+    return piped_answers.arm_and_poses(robot, q, scene, tool)
 
 
 def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Iterator[Fk]:
@@ -150,19 +150,19 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
 def _text(arm: Arm, answer: Fk) -> str:
     xyz, rpy, R = answer["position_mm"], answer["rpy_deg"], answer["rotation"]
     rows = [
-        ["position", *_labelled("xyz", xyz), "mm"],
-        ["orientation", *_labelled(("roll", "pitch", "yaw"), rpy), "deg"],
+        ["position", *_label_numbers("xyz", xyz), "mm"],
+        ["orientation", *_label_numbers(("roll", "pitch", "yaw"), rpy), "deg"],
     ]
     for i, row in enumerate(R):
-        numbers = [word for value in row for word in ("", fixed(value, 6))]
+        numbers = [word for value in row for word in ("", fixed_text(value, 6))]
         rows.append(["" if i else "rotation", *numbers, ""])
     text = f"{render.pose_line(arm, answer['joints'])}\n\n{render.table(rows, left_aligned=(0, 1, 3, 5, 7))}\n"
     if "frames" in answer:
         table = [["frame", "x/mm", "y/mm", "z/mm"]]
-        table += [[frame["name"], *map(fixed, frame["position_mm"])] for frame in answer["frames"]]
+        table += [[frame["name"], *map(fixed_text, frame["position_mm"])] for frame in answer["frames"]]
         text += f"\n{render.table(table)}\n"
     return text
 
 
-def _labelled(names: Any, values: list[float]) -> list[str]:
-    return [word for name, value in zip(names, values, strict=True) for word in (name, fixed(value))]
+def _label_numbers(names: Any, values: list[float]) -> list[str]:
+    return [word for name, value in zip(names, values, strict=True) for word in (name, fixed_text(value))]

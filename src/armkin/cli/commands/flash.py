@@ -44,14 +44,14 @@ def flash(
 
     if port == SIM:
         raise UsageError("flash needs a real board: sim, a board in this process, has its firmware")
-    kind = _kind(robot, board)
+    kind = _board_kind(robot, board)
     program = image(kind)
     port = port or _only_port(kind)
     with output.progress("bytes out and back") as tick:
-        done = upload(program, port, tick)
-    found: dict[str, object] = {"board": kind, **done._asdict()}
+        flashed = upload(program, port, tick)
+    answer: dict[str, object] = {"board": kind, **flashed._asdict()}
     with output.destination(None) as write:
-        write(render.to_json(found) + "\n" if json else _text(found))
+        write(render.to_json(answer) + "\n" if json else _text(answer))
 
 
 def _text(answer: dict[str, object]) -> str:
@@ -60,16 +60,16 @@ def _text(answer: dict[str, object]) -> str:
     return f"{answer['board']} on {answer['port']}: firmware {answer['firmware']}, {answer['bytes']} bytes\n"
 
 
-def _kind(robot: str | None, board: str | None) -> str:
+def _board_kind(robot: str | None, board: str | None) -> str:
     from armkin.board_catalogue import BOARDS
 
     named = board
     if robot is not None:
-        arm = arguments.load(robot)
-        own = arm.board.kind if arm.board is not None else None
-        if board is not None and own is not None and own != board:
-            raise UsageError(f"{arm.name}'s board is {own}, and --board says {board}: leave one of them out")
-        named = board or own
+        arm = arguments.load_arm(robot)
+        arm_board = arm.board.kind if arm.board is not None else None
+        if board is not None and arm_board is not None and arm_board != board:
+            raise UsageError(f"{arm.name}'s board is {arm_board}, and --board says {board}: leave one of them out")
+        named = board or arm_board
         if named is None:
             raise UsageError(f"{arm.name} names no board: add --board, one of {', '.join(BOARDS)}")
     if named is None:
@@ -83,6 +83,6 @@ def _only_port(kind: str) -> str:
     """The only port that looks like an Arduino or a Pico: what is not flashed cannot be asked."""
     from armkin.board.ports import list_ports
 
-    found = [port.device for port in list_ports() if port.board]
+    candidates = [port.device for port in list_ports() if port.board]
     hint = "armkin ports lists them, a Pico's may be the folder of its boot drive"
-    return only_port(found, f"a board for {kind}", hint, asked=False)
+    return only_port(candidates, f"a board for {kind}", hint, asked=False)

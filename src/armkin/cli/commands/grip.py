@@ -38,44 +38,44 @@ def grip(
     json: Json = False,
 ) -> None:
     """Open or close the gripper."""
-    arm = arguments.load(robot)
+    arm = arguments.load_arm(robot)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
-    target = _value(board, value, "VALUE")
-    start = None if assume is None else _value(board, assume, "--assume")
-    with board_link.backend(board, port, baud, reset=not no_reset) as machine:
-        done = board.grip(target, start)
-    if done.counts is not None and done.position != done.target:
+    target = _gripper_value(board, value, "VALUE")
+    start = None if assume is None else _gripper_value(board, assume, "--assume")
+    with board_link.open_backend(board, port, baud, reset=not no_reset) as machine:
+        gripped = board.grip(target, start)
+    if gripped.counts is not None and gripped.position != gripped.target:
         raise LinkError(
-            f"the gripper stands at {render.short(done.position)} instead of {render.short(done.target)} {done.unit}: "
-            "please report this as a bug"
+            f"the gripper stands at {render.short_text(gripped.position)} instead of "
+            f"{render.short_text(gripped.target)} {gripped.unit}: please report this as a bug"
         )
-    found: dict[str, Any] = {**render.head(arm), "port": machine.port.name, "gripper": done.position}
-    if done.counts is None:
-        found |= {"target": done.target, "measured": done.measured}
+    answer: dict[str, Any] = {**render.head(arm), "port": machine.port.name, "gripper": gripped.position}
+    if gripped.counts is None:
+        answer |= {"target": gripped.target, "measured": gripped.measured}
     else:
-        found["counts"] = done.counts
+        answer["counts"] = gripped.counts
     with output.destination(None) as write:
-        write(render.to_json(found) + "\n" if json else f"gripper: {_rest_text(done)}\n")
+        write(render.to_json(answer) + "\n" if json else f"gripper: {_rest_text(gripped)}\n")
 
 
-def _rest_text(done: Gripped) -> str:
+def _rest_text(gripped: Gripped) -> str:
     """Where a gripper has come to rest, in words: ``29.97 deg (833 us)``."""
-    text = f"{render.short(done.position)} {done.unit}"
-    if done.counts is not None:
-        return f"{text} ({done.counts} {done.count_unit})"
-    if not done.measured:
+    text = f"{render.short_text(gripped.position)} {gripped.unit}"
+    if gripped.counts is not None:
+        return f"{text} ({gripped.counts} {gripped.count_unit})"
+    if not gripped.measured:
         return f"{text}, as sent: nothing measures it"
-    held = abs(done.position - done.target) >= 1.5
-    return text + f" of {render.short(done.target)}: it holds something, or is blocked" * held
+    held = abs(gripped.position - gripped.target) >= 1.5
+    return text + f" of {render.short_text(gripped.target)}: it holds something, or is blocked" * held
 
 
-def _value(board: Board, text: str, what: str) -> str | float:
+def _gripper_value(board: Board, text: str, option: str) -> str | float:
     """A gripper's value: open, closed, or a number within them. Raises UsageError for others."""
     board.grip_value("open")  # is there a gripper?
     if text in _WORD:
         return _WORD[text]
     if not is_number(text) and (close := get_close_matches(text.lower(), _WORD, 1)):
-        raise UsageError(f"{what}: '{text}' is neither open nor closed nor a number; did you mean {_WORD[close[0]]}?")
-    value = number(text, what)
+        raise UsageError(f"{option}: '{text}' is neither open nor closed nor a number; did you mean {_WORD[close[0]]}?")
+    value = number(text, option)
     board.grip_value(value)
     return value

@@ -50,33 +50,35 @@ def home(
     """
     from armkin.board.planner import where_arm_stands
 
-    arm = keep_outs.moving(robot, scene)
+    arm = keep_outs.load_moving_arm(robot, scene)
     if arm.keep_out:
         output.note("the search for the switches is not proved free of keep-outs; the move after it is")
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     board.check_home(joints or (), rest_at_home=rest_at_home)  # refuses before a port is opened
-    with board_link.backend(board, port, baud, simulated=_REHEARSAL, reset=not no_reset) as machine:
-        told: dict[str, Any] = {}
+    with board_link.open_backend(board, port, baud, simulated=_REHEARSAL, reset=not no_reset) as machine:
+        switch_report: dict[str, Any] = {}
         keep_outs.check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
         lost = board.home(joints or (), lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
         if lost is not None:
-            told["lost_steps"] = _lost_steps(arm, lost)
+            switch_report["lost_steps"] = _lost_steps(arm, lost)
         if not stay:
             output.note("moving to the home pose")
             board.go_home()
-        found = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine), **told}
+        answer = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine), **switch_report}
     with output.destination(None) as write:
-        write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))
+        write(render.to_json(answer) + "\n" if json else board_link.where_text(arm, answer))
 
 
 def _lost_steps(arm: Arm, lost: Sequence[LostSteps]) -> list[dict[str, Any]]:
     """What the switches tell of the counts, as JSON; a warning where more than a step is missing."""
-    told = []
-    for one in lost:
-        slides = arm.prismatic[arm.joint_names.index(one.joint)]
-        difference = None if one.difference is None else one.difference / (1.0 if slides else units.DEGREE)
-        told.append({"joint": one.joint, "steps": one.steps, "difference": difference})
-        if one.steps is not None and abs(one.steps) > 1:
-            off = f"({difference:.3f} {'mm' if slides else 'deg'})"
-            output.warn(f"{one.joint}: {abs(one.steps)} steps were lost since its position was last set {off}")
-    return told
+    rows = []
+    for search in lost:
+        slides = arm.prismatic[arm.joint_names.index(search.joint)]
+        difference = None if search.difference is None else search.difference / (1.0 if slides else units.DEGREE)
+        rows.append({"joint": search.joint, "steps": search.steps, "difference": difference})
+        if search.steps is not None and abs(search.steps) > 1:
+            difference_text = f"({difference:.3f} {'mm' if slides else 'deg'})"
+            output.warn(
+                f"{search.joint}: {abs(search.steps)} steps were lost since its position was last set {difference_text}"
+            )
+    return rows

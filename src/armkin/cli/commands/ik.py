@@ -12,7 +12,7 @@ import typer
 import armkin
 from armkin.cli import arguments, compiled_ik, ik_text, lock_and_sweep, output, piped_answers, render
 from armkin.cli.ik_answer import answer_of, closest_pose, nearest_to
-from armkin.cli.number_parsing import decimals
+from armkin.cli.number_parsing import decimal_count
 from armkin.cli.options import (
     AllBranches,
     Batch,
@@ -88,35 +88,35 @@ def ik(
     from armkin.inverse.tasks.choose_task import task_for
 
     _check_together(batch, sweep, position_first=position_first, compiled=compiled, continuous=continuous)
-    given = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
-    arm = arguments.load(arguments.required_robot(robot), scene, tool) if given is None else given[0]
-    what = task_for(arm, task)
-    reached = None if given is None else _reached(arm, what, given[1])
-    held = lock_and_sweep.locks(arm, lock)
+    piped = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
+    arm = arguments.load_arm(arguments.required_robot(robot), scene, tool) if piped is None else piped[0]
+    chosen_task = task_for(arm, task)
+    reached = None if piped is None else _reached_targets(arm, chosen_task, piped[1])
+    held = lock_and_sweep.locked_values(arm, lock)
     request = choose_branch.Request(
         arm=arm,
-        task=what.name,
+        task=chosen_task.name,
         near=None if near is None else arguments.joint_list(arm, near, "--near"),
         branch=branch,
         held=held,
-        swept=lock_and_sweep.sweeps(arm, sweep, held),
+        swept=lock_and_sweep.swept_values(arm, sweep, held),
         every=all_branches or continuous,
         position_first=position_first,
     )
-    request = _request_with_solver(request, what.name, compiled=compiled)
-    questions = Questions(request, what, all_branches, turns, continuous)
+    request = _request_with_solver(request, chosen_task.name, compiled=compiled)
+    questions = Questions(request, chosen_task, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
         from armkin.cli.batch_answers import Batch as Run
         from armkin.cli.batch_pieces import Rows
 
         arguments.no_numbers(target)
-        rows = Rows(batch, what.labels, f"task {what.name}", None, reached or [])
+        rows = Rows(batch, chosen_task.labels, f"task {chosen_task.name}", None, reached or [])
         engine = (1, None) if continuous else (workers, cluster)  # each row waits for the one before
         Run(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
         return
     arguments.one_alone(workers, cluster, resume)
     if reached is None:
-        values, words = arguments.target(arm, what, target), [[decimals(word) for word in target or ()]]
+        values, words = arguments.target(arm, chosen_task, target), [[decimal_count(word) for word in target or ()]]
     else:
         values, words = reached[0], None
     _single_target(questions, one_row(values).values, words, out, json=json)
@@ -131,7 +131,7 @@ def _request_with_solver(request: choose_branch.Request, task: str, *, compiled:
         position_first_is_for(choose_branch.locked(request), task)
     if not compiled:
         return request
-    compiled_ik.prepare(request.arm, task)
+    compiled_ik.build_library(request.arm, task)
     return replace(request, ik=compiled_ik.ik, fk=partial(compiled_ik.fk, task=task))
 
 
@@ -158,18 +158,18 @@ def _single_target(
 
     request, task = questions.request, questions.task
     goal = targets_in(task.labels, values)
-    [found] = choose_branch.solve(request, goal, _rounding(request.arm, task, values, words))
-    closest = closest_pose(request, goal[0], found) if found.best is None else None
-    answer = answer_of(request, task, values[0].tolist(), found, questions.all_branches, questions.turns, closest)
+    [answer_set] = choose_branch.solve(request, goal, _decimal_rounding(request.arm, task, values, words))
+    closest = closest_pose(request, goal[0], answer_set) if answer_set.best is None else None
+    answer = answer_of(request, task, values[0].tolist(), answer_set, questions.all_branches, questions.turns, closest)
     with output.destination(out, "one answer is", output.TEXT) as write:
         write(f"{render.to_json(answer)}\n" if json else ik_text.text(request.arm, answer))
     if answer["best"] is None and answer["closest"] is None:
-        raise choose_branch.blocked(request, found)
+        raise choose_branch.blocked(request, answer_set)
     if answer["best"] is None and answer["closest"] is not None:
-        raise choose_branch.refusal(request, found, answer["closest"]["distance_mm"])
+        raise choose_branch.refusal(request, answer_set, answer["closest"]["distance_mm"])
 
 
-def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float]]:
+def _reached_targets(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float]]:
     """Targets [mm, deg] of the task that joint values [deg | mm] reach."""
     from armkin.inverse.tasks.task import targets_of
 
@@ -177,7 +177,7 @@ def _reached(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float
     return targets_out(task.labels, targets_of(task, armkin.fk(arm, q), q))
 
 
-def _rounding(arm: Arm, task: Task, values: Array, decimals: list[list[int]] | None = None) -> Array:
+def _decimal_rounding(arm: Arm, task: Task, values: Array, decimals: list[list[int]] | None = None) -> Array:
     """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with; decimals: how many."""
     from armkin.inverse.answers import rounding as target_rounding
 
@@ -232,11 +232,11 @@ class Questions:
         from armkin.columns import ik_columns
 
         targets = targets_in(self.task.labels, chunk.values)
-        rounding = _rounding(self.request.arm, self.task, chunk.values)
+        rounding = _decimal_rounding(self.request.arm, self.task, chunk.values)
         quick = compiled_ik.nearest if self.request.ik is compiled_ik.ik else None
-        numbers = chunk.numbered()
-        found = ik_columns.columns(self.request, targets, numbers, self.all_branches, quick, rounding=rounding)
-        return found.table, ~found.unsolved
+        numbers = chunk.numbers_array()
+        answered = ik_columns.columns(self.request, targets, numbers, self.all_branches, quick, rounding=rounding)
+        return answered.table, ~answered.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:
         """By way of an object a row, for what is not asked of each row by itself."""
@@ -244,12 +244,12 @@ class Questions:
 
         from armkin.columns.table import of_records
 
-        rest = ("within_limits", "residual_mm", "residual_deg", "motion")
-        heading = ["row", "status", "branch", *self.request.arm.joint_names, *rest]
+        measures = ("within_limits", "residual_mm", "residual_deg", "motion")
+        heading = ["row", "status", "branch", *self.request.arm.joint_names, *measures]
         records: list[list[Any]] = []
         solved: list[bool] = []
         for number, answer in zip(chunk.numbers, self.objects(chunk, with_closest=False), strict=True):
-            records += _records(self.request.arm, int(number), answer)
+            records += _csv_records(self.request.arm, int(number), answer)
             solved.append(answer["best"] is not None)
         return of_records(heading, records), np.array(solved)
 
@@ -261,26 +261,28 @@ class Questions:
         for first in range(0, len(chunk.values), most):
             part = chunk.values[first : first + most]
             targets = targets_in(self.task.labels, part)
-            found = choose_branch.solve(self.request, targets, _rounding(self.request.arm, self.task, part))
-            each = (
-                choose_branch.continued(self.request, found)
+            answers = choose_branch.solve(self.request, targets, _decimal_rounding(self.request.arm, self.task, part))
+            requests = (
+                choose_branch.continued(self.request, answers)
                 if self.continuous
-                else ((self.request, one) for one in found)
+                else ((self.request, answer_set) for answer_set in answers)
             )
             alone = self.continuous or not with_closest  # each row's `near` is another one
-            nearest = {} if alone else nearest_to(self.request, targets, found)
-            for k, (values, goal, (request, one)) in enumerate(zip(part.tolist(), targets, each, strict=True)):
-                missed = with_closest and one.best is None
-                closest = closest_pose(request, goal, one, nearest.get(k)) if missed else None
-                yield answer_of(request, self.task, values, one, self.all_branches, self.turns, closest)
-                if self.continuous and one.best is not None:
-                    self.request = replace(request, near=one.branches[one.best].joints)
+            nearest = {} if alone else nearest_to(self.request, targets, answers)
+            for k, (values, goal, (request, answer_set)) in enumerate(
+                zip(part.tolist(), targets, requests, strict=True)
+            ):
+                missed = with_closest and answer_set.best is None
+                closest = closest_pose(request, goal, answer_set, nearest.get(k)) if missed else None
+                yield answer_of(request, self.task, values, answer_set, self.all_branches, self.turns, closest)
+                if self.continuous and answer_set.best is not None:
+                    self.request = replace(request, near=answer_set.branches[answer_set.best].joints)
 
 
-def _records(arm: Arm, row: int, answer: Ik) -> Iterator[list[Any]]:
+def _csv_records(arm: Arm, row: int, answer: Ik) -> Iterator[list[Any]]:
     """CSV: one line a branch, or one line without joints. A name has no comma here: `cut` sees one column."""
     for branch in answer["branches"]:
-        rest = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
-        yield [row, answer["status"], branch["name"].replace(",", ""), *branch["joints"], *rest]
+        measures = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
+        yield [row, answer["status"], branch["name"].replace(",", ""), *branch["joints"], *measures]
     if not answer["branches"]:
         yield [row, answer["status"], None, *[None] * arm.n, False, None, None, None]

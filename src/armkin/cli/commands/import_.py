@@ -47,24 +47,24 @@ def import_(
     files.protect_input(file)
     try:
         raw = urdf_reader.load(file)  # once: a pipe can be read no second time
-        found = urdf_reader.parse(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
+        imported = urdf_reader.parse(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
     except UsageError as error:
         option = next((o for o in ("base", "tip") if f"the {o} must be named" in str(error)), None)
         if option is None:
             raise
         raise UsageError(f"{error}\ngive it with --{option} LINK") from None
-    arm = build(robot_file.parse(text(found.data), f"{file} as a robot file"))
-    data: dict[str, Any] = conventions.dh(arm) if dh else found.data
+    arm = build(robot_file.parse(text(imported.data), f"{file} as a robot file"))
+    document: dict[str, Any] = conventions.dh(arm) if dh else imported.data
     with output.destination(out) as write:
-        write(text(data, found.notes))
-    for note in found.notes:
+        write(text(document, imported.notes))
+    for note in imported.notes:
         output.note(note)
-    output.note(f"{arm.n} joints from {found.base} to {found.tip}")
-    if not snap and (gain := _gain(raw, found, arm)):
+    output.note(f"{arm.n} joints from {imported.base} to {imported.tip}")
+    if not snap and (gain := _snap_gain(raw, imported, arm)):
         output.note(gain)
 
 
-def _gain(raw: bytes, imported: UrdfRobot, arm: Arm) -> str | None:
+def _snap_gain(raw: bytes, imported: UrdfRobot, arm: Arm) -> str | None:
     """What --snap would buy: another solver class, and how far the tip would move for it."""
     import numpy as np
 

@@ -23,7 +23,7 @@ def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = 
     DH table or screws, limits and home, the step chain with pulses per turn and degrees per pulse, the
     task of `armkin ik` with its target's numbers, how it is solved, and what pulses, send and home still need.
     """
-    arm = arguments.load(robot, scene)
+    arm = arguments.load_arm(robot, scene)
     answer = _answer(arm, task)
     with output.destination(out) as write:
         if json:
@@ -39,19 +39,19 @@ def _answer(arm: Arm, task: str | None) -> Info:
 
     file = arm.file
     assert file is not None  # it was read from one
-    motors = [_motor(motor, file) for motor in file.motor_list()]
+    motors = [_motor_json(motor, file) for motor in file.motor_list()]
     return {
         **render.head(arm),
         "description": file.description,
         "source": file.source,
         "convention": file.convention,
         "joint_units": units.names(arm),
-        "joints": [_joint(joint) for joint in file.joints],
+        "joints": [_joint_json(joint) for joint in file.joints],
         "poses": units.poses_out(arm),
         "base": file.base.model_dump(include={"xyz", "rpy"}),
         "tool": file.tool.model_dump(),
         "zero_pose": None if file.zero_pose is None else file.zero_pose.model_dump(),
-        **_task(arm, task),
+        **_solving_json(arm, task),
         "pitch_offset": file.pitch_offset,
         "reach_mm": arm.reach if arm.link[1:, :3, 3].any() or arm.prismatic.any() else 0.0,
         "motors": motors,
@@ -74,12 +74,12 @@ def _keep_outs(arm: Arm) -> KeepOuts:
     return keep_out_fields(arm)  # type: ignore[return-value]
 
 
-def _joint(joint: Joint) -> dict[str, Any]:
+def _joint_json(joint: Joint) -> dict[str, Any]:
     entry = joint.model_dump(exclude={"drive"})
     return {key: value for key, value in entry.items() if key not in ("dh", "screw", "body") or value is not None}
 
 
-def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
+def _motor_json(motor: Motor, file: RobotFile) -> dict[str, Any]:
     """A motor as the file has it, and what its chain multiplies to."""
     entry = motor.model_dump(exclude_none=True)
     if motor.kind == "stepper":
@@ -98,7 +98,7 @@ def _motor(motor: Motor, file: RobotFile) -> dict[str, Any]:
     return entry
 
 
-def _task(arm: Arm, name: str | None) -> Solving:
+def _solving_json(arm: Arm, name: str | None) -> Solving:
     """The task and its solver, or why there is none."""
     from armkin.inverse.redundant.families import described
     from armkin.inverse.solvers.redundant import redundancy
@@ -111,7 +111,7 @@ def _task(arm: Arm, name: str | None) -> Solving:
         if name is not None:
             raise
         return {"task": None, "target_labels": [], "target_units": [], "solver": None, "ik_refuses": str(error)}
-    found: Solving = {
+    solving: Solving = {
         "task": task.name,
         "target_labels": list(task.labels),
         "target_units": label_units(task.labels),
@@ -120,15 +120,15 @@ def _task(arm: Arm, name: str | None) -> Solving:
     }
     if spare := redundancy(actual(arm), task.name):
         method, why, complete = described(arm, spare)
-        found["redundant"] = arm.joint_names[spare.joint]
-        found["solver"] = {"method": method, "why": why, "complete": complete}
-        return found
+        solving["redundant"] = arm.joint_names[spare.joint]
+        solving["solver"] = {"method": method, "why": why, "complete": complete}
+        return solving
     try:
         method, why, complete = armkin.method(arm, task.name)
-        found["solver"] = {"method": method, "why": why, "complete": complete}
+        solving["solver"] = {"method": method, "why": why, "complete": complete}
     except UsageError as error:
-        found["ik_refuses"] = str(error)
-    return found
+        solving["ik_refuses"] = str(error)
+    return solving
 
 
 def _resolution(arm: Arm) -> list[float] | None:

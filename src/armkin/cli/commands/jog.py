@@ -39,7 +39,7 @@ def jog(
     from armkin.board.planner import where_arm_stands
     from armkin.model.lock_joints import joint_index
 
-    arm = board_link.arm_for_port(keep_outs.moving(robot, scene, ignore_keep_out), port)
+    arm = board_link.arm_for_port(keep_outs.load_moving_arm(robot, scene, ignore_keep_out), port)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     j = joint_index(arm, joint)
     rate = number(speed, "SPEED")
@@ -49,14 +49,14 @@ def jog(
     top = float(units.joints_out(arm, arm.max_speed)[j])
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
-    with board_link.backend(board, port, baud, reset=not no_reset) as machine:
+    with board_link.open_backend(board, port, baud, reset=not no_reset) as machine:
         keep_outs.check_start(machine, arm, no_scene)
-        wanted = float(units.joints_in(arm, [rate] * arm.n)[j])
-        allowed = board.ready_to_jog(j, wanted)
-        if allowed != wanted:
-            slower = abs(rate * allowed / wanted)
+        joint_rate = float(units.joints_in(arm, [rate] * arm.n)[j])
+        allowed = board.ready_to_jog(j, joint_rate)
+        if allowed != joint_rate:
+            slower = abs(rate * allowed / joint_rate)
             output.warn(f"the position is lost: {slower:g} instead of {speed}, and no limits")
         board.jog(j, allowed, time)
-        found = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine)}
+        answer = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine)}
     with output.destination(None) as write:
-        write(render.to_json(found) + "\n" if json else board_link.where_text(arm, found))
+        write(render.to_json(answer) + "\n" if json else board_link.where_text(arm, answer))

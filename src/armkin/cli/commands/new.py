@@ -69,17 +69,17 @@ def new(
     """
     from armkin.robot_file.new_file import text
 
-    path = _path(name, out)
+    path = _output_path(name, out)
     asks = not dh and batch is None and sys.stdin is not None and sys.stdin.isatty()
     convention, table = _table_by_questions(convention) if asks else _table_of_options(dh, batch, convention)
     if convention not in ("standard", "modified"):
         raise UsageError(f"--convention {convention}: must be standard or modified")
-    rows = [_row(entries, i) for i, entries in enumerate(table, 1)]
+    rows = [_dh_row(entries, i) for i, entries in enumerate(table, 1)]
     title = os.path.basename(name)
     if asks and floor is None:
-        floor = _floor(lambda z: _check(text(title, convention, rows, source, z), path))
+        floor = _ask_floor(lambda z: _check_file(text(title, convention, rows, source, z), path))
     made = text(title, convention, rows, source, floor)
-    _check(made, path)  # what it refuses, limits for one, is told in its words, and nothing is written
+    _check_file(made, path)  # what it refuses, limits for one, is told in its words, and nothing is written
     with output.destination(path) as write:
         write(made)
     if path != "-":
@@ -87,7 +87,7 @@ def new(
         output.note(f"wrote {path}; armkin info {word} prints it as papers do, armkin fk {word} home where it stands")
 
 
-def _check(text: str, path: str) -> None:
+def _check_file(text: str, path: str) -> None:
     """Raise RobotFileError for a file that is not valid, or whose floor is hit in every posture."""
     from armkin.keep_out.load_with_scene import arm_in_scene
     from armkin.robot_file import parse
@@ -102,11 +102,11 @@ def _table_of_options(
     if dh and batch is not None:
         raise UsageError("--dh and --batch: give one of the two")
     if not (dh or batch is not None) or convention is None:
-        raise _lacking(bool(dh) or batch is not None, convention)
-    return convention, _options(dh) if dh else _csv(batch or "-")
+        raise _lacking_error(bool(dh) or batch is not None, convention)
+    return convention, _rows_of_options(dh) if dh else _rows_of_csv(batch or "-")
 
 
-def _lacking(table: bool, convention: str | None) -> UsageError:
+def _lacking_error(table: bool, convention: str | None) -> UsageError:
     """All that is missing, at once."""
     lacks = [] if table else ["no table: give --dh ALPHA,A,D,THETA for each joint, or --batch FILE (a CSV)"]
     if convention is None:
@@ -116,7 +116,7 @@ def _lacking(table: bool, convention: str | None) -> UsageError:
     return UsageError("\n".join(lacks))
 
 
-def _path(name: str, out: str | None) -> str:
+def _output_path(name: str, out: str | None) -> str:
     base = os.path.basename(name)
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,79}", base) or base.endswith((".yaml", ".yml")):
         plain = re.sub(r"\.ya?ml$", "", base)
@@ -127,7 +127,7 @@ def _path(name: str, out: str | None) -> str:
     return path
 
 
-def _options(words: Sequence[str]) -> list[dict[str, str]]:
+def _rows_of_options(words: Sequence[str]) -> list[dict[str, str]]:
     table = []
     for i, word in enumerate(words, 1):
         cells = [cell.strip() for cell in word.split(",")]
@@ -148,7 +148,7 @@ def _text_of(source: str) -> str:
         raise FileError(f"{source}: cannot read: {getattr(error, 'strerror', None) or error}", file=source) from None
 
 
-def _csv(source: str) -> list[dict[str, str]]:
+def _rows_of_csv(source: str) -> list[dict[str, str]]:
     lines = [line for line in _text_of(source).splitlines() if line.strip() and not line.lstrip().startswith("#")]
     try:
         rows = [[cell.strip() for cell in row] for row in csv.reader(lines, skipinitialspace=True)]
@@ -187,7 +187,7 @@ def _ask(question: str, default: str, check: Callable[[str], object]) -> str:
             output.warn(str(error))
 
 
-def _floor(check: Callable[[float | None], object]) -> float | None:
+def _ask_floor(check: Callable[[float | None], object]) -> float | None:
     """The height that the arm may not go below; a file that is wrong for other reasons is refused at once."""
     check(None)
 
@@ -206,17 +206,17 @@ def _table_by_questions(convention: str | None) -> tuple[str, list[dict[str, str
 
     def limits(answer: str) -> None:
         if answer != "none":
-            _limits(dict(zip(("lower", "upper"), answer.split(","), strict=False)), "limits")
+            _row_limits(dict(zip(("lower", "upper"), answer.split(","), strict=False)), "limits")
 
     convention = convention or _ask("convention, standard or modified", "standard", known)
     count = whole_number(_ask("how many joints", "3", lambda n: whole_number(n, "joints", 1, 12)), "joints", 1, 12)
     table = []
     for i in range(1, count + 1):
         row = {
-            "alpha": _ask(f"joint {i}: alpha [deg]", "0", lambda word: _entry(word, "alpha")),
-            "a": _ask(f"joint {i}: a [mm]", "0", lambda word: _entry(word, "a")),
-            "d": _ask(f"joint {i}: d [mm], d{i} if it slides", "0", lambda word: _entry(word, "d")),
-            "theta": _ask(f"joint {i}: theta offset [deg]", "0", lambda word: _entry(word, "theta")),
+            "alpha": _ask(f"joint {i}: alpha [deg]", "0", lambda word: _table_entry(word, "alpha")),
+            "a": _ask(f"joint {i}: a [mm]", "0", lambda word: _table_entry(word, "a")),
+            "d": _ask(f"joint {i}: d [mm], d{i} if it slides", "0", lambda word: _table_entry(word, "d")),
+            "theta": _ask(f"joint {i}: theta offset [deg]", "0", lambda word: _table_entry(word, "theta")),
         }
         span = _ask(f"joint {i}: limits LOWER,UPPER, or none", "none", limits)
         if span != "none":
@@ -225,7 +225,7 @@ def _table_by_questions(convention: str | None) -> tuple[str, list[dict[str, str
     return convention, table
 
 
-def _slides(cells: Mapping[str, str], row: str, *, d_varies: bool) -> bool:
+def _is_prismatic(cells: Mapping[str, str], row: str, *, d_varies: bool) -> bool:
     """Whether a row's joint is prismatic, by its type or, without one, by its variable."""
     kind = (cells.get("type") or "").lower()
     if kind not in ("", "revolute", "prismatic", "r", "p"):
@@ -233,27 +233,27 @@ def _slides(cells: Mapping[str, str], row: str, *, d_varies: bool) -> bool:
     return kind in ("prismatic", "p") or (not kind and d_varies)
 
 
-def _row(cells: Mapping[str, str], i: int) -> Row:
+def _dh_row(cells: Mapping[str, str], i: int) -> Row:
     from armkin.robot_file.new_file import Row
 
-    where = f"row {i}: "
-    values = {key: _entry(cells.get(key) or "0", f"{where}{key}") for key in ("alpha", "a", "d", "theta")}
+    context = f"row {i}: "
+    values = {key: _table_entry(cells.get(key) or "0", f"{context}{key}") for key in ("alpha", "a", "d", "theta")}
     for key in ("alpha", "a"):
         if values[key][1]:
-            raise UsageError(f"{where}{key}: '{cells[key]}' is a variable; only theta or d can be")
-    slides = _slides(cells, where, d_varies=values["d"][1])
+            raise UsageError(f"{context}{key}: '{cells[key]}' is a variable; only theta or d can be")
+    slides = _is_prismatic(cells, context, d_varies=values["d"][1])
     if values["d"][1] and values["theta"][1]:
-        raise UsageError(f"{where}both theta and d are variables; a joint has one")
-    limits = _limits(cells, where)
-    home = number(cells.get("home") or "0", f"{where}home")
+        raise UsageError(f"{context}both theta and d are variables; a joint has one")
+    limits = _row_limits(cells, context)
+    home = number(cells.get("home") or "0", f"{context}home")
     if limits is not None and not cells.get("home") and not limits[0] <= home <= limits[1]:
         home = limits[0]
-        output.note(f"{where}0 is outside the limits: home is {home:g}")
+        output.note(f"{context}0 is outside the limits: home is {home:g}")
     numbers = {key: value for key, (value, _) in values.items()}
     return Row(cells.get("name") or f"q{i}", **numbers, prismatic=slides, limits=limits, home=home)
 
 
-def _limits(cells: Mapping[str, str], row: str) -> tuple[float, float] | None:
+def _row_limits(cells: Mapping[str, str], row: str) -> tuple[float, float] | None:
     lower, upper = cells.get("lower") or "", cells.get("upper") or ""
     if not lower and not upper:
         return None
@@ -262,15 +262,15 @@ def _limits(cells: Mapping[str, str], row: str) -> tuple[float, float] | None:
     return number(lower, f"{row}lower"), number(upper, f"{row}upper")
 
 
-def _entry(word: str, name: str) -> tuple[float, bool]:
+def _table_entry(word: str, name: str) -> tuple[float, bool]:
     """An entry of the table as papers write it: its constant, and whether the joint's variable is in it."""
     if (angle := of_pi(word)) is not None and not name.endswith((" a", " d")):
         return angle, False
-    found = _VARIABLE.fullmatch(word.strip())
-    if found is None or not word.strip():
+    match = _VARIABLE.fullmatch(word.strip())
+    if match is None or not word.strip():
         return number(word, name), False
-    if found[1] == "-":
+    if match[1] == "-":
         raise UsageError(f"{name}: '{word}' counts against its row; write the constant here and sign: -1 in the file")
-    constant = found[3] or "0"
+    constant = match[3] or "0"
     angle = of_pi(constant)
-    return (number(constant, name) if angle is None else angle) * (-1.0 if found[2] == "-" else 1.0), True
+    return (number(constant, name) if angle is None else angle) * (-1.0 if match[2] == "-" else 1.0), True

@@ -118,22 +118,22 @@ def path(
     if start is not None and port is not None and not dry_run:
         raise UsageError("--start belongs to a plan: with --port the arm starts where it stands")
 
-    arm = keep_outs.moving(robot, scene, ignore_keep_out, tool)
-    locked = lock_and_sweep.locked(arm, lock)
+    arm = keep_outs.load_moving_arm(robot, scene, ignore_keep_out, tool)
+    locked = lock_and_sweep.locked_radians(arm, lock)
     free = armkin.lock(arm, locked) if locked else arm
-    drawn = drawing_path.moves(free, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
-    moves = _moves(free, file, via, task) if drawn is None else drawn
-    output.check(out, "a plan is", ".csv")
+    drawn = drawing_path.drawing_moves(free, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
+    moves = _moves_of(free, file, via, task) if drawn is None else drawn
+    output.check_destination(out, "a plan is", ".csv")
     options: dict[str, Any] = {
         "branch": branch,
         "task": task,
-        "tolerance": None if tolerance is None else _positive(tolerance, "--tolerance", 1e-6),
+        "tolerance": None if tolerance is None else _number_from(tolerance, "--tolerance", 1e-6),
         "corners": corners,
-        "blend": None if blend is None else _positive(blend, "--blend", 0),
+        "blend": None if blend is None else _number_from(blend, "--blend", 0),
         "speed": arguments.percent(speed, "--speed"),
         "accel": arguments.percent(accel, "--accel"),
-        "tool_speed": None if tool_speed is None else _positive(tool_speed, "--tool-speed", 1e-3),
-        "jerk": None if jerk is None else units.joints_in(arm, [_positive(jerk, "--jerk", 1e-3)] * arm.n),
+        "tool_speed": None if tool_speed is None else _number_from(tool_speed, "--tool-speed", 1e-3),
+        "jerk": None if jerk is None else units.joints_in(arm, [_number_from(jerk, "--jerk", 1e-3)] * arm.n),
         "near": None if near is None else units.joints_in(arm, arguments.joint_list(arm, near, "--near")),
         "split": split,
         "samples": None if samples is None else whole_number(samples, "--samples", 10, 1_000_000),
@@ -144,15 +144,15 @@ def path(
         )
     if port is None or dry_run:
         plan = _plan_from(start, "--start", arm, moves, locked, options, json=json)
-        found = _answer(plan, _rehearsed(plan, rehearsal=dry_run))
-        _files(plan, out, plot)
-        _print(plan, found, json=json, out=out)
+        answer = _answer(plan, _lay_rehearsal(plan, rehearsal=dry_run))
+        _write_files(plan, out, plot)
+        _print_answer(plan, answer, json=json, out=out)
         return
     link = Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
-    _carried_out(arm, moves, locked, options, link, out, plot, json=json)
+    _carry_out_path(arm, moves, locked, options, link, out, plot, json=json)
 
 
-def sent(
+def send_path(
     arm: Arm,
     file: str,
     link: Link,
@@ -164,16 +164,16 @@ def sent(
     json: bool,
 ) -> None:
     """`armkin send ROBOT --path FILE`: the same with send's options, and its default port."""
-    moves = _moves(arm, file, None, None)
-    output.check(trace, "a plan is", ".csv")
+    moves = _moves_of(arm, file, None, None)
+    output.check_destination(trace, "a plan is", ".csv")
     options: dict[str, Any] = {"speed": arguments.percent(speed, "--speed")}
     if not dry_run:
-        _carried_out(arm, moves, {}, options, link, trace, None, json=json)
+        _carry_out_path(arm, moves, {}, options, link, trace, None, json=json)
         return
     plan = _plan_from(start, "--from", arm, moves, {}, options, json=json)
-    found = {**_answer(plan, _rehearsed(plan)), "dry_run": True}
-    _files(plan, trace, None)
-    _print(plan, found, json=json, out=trace)
+    answer = {**_answer(plan, _lay_rehearsal(plan)), "dry_run": True}
+    _write_files(plan, trace, None)
+    _print_answer(plan, answer, json=json, out=trace)
 
 
 def _plan_from(
@@ -190,10 +190,10 @@ def _plan_from(
     arm = board_link.arm_for_plan(arm)
     if start is not None:
         options["start"] = board_link.standing_joints(arm, start, option)
-    return _planned(arm, moves, locked, options, json=json)
+    return _make_plan(arm, moves, locked, options, json=json)
 
 
-def _carried_out(
+def _carry_out_path(
     arm: Arm,
     moves: Any,
     locked: dict[str, float],
@@ -213,28 +213,28 @@ def _carried_out(
     arm = board_link.arm_for_port(arm, link.port)
     board, stands = board_link.board_of(arm, rehearsal=link.port == SIM), board_link.assumed_joints(arm, link.assume)
     simulated = board_link.simulation_note(link.assume)
-    with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
-        board_link.prepare(arm, machine, link.assume, stands)
+    with board_link.open_backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
+        board_link.prepare_motion(arm, machine, link.assume, stands)
         keep_outs.check_start(machine, arm, link.no_scene)
         held = board_link.resumed_note(board, link.resume)
         began = machine.counts() if held is None else held.start
         with planning():
-            plan = _planned(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)
+            plan = _make_plan(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)
             path_run.check_gripper(plan, board)
             path_run.check_pauses(plan, sys.stdin.isatty())
             laid = path_run.lay_parts(plan, began, board.lay)
-            _files(plan, out, plot)
+            _write_files(plan, out, plot)
         if plan.approach is not None and held is None:
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
-        with board.under_way(laid, held) as (left, first, note), board_link.progress(left, note) as tell:
+        with board.under_way(laid, held) as (left, first, note), board_link.motion_progress(left, note) as tell:
             path_run.follow_plan(board, plan, left, tell, first, ask=_until_enter)
-        found = {**_answer(plan, laid), "port": machine.port.name, **where_arm_stands(machine)}
+        answer = {**_answer(plan, laid), "port": machine.port.name, **where_arm_stands(machine)}
         if held is not None:
-            found.pop("approach", None)  # where it began, that motion is over
-    _print(plan, found, json=json, out=out)
+            answer.pop("approach", None)  # where it began, that motion is over
+    _print_answer(plan, answer, json=json, out=out)
     if not json:
         with output.answer_stream(out) as write:
-            write(board_link.where_text(arm, found))
+            write(board_link.where_text(arm, answer))
 
 
 def _until_enter() -> None:
@@ -242,7 +242,7 @@ def _until_enter() -> None:
     sys.stdin.readline()
 
 
-def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) -> Any:
+def _moves_of(arm: Arm, file: str | None, via: list[str] | None, task: str | None) -> Any:
     """The moves as `armkin.path` takes them."""
     from armkin import path_file
 
@@ -252,8 +252,8 @@ def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) 
         from armkin.inverse.tasks.choose_task import task_for
 
         labels = task_for(arm, task).labels
-        first, *rest = [_corner(text, labels) for text in via]
-        return path_file.validated({"moves": [{"point": first}, *({"line": corner} for corner in rest)]})
+        first, *later_corners = [_corner_values(text, labels) for text in via]
+        return path_file.validated({"moves": [{"point": first}, *({"line": corner} for corner in later_corners)]})
     assert file is not None
     if file == "-":
         return path_file.parse(arguments.standard_input(path_file.LARGEST), "standard input")
@@ -261,20 +261,20 @@ def _moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) 
     return path_file.read(file)
 
 
-def _corner(text: str, labels: tuple[str, ...]) -> list[float]:
+def _corner_values(text: str, labels: tuple[str, ...]) -> list[float]:
     """`--via X,Y,Z`, or with the rest of the target."""
     short = labels[: 2 if labels[2:3] != ("z",) else 3]
     return comma_separated(text, short if text.count(",") + 1 == len(short) else labels, "--via")
 
 
-def _positive(text: str, option: str, least: float) -> float:
+def _number_from(text: str, option: str, least: float) -> float:
     value = number(text, option)
     if value < least:
         raise UsageError(f"{option}: '{text}' must be at least {least:g}")
     return value
 
 
-def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, Any], *, json: bool) -> PathPlan:
+def _make_plan(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, Any], *, json: bool) -> PathPlan:
     """The plan; of a path that is not carried, what is known of it is printed first."""
     try:
         if locked:
@@ -286,13 +286,13 @@ def _planned(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, 
             plan = armkin.path(arm, moves, **options)
     except NoSolutionError as error:
         if error.plan is not None:
-            _print(error.plan, _answer(error.plan, None), json=json)
+            _print_answer(error.plan, _answer(error.plan, None), json=json)
         raise
     keep_outs.tell_ignored([plan.motion] if plan.approach is None else [plan.approach, plan.motion])
     return plan
 
 
-def _rehearsed(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | None:
+def _lay_rehearsal(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | None:
     """The plan on the robot file's board, or on one that is made up; None without drives.
 
     rehearsal: a gripper that could not do its part is refused, too.
@@ -313,21 +313,21 @@ def _answer(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
     """The answer as data."""
     from armkin.motion.branch_report import plan_fields
 
-    segments = None if laid is None else sum(one.segments for one in laid[plan.approach is not None :])
+    segments = None if laid is None else sum(part.segments for part in laid[plan.approach is not None :])
     return {**render.head(plan.arm), **plan_fields(plan), "segments": segments}
 
 
-def _files(plan: PathPlan, out: str | None, plot: str | None) -> None:
+def _write_files(plan: PathPlan, out: str | None, plot: str | None) -> None:
     """`--out` and `--plot`."""
     if out is not None:
-        _write(plan, out)
+        _write_samples(plan, out)
     if plot is not None:
         from armkin.plot.path_picture import plot_path
 
         plot_path(plan, plot)
 
 
-def _write(plan: PathPlan, name: str) -> None:
+def _write_samples(plan: PathPlan, name: str) -> None:
     """CSV: time, joints, their speeds, the tool, the way."""
     import numpy as np
 
@@ -345,7 +345,7 @@ def _write(plan: PathPlan, name: str) -> None:
             write("".join(csv_line(row) + "\n" for row in (rows + 0.0).tolist()))
 
 
-def _print(plan: PathPlan, answer: dict[str, Any], *, json: bool, out: str | None = None) -> None:
+def _print_answer(plan: PathPlan, answer: dict[str, Any], *, json: bool, out: str | None = None) -> None:
     """The answer, on stderr while the samples of `--out -` have stdout."""
     with output.answer_stream(out) as write:
         write(render.to_json(answer) + "\n" if json else path_text.text(plan, answer))

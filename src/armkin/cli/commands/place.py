@@ -62,26 +62,26 @@ def place(
     from armkin.engines.ordered_chunks import Engine
     from armkin.reachability.place_file import write
 
-    arms = [arguments.load(word) for word in words[:-1]]
-    settings = _settings(step, z, yaw, area)
-    found = _search(arms, words[-1], settings, scene, out, Engine(workers, cluster), compiled=compiled)
+    arms = [arguments.load_arm(word) for word in words[:-1]]
+    settings = _grid_settings(step, z, yaw, area)
+    robot_places = _search_places(arms, words[-1], settings, scene, out, Engine(workers, cluster), compiled=compiled)
     if out is not None:
-        write(found, out)
+        write(robot_places, out)
     if plot is not None:
         from armkin.plot.place_picture import plot_place
 
-        plot_place(found, plot)
-    answer: Answer = {"robots": [_answer(one) for one in found]}
+        plot_place(robot_places, plot)
+    answer: Answer = {"robots": [_answer(best_places) for best_places in robot_places]}
     with output.destination(None) as say:
-        say(f"{render.to_json(answer)}\n" if json else _text(found))
-    for one in found:
-        if one.unplanned and one.reach_all:
-            output.warn(f"the path is not planned from there: {one.unplanned}")
-    if not any(one.reach_all for one in found):
-        raise _no_place(found, "points of the path on one branch" if _is_path(words[-1]) else "targets")
+        say(f"{render.to_json(answer)}\n" if json else _text(robot_places))
+    for best_places in robot_places:
+        if best_places.unplanned and best_places.reach_all:
+            output.warn(f"the path is not planned from there: {best_places.unplanned}")
+    if not any(best_places.reach_all for best_places in robot_places):
+        raise _no_place(robot_places, "points of the path on one branch" if _is_path(words[-1]) else "targets")
 
 
-def _search(
+def _search_places(
     arms: list[Arm],
     source: str,
     settings: dict[str, Any],
@@ -97,12 +97,12 @@ def _search(
 
     targets: list[Any] = [source if _is_path(source) else _targets(arm, source) for arm in arms]
     for arm in arms if compiled else ():
-        compiled_ik.prepare(arm)
+        compiled_ik.build_library(arm)
     with output.progress("positions") as tick:
         return place_several(arms, targets, settings, scene, out, engine, tick, compiled_ik.ik if compiled else ik)
 
 
-def _settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, Any]:
+def _grid_settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, Any]:
     """The grid of places: mm, and radians of yaw."""
     size, height, turn = number(step, "--step"), number(z, "--z"), number(yaw, "--yaw")
     if size <= 0 or turn <= 0:
@@ -115,7 +115,7 @@ def _settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, Any]:
 
 def _no_place(places: Sequence[Place], targets: str) -> NoSolutionError:
     """How many of the targets are reached where no place reaches all."""
-    most = max(places, key=lambda one: int(one.reached.max()))
+    most = max(places, key=lambda candidate: int(candidate.reached.max()))
     return NoSolutionError(
         f"no place reaches all {most.of} {targets}; {most.arm.name} reaches {int(most.reached.max())} at best"
     )
@@ -150,22 +150,22 @@ def _answer(place: Place) -> PlacedRobot:
         "margin_mm": float(place.margin[i, j, k]),
     }
     if place.held:
-        best["held"] = _held(place)
+        best["held"] = _held_values(place)
     counts = {"places": place.reached.size, "reach_all": place.reach_all}
     answer = cast("PlacedRobot", {**render.head(place.arm), "best": best, **counts})
     if place.planned:
-        answer["planned"] = [_planned(place, one) for one in place.planned]
+        answer["planned"] = [_planned_json(place, plan) for plan in place.planned]
     return answer
 
 
-def _held(place: Place) -> dict[str, float]:
+def _held_values(place: Place) -> dict[str, float]:
     """Where the redundant joint is held at the best place [deg]."""
     from armkin.model.units import DEGREE
 
     return {name: round(float(value / DEGREE), 9) for name, value in place.held.items()}
 
 
-def _planned(place: Place, plan: PathFromPlace) -> PlannedPlace:
+def _planned_json(place: Place, plan: PathFromPlace) -> PlannedPlace:
     from armkin.model.units import DEGREE
 
     i, j, k = plan.index
@@ -180,30 +180,33 @@ def _planned(place: Place, plan: PathFromPlace) -> PlannedPlace:
 
 def _text(places: Sequence[Place]) -> str:
     rows = [["robot", "x/mm", "y/mm", "z/mm", "yaw/deg", "reached", "margin/mm", "places that reach all"]]
-    for one in places:
-        i, j, k = one.best
-        reached = f"{one.reached[i, j, k]} of {one.of}"
-        numbers = [*map(render.short, one.xyz.tolist()), render.short(float(one.yaw[k]) * 57.29577951308232)]
+    for candidate in places:
+        i, j, k = candidate.best
+        reached = f"{candidate.reached[i, j, k]} of {candidate.of}"
+        numbers = [
+            *map(render.short_text, candidate.xyz.tolist()),
+            render.short_text(float(candidate.yaw[k]) * 57.29577951308232),
+        ]
         rows.append(
             [
-                one.arm.name,
+                candidate.arm.name,
                 *numbers,
                 reached,
-                f"{one.margin[i, j, k]:.1f}",
-                f"{one.reach_all:,} of {one.reached.size:,}",
+                f"{candidate.margin[i, j, k]:.1f}",
+                f"{candidate.reach_all:,} of {candidate.reached.size:,}",
             ]
         )
     text = render.table(rows, indent="") + "\n"
-    for one in places:
-        if one.held:
-            joints = ", ".join(f"{name} at {value:.4g}" for name, value in _held(one).items())
-            text += f"{one.arm.name}, held there: {joints}\n"
-    if any(one.planned for one in places):
+    for candidate in places:
+        if candidate.held:
+            joints = ", ".join(f"{name} at {value:.4g}" for name, value in _held_values(candidate).items())
+            text += f"{candidate.arm.name}, held there: {joints}\n"
+    if any(candidate.planned for candidate in places):
         rows = [["planned from", "x/mm", "y/mm", "yaw/deg", "margin/mm", "s", ""]]
-        for one in places:
-            for each in map(_planned, [one] * len(one.planned), one.planned):
-                seconds = "" if each["duration_s"] is None else f"{each['duration_s']:.2f}"
-                numbers = [render.short(x) for x in (*each["xyz"][:2], each["yaw_deg"], each["margin_mm"])]
-                rows.append([one.arm.name, *numbers, seconds, each["refused"] or ""])
+        for candidate in places:
+            for plan in map(_planned_json, [candidate] * len(candidate.planned), candidate.planned):
+                seconds = "" if plan["duration_s"] is None else f"{plan['duration_s']:.2f}"
+                numbers = [render.short_text(x) for x in (*plan["xyz"][:2], plan["yaw_deg"], plan["margin_mm"])]
+                rows.append([candidate.arm.name, *numbers, seconds, plan["refused"] or ""])
         text += "\n" + render.table(rows, left_aligned=(0, 6), indent="") + "\n"
     return text

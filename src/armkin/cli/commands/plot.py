@@ -64,21 +64,21 @@ def plot(
     _check_canvas(out)
     if target is None and (task is not None or lock):
         raise UsageError("--task and --lock belong to --target")
-    style: dict[str, Any] = {"frames": frames, "view": None if view is None else _eye(view)}
+    style: dict[str, Any] = {"frames": frames, "view": None if view is None else _view_angles(view)}
     if target is None and batch is None and not q:
-        _piped(robot, scene, out, **style)
+        _draw_piped(robot, scene, out, **style)
         return
-    arm = arguments.load(arguments.required_robot(robot), scene)
+    arm = arguments.load_arm(arguments.required_robot(robot), scene)
     if target is not None and q:
         arguments.check_commas(arm, task, target, q)
     if sum((bool(q), target is not None, batch is not None)) > 1:
         raise UsageError("joint values, --target and --batch: give one of the three")
     if target is not None:
-        _branches(arm, target, task, lock, out, **style)
+        _draw_branches(arm, target, task, lock, out, **style)
     elif batch is not None:
-        _path(arm, _poses(arm, batch), out, **style)
+        _draw_poses(arm, _poses_of_file(arm, batch), out, **style)
     else:
-        _pose(arm, arguments.joints(arm, q), out, **style)
+        _draw_pose(arm, arguments.joints(arm, q), out, **style)
 
 
 def _check_canvas(out: str | None) -> None:
@@ -95,7 +95,7 @@ def _check_canvas(out: str | None) -> None:
     canvas.require()
 
 
-def _pose(arm: Arm, values: list[float], out: str | None, **style: Any) -> None:
+def _draw_pose(arm: Arm, values: list[float], out: str | None, **style: Any) -> None:
     """A single pose [deg | mm]."""
     import numpy as np
 
@@ -107,23 +107,23 @@ def _pose(arm: Arm, values: list[float], out: str | None, **style: Any) -> None:
     render.warn_of_limits(arm, outside)
 
 
-def _path(arm: Arm, poses: Any, out: str | None, **style: Any) -> None:
+def _draw_poses(arm: Arm, poses: Any, out: str | None, **style: Any) -> None:
     """Poses (K, n) [deg | mm], one after another."""
     from armkin.plot import plot_poses
 
     plot_poses(arm, units.joints_in(arm, poses), out, title=f"{arm.name}: {len(poses)} poses", **style)
 
 
-def _piped(robot: str | None, scene: str | None, out: str | None, **style: Any) -> None:
+def _draw_piped(robot: str | None, scene: str | None, out: str | None, **style: Any) -> None:
     """What a command before the pipe has printed: its branches, or its poses."""
     from armkin.plot import plot_poses
 
-    found = piped_answers.answers(robot, scene)
-    if found is None:
-        arm = arguments.load(arguments.required_robot(robot), scene)
+    piped = piped_answers.answers(robot, scene)
+    if piped is None:
+        arm = arguments.load_arm(arguments.required_robot(robot), scene)
         names = " ".join(arm.joint_names)
         raise UsageError(f"nothing to draw: give joint values ({names}), a pose's name, --target or --batch")
-    arm, answers = found
+    arm, answers = piped
     if len(answers) == 1 and len(answers[0].get("branches") or ()) > 1:
         branches = answers[0]["branches"]
         q = units.joints_in(arm, [branch["joints"] for branch in branches])
@@ -131,12 +131,12 @@ def _piped(robot: str | None, scene: str | None, out: str | None, **style: Any) 
         return
     values = piped_answers.joints_of(arm, answers)
     if len(values) == 1:
-        _pose(arm, values[0], out, **style)
+        _draw_pose(arm, values[0], out, **style)
     else:
-        _path(arm, values, out, **style)
+        _draw_poses(arm, values, out, **style)
 
 
-def _eye(text: str) -> tuple[float, float]:
+def _view_angles(text: str) -> tuple[float, float]:
     if text in _VIEWS:
         return _VIEWS[text]
     if "," not in text:
@@ -145,7 +145,9 @@ def _eye(text: str) -> tuple[float, float]:
     return elevation, azimuth
 
 
-def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out: str | None, **style: Any) -> None:
+def _draw_branches(
+    arm: Arm, text: str, task: str | None, lock: list[str] | None, out: str | None, **style: Any
+) -> None:
     """All branches of one target."""
     import numpy as np
 
@@ -154,11 +156,11 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
     from armkin.inverse.tasks.choose_task import task_for
     from armkin.plot import plot_poses
 
-    what = task_for(arm, task)
-    values = arguments.target_list(arm, what, text)
-    request = choose_branch.Request(arm=arm, task=what.name, held=lock_and_sweep.locks(arm, lock))
-    [answer] = choose_branch.solve(request, targets_in(what.labels, [values]))
-    goal = render.labelled(what.labels, values, label_units(what.labels))
+    chosen_task = task_for(arm, task)
+    values = arguments.target_list(arm, chosen_task, text)
+    request = choose_branch.Request(arm=arm, task=chosen_task.name, held=lock_and_sweep.locked_values(arm, lock))
+    [answer] = choose_branch.solve(request, targets_in(chosen_task.labels, [values]))
+    goal = render.label_values(chosen_task.labels, values, label_units(chosen_task.labels))
     if not answer.branches:
         raise NoSolutionError(f"{arm.name} cannot reach {goal}: there is no branch to draw")
     q = np.array([branch.q for branch in answer.branches])
@@ -167,7 +169,7 @@ def _branches(arm: Arm, text: str, task: str | None, lock: list[str] | None, out
     plot_poses(arm, q, out, names=names, target=position(arm, q[0]), title=f"{arm.name}: {goal}", **style)
 
 
-def _poses(arm: Arm, path: str) -> Any:
+def _poses_of_file(arm: Arm, path: str) -> Any:
     """The rows of a file (K, n) [deg | mm]."""
     import numpy as np
 

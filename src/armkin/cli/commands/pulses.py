@@ -11,7 +11,7 @@ import typer
 import armkin
 from armkin.cli import arguments, output, piped_answers, render
 from armkin.cli.options import Batch, BatchOut, Cluster, Joints, JsonLines, Resume, RobotOrPipe, Scene, Workers
-from armkin.cli.render import fixed
+from armkin.cli.render import fixed_text
 from armkin.cli.row_chunks import Chunk, one_row
 from armkin.model import units
 
@@ -47,9 +47,9 @@ def pulses(
     """
     if batch is not None:
         arguments.no_numbers(q)
-        arm, values = arguments.load(arguments.required_robot(robot), scene), list[list[float]]()
+        arm, values = arguments.load_arm(arguments.required_robot(robot), scene), list[list[float]]()
     else:
-        arm, values = piped_answers.poses(robot, q, scene)
+        arm, values = piped_answers.arm_and_poses(robot, q, scene)
     origin = units.home_out(arm) if start is None else arguments.joint_list(arm, start, "--from")
     if batch is None and len(values) == 1:
         arguments.one_alone(workers, cluster, resume)
@@ -64,9 +64,9 @@ def pulses(
     from armkin.cli.batch_pieces import Rows
 
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
-    asked = {"command": "pulses", "robot file": arm.sha256, "scene": arm.scene_sha256, "from": origin, "best": best}
+    identity = {"command": "pulses", "robot file": arm.sha256, "scene": arm.scene_sha256, "from": origin, "best": best}
     questions = Questions(arm, origin, best)
-    Run(questions, out, json, workers, cluster, resume, asked).run(rows).conclude(questions.unsolvable)
+    Run(questions, out, json, workers, cluster, resume, identity).run(rows).conclude(questions.unsolvable)
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ class Questions:
         """The columns, and which rows are within limits."""
         from armkin.columns import fk_columns
 
-        found = fk_columns.counts(self.arm, chunk.values, self.best)
-        return found, found["within_limits"]
+        columns = fk_columns.counts(self.arm, chunk.values, self.best)
+        return columns, columns["within_limits"]
 
     def objects(self, chunk: Chunk) -> Iterator[Pulses]:
         """An object a row."""
@@ -94,9 +94,9 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     from armkin.motors import motor_names, outside_travel, pulse_units, resolution
 
     q = units.joints_in(arm, chunk.values)
-    found = armkin.best_pulses(arm, q) if best else None
-    rounded = armkin.rounding(arm, q) if found is None else found.rounded
-    r = rounded if found is None else found.chosen
+    best_vectors = armkin.best_pulses(arm, q) if best else None
+    rounded = armkin.rounding(arm, q) if best_vectors is None else best_vectors.rounded
+    r = rounded if best_vectors is None else best_vectors.chosen
     moves = (r.pulses - armkin.pulses(arm, units.joints_in(arm, origin))).tolist()
     actual = units.joints_out(arm, r.actual_joints).tolist()
     violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
@@ -119,9 +119,11 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
         too_far.tolist(),
         strict=True,
     )
-    plain = None if found is None else list(zip(rounded.pulses.tolist(), rounded.error.tolist(), strict=True))
-    gains = [] if found is None else found.gain.tolist()
-    for i, (joints, counts, move, there, exact, at, off, error, outside, far) in enumerate(columns):
+    plain = None if best_vectors is None else list(zip(rounded.pulses.tolist(), rounded.error.tolist(), strict=True))
+    gains = [] if best_vectors is None else best_vectors.gain.tolist()
+    for i, (joints, counts, move, actual_joints, exact, actual_tip, tip_error, error, outside, far) in enumerate(
+        columns
+    ):
         answer: Pulses = {
             "robot": head["robot"],
             "robot_file": head["robot_file"],
@@ -134,8 +136,8 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
             "joints": joints,
             "pulses": counts,
             "moves": move,
-            "actual_joints": there,
-            "position_mm": {"theoretical": exact, "actual": at, "difference": off},
+            "actual_joints": actual_joints,
+            "position_mm": {"theoretical": exact, "actual": actual_tip, "difference": tip_error},
             "error_mm": error,
             "within_limits": not outside,
             "violations": outside,
@@ -143,10 +145,10 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
         }
         answer.update(in_scene)
         answer.update(near[i])
-        if found is not None and plain is not None:
+        if best_vectors is not None and plain is not None:
             answer["rounded"] = {"pulses": plain[i][0], "error_mm": plain[i][1]}
             answer["gain_mm"] = gains[i]
-            answer["tried"] = found.tried
+            answer["tried"] = best_vectors.tried
         yield answer
 
 
@@ -164,15 +166,15 @@ def _text(arm: Arm, answer: Pulses) -> str:
         answer["joint_units"],
         strict=True,
     ):
-        joints.append([name, *(fixed(v, 6) for v in (target, actual, abs(actual - target), step)), unit])
+        joints.append([name, *(fixed_text(v, 6) for v in (target, actual, abs(actual - target), step)), unit])
     tip = [["tip", "exact", "actual", "difference", ""]]
-    where = answer["position_mm"]
+    position = answer["position_mm"]
     for i, axis in enumerate("xyz"):
-        tip.append([axis, *(fixed(where[key][i], 6) for key in ("theoretical", "actual", "difference")), "mm"])
-    error = f"{fixed(answer['error_mm'], 6)} mm"
+        tip.append([axis, *(fixed_text(position[key][i], 6) for key in ("theoretical", "actual", "difference")), "mm"])
+    error = f"{fixed_text(answer['error_mm'], 6)} mm"
     last = f"the tip is {error} off"
     if "rounded" in answer:
-        gain, before = fixed(answer["gain_mm"], 6), fixed(answer["rounded"]["error_mm"], 6)
+        gain, before = fixed_text(answer["gain_mm"], 6), fixed_text(answer["rounded"]["error_mm"], 6)
         last += f", {gain} mm nearer than with each motor rounded by itself ({before} mm)\n"
         last += f"best of {answer['tried']} pulse vectors around the target"
     tables = (render.table(motors, (0, 3)), render.table(joints, (0, 5)), render.table(tip, (0, 4)))

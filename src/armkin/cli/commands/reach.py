@@ -42,16 +42,16 @@ def reach(
     """
     from armkin.reachability.reach_cells import MOST, Grid
 
-    arm = arguments.load(robot, scene)
+    arm = arguments.load_arm(robot, scene)
     step, ring = number(grid, "--grid"), whole_number(azimuths, "--azimuths", 1, MOST)
-    many, turns = whole_number(directions, "--directions", 1, MOST), whole_number(rolls, "--rolls", 1, MOST)
-    cells = len(Grid(arm, step, ring, many, turns, tool_down).rings) * ring
+    direction_count, turns = whole_number(directions, "--directions", 1, MOST), whole_number(rolls, "--rolls", 1, MOST)
+    cells = len(Grid(arm, step, ring, direction_count, turns, tool_down).rings) * ring
     with output.progress("cells", cells) as tick:
-        found = armkin.reach(
+        reach_map = armkin.reach(
             arm,
             grid=step,
             azimuths=ring,
-            directions=many,
+            directions=direction_count,
             rolls=turns,
             tool_down=tool_down,
             out=out,
@@ -62,8 +62,8 @@ def reach(
     if plot is not None:
         from armkin.plot.reach_picture import plot_reach
 
-        plot_reach(found, plot)
-    answer = _answer(found)
+        plot_reach(reach_map, plot)
+    answer = _answer(reach_map)
     with output.destination(None) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(answer))
 
@@ -89,10 +89,10 @@ def _text(answer: Answer) -> str:
     return (
         f"{answer['robot']}: {answer['reached']:,} of {answer['cells']:,} cells reached ({share:.1f} %), "
         f"{answer['volume_mm3'] / 1e9:.4g} m3\n\n"
-        f"{answer['answers']:,} poses (task {answer['task']}, {_orientations(answer['orientations'])} a cell) "
+        f"{answer['answers']:,} poses (task {answer['task']}, {_orientations_text(answer['orientations'])} a cell) "
         f"from {answer['solves']:,} solves {how}, in {answer['seconds']:.2f} s\n"
     )
 
 
-def _orientations(count: int) -> str:
+def _orientations_text(count: int) -> str:
     return f"{count:,} orientation{'s' * (count != 1)}"

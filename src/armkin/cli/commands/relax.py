@@ -38,12 +38,12 @@ def relax(
     Hold the arm: without its motors it falls. Prints joint values as CSV with a header, one row, or ten a second
     for --seconds; `armkin send ROBOT --batch FILE` plays them back.
     """
-    arm = arguments.load(robot)
+    arm = arguments.load_arm(robot)
     board = _with_servos(arm)
     time = number(seconds, "--seconds")
     if not 0 <= time <= _LONGEST:
         raise UsageError(f"--seconds: '{seconds}' must be from 0 to {_LONGEST:g}")
-    with board_link.backend(board, port, baud, reset=not no_reset) as machine, output.destination(out) as write:
+    with board_link.open_backend(board, port, baud, reset=not no_reset) as machine, output.destination(out) as write:
         board.relax()
         output.note("the motors are off; armkin send switches them on again, where the arm then stands")
         write(csv_line(arm.joint_names) + "\n")

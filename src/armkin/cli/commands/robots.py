@@ -24,16 +24,16 @@ def robots(json: Json = False, out: TextOut = None) -> None:
     """
     from armkin.robot_file import catalogue
 
-    found = [_entry(name) for name in catalogue.names()]
+    entries = [_robot_entry(name) for name in catalogue.names()]
     with output.destination(out) as write:
-        write(render.to_json({"robots": found}) + "\n" if json else _text(found))
+        write(render.to_json({"robots": entries}) + "\n" if json else _text(entries))
 
 
-def _entry(name: str) -> ShippedRobot:
+def _robot_entry(name: str) -> ShippedRobot:
     from armkin.board.backend.missing_keys import missing_by_command
 
     arm = armkin.load(name)
-    task, labels, refused = _task(arm)
+    task, labels, refused = _task_and_target(arm)
     lacks = missing_by_command(arm)
     return {
         **render.head(arm),
@@ -42,13 +42,13 @@ def _entry(name: str) -> ShippedRobot:
         "joint_types": ["prismatic" if sliding else "revolute" for sliding in arm.prismatic],
         "task": task,
         "target_labels": labels,
-        "can": {"ik": not refused, **{what: not lacks[what] for what in _CAN[1:]}},
+        "can": {"ik": not refused, **{command: not lacks[command] for command in _CAN[1:]}},
         "lacks": {"ik": refused, **lacks},
         "compared": "" if arm.file is None else arm.file.compared,
     }
 
 
-def _task(arm: Any) -> tuple[str | None, list[str], list[str]]:
+def _task_and_target(arm: Any) -> tuple[str | None, list[str], list[str]]:
     """The task with its target's numbers, and why `armkin ik` refuses it."""
     from armkin.errors import UsageError
     from armkin.inverse.tasks.choose_task import task_for
@@ -65,7 +65,7 @@ def _text(robots: list[ShippedRobot]) -> str:
     rows = [["robot", "joints", "task", "target", *_CAN, "compared"]]
     for entry in robots:
         kinds = "".join("P" if kind == "prismatic" else "R" for kind in entry["joint_types"])
-        marks = ["yes" if entry["can"][what] else "-" for what in _CAN]
+        marks = ["yes" if entry["can"][command] else "-" for command in _CAN]
         if entry["task"] is not None and not entry["can"]["ik"]:
             marks[0] = "--lock"
         compared = "URDF only" if entry["compared"].startswith("only its own URDF") else "yes"

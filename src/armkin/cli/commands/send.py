@@ -15,7 +15,7 @@ from armkin.cli.keep_outs import Ignore, NoScene
 from armkin.cli.number_parsing import number
 from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
 from armkin.cli.send_goals import TargetOptions
-from armkin.cli.send_goals import goals as read_goals
+from armkin.cli.send_goals import read_goals as read_goals
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -117,24 +117,26 @@ def send(
         board_link.can_resume({"--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM})
     link = Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
     if path is not None:
-        from armkin.cli.commands.path import sent
+        from armkin.cli.commands.path import send_path
 
-        others = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend, "--near": near}
-        arm = keep_outs.moving(_of_a_path(robot, {**others, "--accel": accel}), scene, ignore_keep_out, tool)
-        sent(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
+        other_options = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend, "--near": near}
+        arm = keep_outs.load_moving_arm(
+            _of_a_path(robot, {**other_options, "--accel": accel}), scene, ignore_keep_out, tool
+        )
+        send_path(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
         return
-    radius = _blend(blend, batch)
+    radius = _blend_radius(blend, batch)
     arm, goals = read_goals(robot, q, TargetOptions(target, task, branch, lock, near), batch, scene, tool)
-    output.check(trace, "a plan is", ".csv")
-    arm = keep_outs.marked(arm, ignore_keep_out)
-    arm = _accelerated(arm, accel)
+    output.check_destination(trace, "a plan is", ".csv")
+    arm = keep_outs.mark_ignored(arm, ignore_keep_out)
+    arm = _with_accel(arm, accel)
     arm = arm if dry_run else board_link.arm_for_port(arm, port)
-    planner = Planner(_board(arm, rehearsal=rehearsal), fraction, radius)
+    planner = Planner(_board_of(arm, rehearsal=rehearsal), fraction, radius)
     stands = board_link.assumed_joints(arm, assume)
     if dry_run:
         _dry_run(planner, goals, start, trace, json)
     else:
-        _move(planner, goals, link, stands, trace, json=json)
+        _plan_and_move(planner, goals, link, stands, trace, json=json)
 
 
 def _check_together(
@@ -160,15 +162,15 @@ def _check_rows_are_kept(batch: str | None) -> None:
 
 def _of_a_path(robot: str | None, options: Mapping[str, object]) -> str:
     """The robot of --path. Raises UsageError without one, and where one of the `options` is given, too."""
-    given = [name for name, what in options.items() if what]
-    if given:
-        raise UsageError(f"--path and {given[0]}: give one of them; armkin path has more options")
+    options_given = [name for name, value in options.items() if value]
+    if options_given:
+        raise UsageError(f"--path and {options_given[0]}: give one of them; armkin path has more options")
     if robot is None:
         raise UsageError("--path needs a robot: armkin send three_dof --path FILE")
     return robot
 
 
-def _board(arm: Arm, *, rehearsal: bool) -> Board:
+def _board_of(arm: Arm, *, rehearsal: bool) -> Board:
     """The arm's board; where a rehearsal lacks accelerations alone, --accel is what gives them."""
     try:
         return board_link.board_of(arm, rehearsal=rehearsal)
@@ -178,7 +180,7 @@ def _board(arm: Arm, *, rehearsal: bool) -> Board:
         raise
 
 
-def _move(
+def _plan_and_move(
     planner: Planner, goals: Goals | Stream, link: Link, start: Array | None, trace: str | None, *, json: bool
 ) -> None:
     """Plan from where the arm stands, or from where the motion that is resumed began; move; tell where it stands."""
@@ -186,14 +188,14 @@ def _move(
     from armkin.board.stop_signals import planning
 
     arm, board, simulated = planner.arm, planner.board, board_link.simulation_note(link.assume)
-    with board_link.backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
-        board_link.prepare(arm, machine, link.assume, start)
+    with board_link.open_backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
+        board_link.prepare_motion(arm, machine, link.assume, start)
         keep_outs.check_start(machine, arm, link.no_scene)
         held = board_link.resumed_note(board, link.resume)
         began = machine.counts() if held is None else held.start
         if isinstance(goals, Stream):
             with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
-                machine.run(planner.sum_up(goals.plans(planner, began)), lambda done, _: tick(round(1000 * done)))
+                machine.run(planner.sum_up(goals.plans(planner, began)), lambda elapsed, _: tick(round(1000 * elapsed)))
         else:
             with planning():
                 plans = _all_plans(planner, goals, began)  # every refusal before anything moves
@@ -201,8 +203,8 @@ def _move(
             began = machine.counts()
             _carry_out(planner, plans, held)
         planned = planner.total_sent.summary(began)
-        found: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
-    _report_end(arm, planned, found, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
+        answer: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
+    _report_end(arm, planned, answer, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
 
 
 def _report_end(
@@ -222,7 +224,7 @@ def _report_end(
         problem.fields["sent"] = answer  # of exit codes, 0 and 3 alone have something on stdout
         raise problem
     with output.answer_stream(trace) as write:
-        write(render.to_json(answer) + "\n" if json else _arrived(arm, planned, answer))
+        write(render.to_json(answer) + "\n" if json else _arrival_text(arm, planned, answer))
     if problem is not None:
         raise problem
 
@@ -243,11 +245,11 @@ def _dry_run(planner: Planner, goals: Goals | Stream, start: str | None, trace: 
 def _carry_out(planner: Planner, plans: Sequence[Planned], held: Any) -> None:
     """Move through the plans, or through what is left of them since they were held."""
     board = planner.board
-    with board.under_way(plans, held) as (left, _, note), board_link.progress(left, note) as tell:
+    with board.under_way(plans, held) as (left, _, note), board_link.motion_progress(left, note) as tell:
         board.machine.run(planner.sum_up(left), tell)
 
 
-def _accelerated(arm: Arm, text: str | None) -> Arm:
+def _with_accel(arm: Arm, text: str | None) -> Arm:
     """The arm with `--accel` [deg/s2 | mm/s2] for the joints that have no acceleration."""
     import dataclasses
 
@@ -258,11 +260,11 @@ def _accelerated(arm: Arm, text: str | None) -> Arm:
     value = number(text, "--accel")
     if not 1e-6 <= value <= 1e6:
         raise UsageError(f"--accel: {value:g} must be from 0.000001 to 1000000 deg/s2 (mm/s2)")
-    given = units.joints_in(arm, [value] * arm.n)
-    return dataclasses.replace(arm, max_accel=np.where(np.isnan(arm.max_accel), given, arm.max_accel))
+    accel = units.joints_in(arm, [value] * arm.n)
+    return dataclasses.replace(arm, max_accel=np.where(np.isnan(arm.max_accel), accel, arm.max_accel))
 
 
-def _blend(text: str | None, batch: str | None) -> float:
+def _blend_radius(text: str | None, batch: str | None) -> float:
     """`--blend`: 0 without it."""
     if text is None:
         return 0.0
@@ -303,23 +305,23 @@ def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
                 (trace.position[:, 1:] + 0.0).reshape(len(trace.time), -1).tolist()[first:],
                 strict=True,
             )
-            write("".join(csv_line([time, *joints, *where]) + "\n" for time, joints, where in rows))
+            write("".join(csv_line([time, *joints, *positions]) + "\n" for time, joints, positions in rows))
             began += plan.duration
 
 
-def _arrived(arm: Arm, planned: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
+def _arrival_text(arm: Arm, planned: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
     """Where the arm stands, and whether that is where the plan ends."""
     text = board_link.where_text(arm, answer)
     if answer["pulses"] is None:
         return text
-    off = [
-        f"{name} {there - here:+d} {unit}"
-        for name, unit, here, there in zip(
+    differences = [
+        f"{name} {count - planned_count:+d} {unit}"
+        for name, unit, planned_count, count in zip(
             answer["motors"], answer["pulse_units"], planned["pulses"], answer["pulses"], strict=True
         )
-        if there != here
+        if count != planned_count
     ]
-    differs = f"not as planned: {', '.join(off)}" if off else "as planned"
+    differs = f"not as planned: {', '.join(differences)}" if differences else "as planned"
     return f"{text}read back: {differs}, {answer['duration_s']:.3f} s\n"
 
 
@@ -330,8 +332,8 @@ def _text(arm: Arm, answer: Mapping[str, Any]) -> str:
     motors = [f"{name}/{unit}" for name, unit in zip(answer["motors"], answer["pulse_units"], strict=True)]
     joints = [
         ["", *headings],
-        ["from", *map(render.fixed, answer["start_joints"])],
-        ["to", *map(render.fixed, answer["joints"])],
+        ["from", *map(render.fixed_text, answer["start_joints"])],
+        ["to", *map(render.fixed_text, answer["joints"])],
     ]
     pulses = [
         ["", *motors],
@@ -340,7 +342,7 @@ def _text(arm: Arm, answer: Mapping[str, Any]) -> str:
         ["moves", *(f"{move:+d}" for move in answer["moves"])],
         ["top rate /s", *(f"{rate:.0f}" for rate in answer["top_rate"])],
     ]
-    top = [["", *speeds], ["top speed", *(render.fixed(value, 2) for value in answer["top_speed"])]]
+    top = [["", *speeds], ["top speed", *(render.fixed_text(value, 2) for value in answer["top_speed"])]]
     head = (
         f"{arm.name}: {answer['waypoints']} waypoint{'s' * (answer['waypoints'] != 1)}, "
         f"{answer['duration_s']:.3f} s, {answer['segments']} segments (dry run: nothing moves)"

@@ -29,7 +29,7 @@ def setup(
     the sections that printer.cfg needs. armkin's own firmware takes its settings from the robot file at every command,
     and bus servos have none that matter here.
     """
-    arm = arguments.load(robot)
+    arm = arguments.load_arm(robot)
     board = board_link.board_of(arm, rehearsal=True)
     if not board.can("settings"):
         raise UsageError(
@@ -40,20 +40,20 @@ def setup(
     answer: dict[str, Any] = {**render.head(arm), "port": port, "firmware": None, "differences": None}
     file = board.settings_file
     if file is None or port is not None:
-        with board_link.backend(board, port, baud, reset=not no_reset) as machine:
-            found = board.settings()
+        with board_link.open_backend(board, port, baud, reset=not no_reset) as machine:
+            differences = board.settings()
             if write:
                 board.write_settings()
-            answer |= {"port": machine.port.name, "firmware": machine.report()["firmware"], "differences": found}
+            answer |= {"port": machine.port.name, "firmware": machine.report()["firmware"], "differences": differences}
     if file is None:
         answer["written"], text = write, _text(answer["differences"], write)
     else:
-        answer["printer_cfg"], text = file, f"{file}\n{_differing(answer['differences'])}"
+        answer["printer_cfg"], text = file, f"{file}\n{_differences_text(answer['differences'])}"
     with output.destination(None) as put:
         put(render.to_json(answer) + "\n" if json else text)
 
 
-def _differing(differences: list[dict[str, Any]] | None) -> str:
+def _differences_text(differences: list[dict[str, Any]] | None) -> str:
     """What differs, as comments below the sections."""
     if differences is None:
         return "# not compared: --port names the socket of Klipper's API server\n"
@@ -70,7 +70,7 @@ def _text(differences: list[dict[str, Any]], written: bool) -> str:
         return "the settings fit the robot file\n"
     rows = [["setting", "what", "board", "robot file", ""]]
     for d in differences:
-        there = "-" if d["found"] is None else f"{d['found']:g}"
-        rows.append([f"${d['setting']}", d["what"], there, f"{d['wanted']:g}", "" if d["serious"] else "no harm"])
+        board_value = "-" if d["found"] is None else f"{d['found']:g}"
+        rows.append([f"${d['setting']}", d["what"], board_value, f"{d['wanted']:g}", "" if d["serious"] else "no harm"])
     end = "written, and read back" if written else "--write writes them; the arm's position is lost with that"
     return f"{render.table(rows, left_aligned=(0, 1, 4))}\n{end}\n"

@@ -34,21 +34,21 @@ def status(
     """
     from armkin.board.planner import where_arm_stands
 
-    arm = arguments.load(robot)
-    new = "the simulated board is new in every command: nothing has told it yet where the arm stands"
+    arm = arguments.load_arm(robot)
+    unknown_note = "the simulated board is new in every command: nothing has told it yet where the arm stands"
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
-    with board_link.backend(board, port, baud, simulated=new, reset=not no_reset) as machine:
+    with board_link.open_backend(board, port, baud, simulated=unknown_note, reset=not no_reset) as machine:
 
         def found() -> dict[str, Any]:
             head = {**render.head(arm), "port": machine.port.name, "board": board.kind}
             return {**head, **where_arm_stands(machine), **machine.report()}
 
         def text(found: dict[str, Any]) -> str:
-            words = _servos if "servos" in found else _grbl if "settings" in found else _text
+            words = _servos_text if "servos" in found else _grbl_text if "settings" in found else _text
             return render.to_json(found) + "\n" if json else board_link.where_text(arm, found) + words(found)
 
         if watch:
-            _watch(text(found()) for _ in _until_signal(machine.refresh, board.stop))
+            _print_changes(text(found()) for _ in _until_signal(machine.refresh, board.stop))
             return
         answer = text(found())
     with output.destination(None) as write:
@@ -63,7 +63,7 @@ def _until_signal(refresh: Callable[[], None], stop: Callable[[], bool]) -> Iter
         refresh()
 
 
-def _watch(texts: Iterator[str]) -> None:
+def _print_changes(texts: Iterator[str]) -> None:
     """On a terminal in place; else what differs from the text before."""
     if not sys.stdout.isatty():
         before = ""
@@ -85,7 +85,7 @@ def _watch(texts: Iterator[str]) -> None:
             before = text
 
 
-def _servos(answer: dict[str, Any]) -> str:
+def _servos_text(answer: dict[str, Any]) -> str:
     rows = [["servo", "id", "torque", "load", "voltage", "temperature", "errors"]]
     for servo in answer["servos"]:
         figures = (f"{servo['load_percent']:.1f} %", f"{servo['voltage']:.1f} V", f"{servo['temperature']} C")
@@ -94,7 +94,7 @@ def _servos(answer: dict[str, Any]) -> str:
     return render.table(rows) + "\n"
 
 
-def _grbl(answer: dict[str, Any]) -> str:
+def _grbl_text(answer: dict[str, Any]) -> str:
     wrong = answer["settings"]
     rows = [
         ["board", f"{answer['board']} on {answer['port']}, {answer['firmware']}"],
@@ -115,7 +115,7 @@ _POWER = {
 def _text(answer: dict[str, Any]) -> str:
     high = [name for name, level in answer["switches"].items() if level]
     low = [name for name, level in answer["switches"].items() if not level]
-    on = {True: "on", False: "off"}
+    switch_word = {True: "on", False: "off"}
     power = _POWER[answer["motor_power"]]
     if answer["motor_power"] is None and answer["joints"] is not None:
         power += ": after a cut the position above is wrong; armkin stop --power-cut declares it lost"
@@ -123,7 +123,7 @@ def _text(answer: dict[str, Any]) -> str:
         ["board", f"{answer['board']} on {answer['port']}, firmware {answer['firmware']}"],
         ["configured", "for this robot file" if answer["configured"] else "not for this robot file"],
         ["state", answer["state"]],
-        ["drivers", f"{on[answer['drivers_on']]}, servo pulses {on[answer['servo_pulses_on']]}"],
+        ["drivers", f"{switch_word[answer['drivers_on']]}, servo pulses {switch_word[answer['servo_pulses_on']]}"],
         ["switches", f"high: {', '.join(high) or 'none'}; low: {', '.join(low) or 'none'}"],
         ["abort input", "active" if answer["abort_input"] else "not active"],
         ["motor power", power],

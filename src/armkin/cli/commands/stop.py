@@ -31,15 +31,18 @@ def stop(
     from armkin.board.ports import SIM, SerialPort, holder_pid, holder_rate, is_socket
 
     baud = baud or board_link.BAUD
-    port = _port(port, baud, not no_reset)
+    port = _port_of(port, baud, not no_reset)
     if port == SIM:
         raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")
     process = holder_pid(port)
     if process is not None:
-        others = holder_rate(port) not in (None, baud)  # a board of others: it was stopped by the process that moved it
-        _end(process, port)
+        is_foreign = holder_rate(port) not in (
+            None,
+            baud,
+        )  # a board of others: it was stopped by the process that moved it
+        _end_process(process, port)
         output.note(f"process {process} has given the port back")
-        if others and not power_cut:
+        if is_foreign and not power_cut:
             output.note("it has stopped the arm first")
             return
     elif is_socket(port):
@@ -48,10 +51,10 @@ def stop(
     from armkin.board.firmware.wire.session import Session
     from armkin.board.stop_signals import stoppable
 
-    with stoppable() as asked:
+    with stoppable() as stop_asked:
         link = SerialPort(port, baud, reset=not no_reset)
         try:
-            session = Session(link, asked)
+            session = Session(link, stop_asked)
             session.open()  # a former session's motion is held by that alone
             session.hold()
             if power_cut and session.reopen().config:
@@ -61,7 +64,7 @@ def stop(
     output.note("the arm stands" + ("; its position is lost: home it, or say --assume-home" if power_cut else ""))
 
 
-def _port(port: str | None, baud: int, reset: bool) -> str:
+def _port_of(port: str | None, baud: int, reset: bool) -> str:
     """The port given, the only one that armkin holds, or the only one where a board answers."""
     from armkin.board.firmware.wire.find_boards import answering_ports, likely_ports
     from armkin.board.ports import holder_pid
@@ -76,7 +79,7 @@ def _port(port: str | None, baud: int, reset: bool) -> str:
     return port
 
 
-def _end(process: int, port: str) -> None:
+def _end_process(process: int, port: str) -> None:
     import time
 
     from armkin.board.ports import ask_to_stop, holder_pid

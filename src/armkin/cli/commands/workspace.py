@@ -76,23 +76,23 @@ def workspace(
     from armkin.reachability import cloud_file
     from armkin.reachability.sampling import MOST
 
-    arm = arguments.load(robot, scene, tool)
+    arm = arguments.load_arm(robot, scene, tool)
     if out is not None:
         cloud_file.check_cloud(out)
     if plot is None and color is not None:
         raise UsageError("--color is for the picture; add --plot FILE")
     shade = color or "manipulability"
-    measures, keep = _measures(measure, None if plot is None else shade)
+    measures, keep = _measures_and_kept(measure, None if plot is None else shade)
     count = None if samples is None else whole_number(samples, "--samples", 1, MOST)
-    points = None if grid is None else _points(grid)
+    points = None if grid is None else _grid_points(grid)
     total = count or 100_000 if points is None else math.prod(points * arm.n if len(points) == 1 else points)
     with output.progress("samples", total) as tick:
-        found = armkin.workspace(
+        survey = armkin.workspace(
             arm,
             count,
             grid_points=points,
             seed=whole_number(seed, "--seed", 0, 2**53),
-            position=partial(_compiled, arm) if compiled else None,
+            position=partial(_compiled_tips, arm) if compiled else None,
             measures=measures,
             out=out,
             keep=keep,
@@ -103,13 +103,13 @@ def workspace(
     if plot is not None:
         from armkin.plot import plot_workspace
 
-        plot_workspace(found, plot, colour=shade)
-    answer = _answer(found)
+        plot_workspace(survey, plot, colour=shade)
+    answer = _answer(survey)
     with output.destination(None) as write:
         write(f"{render.to_json(answer)}\n" if json else _text(answer))
 
 
-def _measures(names: list[str] | None, shade: str | None) -> tuple[list[str], int]:
+def _measures_and_kept(names: list[str] | None, shade: str | None) -> tuple[list[str], int]:
     """What is measured of each sample, and how many samples a picture by the colour `shade` keeps."""
     measures = list(dict.fromkeys(names or ()))
     if shade is None:
@@ -120,12 +120,12 @@ def _measures(names: list[str] | None, shade: str | None) -> tuple[list[str], in
     return measures + [shade] * (shade in MEASURES and shade not in measures), KEEP
 
 
-def _compiled(arm: Arm, q: Array) -> Array:
+def _compiled_tips(arm: Arm, q: Array) -> Array:
     """The tip by machine code, which each process builds or finds."""
     return armkin.compile(arm).position(q)
 
 
-def _points(grid: str) -> list[int]:
+def _grid_points(grid: str) -> list[int]:
     """`--grid 10` or `--grid 10,20,30`."""
     from armkin.reachability.sampling import MOST
 
@@ -168,15 +168,15 @@ def _text(answer: Mapping[str, Any]) -> str:
     for name in ("x", "y", "z", "reach"):
         low, high = answer[f"{name}_mm"]
         note = "mm from the base" if name == "reach" else "mm"
-        rows.append([name, render.fixed(low, 2), render.fixed(high, 2), note])
+        rows.append([name, render.fixed_text(low, 2), render.fixed_text(high, 2), note])
     for name, (low, high) in answer["measures"].items():
         rows.append([name.replace("_", " "), f"{low:.4g}", f"{high:.4g}", "mm" if name == "step_error" else ""])
     if "free_share" in answer:
         rows.append(["free", "", f"{100 * answer['free_share']:.1f}", "% of the samples hit nothing"])
     count = answer["samples"]
     text = f"{answer['robot']}: {count:,} sample{'s' * (count != 1)}\n\n{render.table(rows, left_aligned=(0, 3))}\n\n"
-    what, unit = ("volume", "mm3") if "volume_mm3" in answer else ("area", "mm2")
-    value, error = answer[f"{what}_{unit}"], answer[f"{what}_error_{unit}"]
-    off = f" +- {100 * error / value:.2g} %" if value else ""
+    measure, unit = ("volume", "mm3") if "volume_mm3" in answer else ("area", "mm2")
+    value, error = answer[f"{measure}_{unit}"], answer[f"{measure}_error_{unit}"]
+    error_text = f" +- {100 * error / value:.2g} %" if value else ""
     how = answer["method"] if answer["method"].startswith("exact") else f"by {answer['method']}"
-    return f"{text}{what} {value:.6g} {unit}{off}\n{render.wrapped(how)}\n"
+    return f"{text}{measure} {value:.6g} {unit}{error_text}\n{render.wrap_text(how)}\n"

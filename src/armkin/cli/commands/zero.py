@@ -60,7 +60,7 @@ def zero(
     """
     import numpy as np
 
-    arm = arguments.load(robot)
+    arm = arguments.load_arm(robot)
     board = board_link.board_of(arm, rehearsal=True)
     if not board.can("zero") or np.count_nonzero(arm.motor_gain) != arm.n:
         raise UsageError(f"{arm.name}: zero is for arms whose joints have a bus servo each, drive: {{kind: bus, ...}}")
@@ -68,44 +68,44 @@ def zero(
         if gripper is not None:
             raise UsageError("--from and --gripper: the file says where the gripper's ends are")
 
-        def check(found: Any) -> str | None:
+        def check(zeros: Any) -> str | None:
             if port is None:
                 return None
-            with board_link.backend(board, port, baud, reset=not no_reset) as machine:
-                found.check(machine)
+            with board_link.open_backend(board, port, baud, reset=not no_reset) as machine:
+                zeros.check(machine)
                 return machine.port.name
 
-        lerobot_zero.record(board, robot, source, pose, out, json, check)
+        lerobot_zero.record_zeros(board, robot, source, pose, out, json, check)
         return
     q = units.joints_in(arm, arguments.joint_list(arm, pose or "home", "--pose"))
     jaw = None if gripper is None else board.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
-    with board_link.backend(board, port, baud, reset=not no_reset) as machine:
+    with board_link.open_backend(board, port, baud, reset=not no_reset) as machine:
         name = machine.port.name
         counts, grips = board.zero(jaw)
-    found = np.rint(np.array(counts) - arm.motor_gain @ q).astype(int).tolist()
+    zeros = np.rint(np.array(counts) - arm.motor_gain @ q).astype(int).tolist()
     if out is not None:
-        _write(arm, robot, found, grips, out)
+        _write_robot_file(arm, robot, zeros, grips, out)
     if out != "-":
-        answer: dict[str, Any] = {**render.head(arm), "port": name, "counts": counts, "zero": found}
+        answer: dict[str, Any] = {**render.head(arm), "port": name, "counts": counts, "zero": zeros}
         answer["gripper_zero"] = None if grips is None else grips[1]
         with output.destination(None) as write:
-            write(f"{render.to_json(answer)}\n" if json else _text(board, counts, found, grips))
+            write(f"{render.to_json(answer)}\n" if json else _text(board, counts, zeros, grips))
 
 
-def _write(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[int, int] | None, out: str) -> None:
+def _write_robot_file(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[int, int] | None, out: str) -> None:
     """The robot file with these zeros, all else as it stands."""
     from armkin.motors import motor_names
     from armkin.robot_file import parse
     from armkin.robot_file.catalogue import locate
     from armkin.robot_file.replace_values import with_values
 
-    where: dict[tuple[str | int, ...], int] = {
+    edits: dict[tuple[str | int, ...], int] = {
         ("joints", arm.joint_names.index(name), "drive", "zero"): count
         for name, count in zip(motor_names(arm), zeros, strict=True)
     }
     if grips is not None:
-        where["gripper", "zero"] = grips[1]
-    text = with_values(Path(locate(robot)).read_text(encoding="utf-8"), where)
+        edits["gripper", "zero"] = grips[1]
+    text = with_values(Path(locate(robot)).read_text(encoding="utf-8"), edits)
     parse(text, out)  # nothing is written that no command would take
     with output.destination(out) as write:
         write(text)
@@ -116,8 +116,8 @@ def _text(board: Board, counts: Sequence[int], zeros: Sequence[int], grips: tupl
     from armkin.motors import motor_names
 
     rows = [["joint", "count", "zero", "was"]]
-    for joint, count, new, motor in zip(motor_names(board.arm), counts, zeros, board.arm.motors, strict=True):
-        rows.append([joint, str(count), str(new), f"{motor.zero:g}"])
+    for joint, count, zero, motor in zip(motor_names(board.arm), counts, zeros, board.arm.motors, strict=True):
+        rows.append([joint, str(count), str(zero), f"{motor.zero:g}"])
     if grips is not None:
         rows.append(["gripper", *map(str, grips), f"{board.gripper().zero:g}"])
     return f"{render.table(rows)}\n"
