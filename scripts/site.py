@@ -51,7 +51,7 @@ def main(arms: Sequence[str]) -> None:
     (reference / "commands.md").write_text("\n".join(commands()), "utf-8")
     (reference / "robot_file.md").write_text("\n".join(robot_file()), "utf-8")
     (reference / "python.md").write_text("\n".join(python()), "utf-8")
-    (reference / "arms.md").write_text("\n".join(pages(arms or catalogue.names())), "utf-8")
+    (reference / "arms.md").write_text("\n".join(pages(arms or catalogue.robot_names())), "utf-8")
     subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-f", str(ROOT / "mkdocs.yml")],
         check=True,

@@ -40,7 +40,7 @@ def _off(p: np.ndarray, q: np.ndarray) -> float:
 def program_read(text: str) -> np.ndarray:
     """What armkin reads of a program: (N, 3) [mm], arcs as chords."""
     out: list[np.ndarray] = []
-    for move in gcode.parse(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions()).moves:
+    for move in gcode.parse_gcode(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions()).moves:
         if move.point is not None:
             out.append(np.array(move.point))
         out += [np.array(p) for p in move.polyline or []]
@@ -79,7 +79,7 @@ def drawing_off(seed: int) -> float:
     """How far a drawing's strokes lie off the other reader's [mm]."""
     text = random_drawings.drawing(seed)
     strokes: list[list[list[float]]] = []
-    for move in svg.parse(text.encode(), "t.svg", AS_IT_IS, DrawingOptions(lift=0.0)).moves:
+    for move in svg.parse_svg(text.encode(), "t.svg", AS_IT_IS, DrawingOptions(lift=0.0)).moves:
         if move.point is not None:
             strokes.append([list(move.point)])
         strokes[-1] += [list(p) for p in move.polyline or []]
@@ -99,7 +99,7 @@ def spoilt(seed: int, which: int) -> tuple[str, str, str]:
 def refusal(text: str) -> str:
     """Why a drawing is refused; empty: it is drawn."""
     try:
-        svg.parse(text.encode(), "t.svg", AS_IT_IS, DrawingOptions())
+        svg.parse_svg(text.encode(), "t.svg", AS_IT_IS, DrawingOptions())
     except PathFileError as error:
         return str(error)
     return ""

@@ -23,7 +23,7 @@ from armkin.board.sim.sim_servo_bus import Servo
 from armkin.board_catalogue import BOARDS
 from armkin.formula.arrays import Array
 from armkin.model.build_arm import build
-from armkin.robot_file import parse
+from armkin.robot_file import parse_robot_file
 from command_line import ROOT
 
 ELSEWHERE = ((8, 84, -80), (-60, 30, 20), (75, 110, -115), (-84, 60, -10), (20, -15, 25))  # [deg]
@@ -102,7 +102,7 @@ KINDS = {
 
 def on(kind: str, at: Array | None = None) -> Kind:
     """three_dof on a simulated board of that kind, at home or at joint values (n,) [rad]."""
-    arm = build(parse(KINDS[kind]))
+    arm = build(parse_robot_file(KINDS[kind]))
     seen: list[list[float]] = []
     board = board_of(arm)
     port: Any = board.simulated()

@@ -352,7 +352,7 @@ def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     from armkin import board_catalogue
     from armkin.board import kinds
     from armkin.model.build_arm import build
-    from armkin.robot_file import parse
+    from armkin.robot_file import parse_robot_file
     from armkin.robot_file.robot_schema import json_schema
 
     text = (SOURCE / "armkin/board/kinds/grbl.py").read_text()
@@ -363,7 +363,7 @@ def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         robot = (
             (SOURCE.parent / "tests/robots/three_dof_grbl.yaml").read_text().replace("kind: grbl", "kind: gcode_box")
         )
-        board = kinds.board_of(build(parse(robot)))
+        board = kinds.board_of(build(parse_robot_file(robot)))
         assert (board.kind, type(board).__module__) == ("gcode_box", "armkin.board.kinds.gcode_box")
         assert "gcode_box" in json_schema()["$defs"]["Board"]["properties"]["kind"]["enum"]
     finally:

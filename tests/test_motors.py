@@ -144,7 +144,7 @@ def servo_arm(invert: bool) -> Arm:
     text = (ROOT / "robots/planar_2dof.yaml").read_text()
     if invert:
         text = text.replace("axis: S1,", "axis: S1, invert: true,")
-    return build(robot_file.parse(text))
+    return build(robot_file.parse_robot_file(text))
 
 
 def test_servo_pulse_widths() -> None:

@@ -90,5 +90,5 @@ def test_bus_servo_mistakes_are_named(old: str, new: str, says: str) -> None:
     text = BUS.read_text()
     assert old in text
     with pytest.raises(RobotFileError) as caught:
-        robot_file.parse(text.replace(old, new, 1))
+        robot_file.parse_robot_file(text.replace(old, new, 1))
     assert says in "\n".join(caught.value.problems)

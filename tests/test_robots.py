@@ -93,7 +93,7 @@ def test_printed_pose(name: str, joints: list[float], tip: tuple[float, ...], to
 
 @pytest.mark.parametrize("path", sorted(ROBOTS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_shipped_arm_says_what_it_was_compared_with(path: Path) -> None:
-    assert robot_file.read(path).compared
+    assert robot_file.read_robot_file(path).compared
 
 
 def test_makers_reaches() -> None:
@@ -154,7 +154,7 @@ def test_step_chains_give_the_steps_that_the_sources_print() -> None:
         "moveo": [32800 / 360, 18000 / 360, 72000 / 360, 3280 / 360, 14400 / 360],
     }
     for name, steps_per_degree in printed.items():
-        motors = robot_file.read(ROBOTS / f"{name}.yaml").motor_list()
+        motors = robot_file.read_robot_file(ROBOTS / f"{name}.yaml").motor_list()
         assert [motor.pulses_per_unit() for motor in motors] == pytest.approx(steps_per_degree, abs=1e-3), name
 
 

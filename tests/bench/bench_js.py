@@ -156,7 +156,7 @@ def _held(arm: armkin.Arm, folder: Path, q: np.ndarray, joint: int) -> list[str]
 def main(words: list[str]) -> None:
     seed = int(words[1]) if words[:1] == ["--agree"] else None
     names = words[2:] if seed is not None else words
-    for name in names or catalogue.names():
+    for name in names or catalogue.robot_names():
         arm = armkin.load(name)
         with tempfile.TemporaryDirectory() as folder:
             try:

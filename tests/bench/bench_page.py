@@ -173,6 +173,6 @@ def measure(browser: Browser, name: str, folder: Path) -> None:
 if __name__ == "__main__":
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     with chromium() as one, tempfile.TemporaryDirectory() as place:
-        for each in sys.argv[1:] or catalogue.names():
+        for each in sys.argv[1:] or catalogue.robot_names():
             measure(one, each, Path(place))
     print(f"load {os.getloadavg()[0]:.1f}; the fixed loop at best {Processor.best:.1f} ms")

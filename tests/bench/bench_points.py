@@ -92,7 +92,7 @@ def planned(name: str, text: str, at: list[float]) -> None:
     """Read and plan a program; print what it takes."""
     arm = armkin.load("three_dof")
     began = time.process_time()
-    file = gcode.parse(text.encode(), "points.gcode", place_drawing(arm, at), DrawingOptions())
+    file = gcode.parse_gcode(text.encode(), "points.gcode", place_drawing(arm, at), DrawingOptions())
     read = time.process_time() - began
     plan = armkin.path(arm, file)
     spent = time.process_time() - began
@@ -143,7 +143,7 @@ def _place(target: np.ndarray) -> np.ndarray:
 def homes(names: list[str]) -> None:
     """Arms whose home is singular, every shipped one if none is named: carried, turned at rest, or not to be done."""
     print("arm               carried  at rest  refused  false sentences")
-    for name in names or catalogue.names():
+    for name in names or catalogue.robot_names():
         arm = moving(name)
         if arm.n != 6 or condition(arm, arm.home) < 1e9:
             continue

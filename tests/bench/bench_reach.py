@@ -68,7 +68,7 @@ def place(solve: Any = armkin.ik) -> bool:
     from armkin.robot_file import catalogue
 
     total, different, arms = 0.0, 0, 0
-    for name in catalogue.names():
+    for name in catalogue.robot_names():
         arm, rng = armkin.load(name), np.random.default_rng(2)
         try:
             task, geometry = solver(arm, None)

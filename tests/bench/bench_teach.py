@@ -164,7 +164,7 @@ def drags(robot: str, browser: Browser) -> None:
 
 if __name__ == "__main__":
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
-    for name in sys.argv[1:] or catalogue.names():
+    for name in sys.argv[1:] or catalogue.robot_names():
         events(name)
     with chromium() as one:
         for name in POSES:

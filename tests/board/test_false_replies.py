@@ -26,7 +26,7 @@ from armkin.errors import LinkError
 from armkin.model import build_arm as arms
 from armkin.model.arm import Arm
 from armkin.motion.rounded_waypoints import round_waypoints
-from armkin.robot_file import parse
+from armkin.robot_file import parse_robot_file
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +130,7 @@ def switched() -> Arm:
     for axis, at in zip("XYZ", (-20, 75, -105), strict=True):
         homing = f"homing: {{switch: {axis}, direction: -1, at: {at}, speed: 40, backoff: 3, normally: open}}"
         text = text.replace(f"    drive: {{axis: {axis},", f"    {homing}\n    drive: {{axis: {axis},")
-    return arms.build(parse(text))
+    return arms.build(parse_robot_file(text))
 
 
 @pytest.mark.parametrize("command", COMMANDS)

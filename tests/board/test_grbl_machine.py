@@ -20,7 +20,7 @@ from armkin.board.grbl.settings import expected_settings
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError, UsageError
 from armkin.model.build_arm import build
-from armkin.robot_file import parse
+from armkin.robot_file import parse_robot_file
 from armkin.robot_file.robot_keys import Gripper
 from command_line import ROOT, THREE_DOF
 
@@ -181,7 +181,7 @@ def test_arms_that_grbl_cannot_drive_are_refused() -> None:
         ("microsteps: 16", "microsteps: 256", "enough for 500 steps a unit at most"),
     ):
         with pytest.raises(UsageError, match=message):
-            axes_of(build(parse(text.replace(old, new))))
+            axes_of(build(parse_robot_file(text.replace(old, new))))
     with pytest.raises(UsageError, match="GRBL drives steppers alone"):
         axes_of(armkin.load("ra02"))
 

@@ -25,7 +25,7 @@ from armkin.errors import LinkError, UsageError
 from armkin.model import build_arm as arms
 from armkin.model.arm import Arm
 from armkin.motors import joints, pulses
-from armkin.robot_file import parse
+from armkin.robot_file import parse_robot_file
 from command_line import THREE_DOF, run
 
 ROBOT = "robots/three_dof.yaml"
@@ -54,7 +54,7 @@ SWITCHES = [
 
 @pytest.fixture(scope="module")
 def wrist() -> Arm:
-    return arms.build(parse(WRIST % tuple(SWITCHES)))
+    return arms.build(parse_robot_file(WRIST % tuple(SWITCHES)))
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +139,7 @@ def test_lost_known_and_changed(three_dof: Arm) -> None:
     assert machine(three_dof, port).position() == "known"
     board.reset()
     assert machine(three_dof, port).position() == "retained"
-    other = arms.build(parse(Path(ROBOT).read_text().replace("pulley: 4", "pulley: 5")))
+    other = arms.build(parse_robot_file(Path(ROBOT).read_text().replace("pulley: 4", "pulley: 5")))
     changed = machine(other, port)
     assert changed.position() == "lost"
     with pytest.raises(LinkError, match="configured for another arm"):
@@ -179,7 +179,7 @@ def test_what_is_missing_is_named(old: str, new: str, message: str) -> None:
     text = Path(ROBOT).read_text()
     assert old in text
     with pytest.raises(UsageError, match=message):
-        configure(arms.build(parse(text.replace(old, new))))
+        configure(arms.build(parse_robot_file(text.replace(old, new))))
 
 
 @settings(max_examples=200, deadline=None)

@@ -208,7 +208,7 @@ def test_tasks_that_need_parallel_axes_keep_them() -> None:
     tips = armkin.fk(arm, c * 1.003 + [0.02, 0.01, -0.01, 0.0])[:, :3, 3] + rng.normal(size=(40, 3)) * 0.05
     found = armkin.calibrate(arm, c, tips)
     assert found.held == ["twists: task xyz_pitch needs parallel axes"]
-    again = build(robot_file.parse(found.text))
+    again = build(robot_file.parse_robot_file(found.text))
     assert armkin.method(again) == armkin.method(arm)
     q = c[0]
     s = armkin.ik(again, [*armkin.fk(again, q)[:3, 3], 1.003 * q[1:].sum()], near=q)

@@ -17,7 +17,7 @@ import armkin
 from armkin import robot_file
 from armkin.export import conventions
 from armkin.model.build_arm import build
-from armkin.robot_file.robot_file_text import text
+from armkin.robot_file.robot_file_text import format_robot_file
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def built(arm: armkin.Arm, seed: int, *, base: bool = True) -> Built:
         "rpy": [float(x) for x in np.add(where["rpy"], turn)],
     }
     keep = {key: value for key, value in data.items() if key in ("name", "convention", "tool")}
-    true = build(robot_file.parse(text({**keep, "base": changed, "joints": joints})))
+    true = build(robot_file.parse_robot_file(format_robot_file({**keep, "base": changed, "joints": joints})))
     return Built(true, 1.0 + 0.002 * rng.normal(size=arm.n))
 
 

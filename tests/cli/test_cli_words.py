@@ -103,7 +103,7 @@ def test_no_shipped_robot_looks_like_metres_or_radians(name: str) -> None:
 def test_a_variable_in_the_table_is_left_out(variable: str) -> None:
     text = (ROOT / THREE_DOF).read_text().replace("d: 170, theta: 0", f"d: 170, theta: {variable}")
     with pytest.raises(RobotFileError, match="leave the variable out: theta is the constant part"):
-        robot_file.parse(text, "arm.yaml")
+        robot_file.parse_robot_file(text, "arm.yaml")
 
 
 def test_a_path_file_in_the_robots_place_is_called_one() -> None:

@@ -27,7 +27,7 @@ def offered(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
     [
         ("armkin ", list(COMMANDS)),
         ("armkin pu", ["pulses"]),
-        ("armkin fk ", list(catalogue.names())),
+        ("armkin fk ", list(catalogue.robot_names())),
         ("armkin fk pum", ["puma560"]),
         ("armkin fk three_dof ho", ["home"]),
         ("armkin send cobra", ["cobra600"]),

@@ -22,7 +22,7 @@ def made(*words: object, stdin: bytes = b"") -> robot_file.RobotFile:
     """The robot file that a command line writes to standard output."""
     result = run("new", "arm", *words, "--out", "-", stdin=stdin)
     assert result.code == 0, result.err
-    return robot_file.parse(result.out, "arm.yaml")
+    return robot_file.parse_robot_file(result.out, "arm.yaml")
 
 
 def test_a_table_becomes_an_arm(tmp_path: Path) -> None:
@@ -33,7 +33,7 @@ def test_a_table_becomes_an_arm(tmp_path: Path) -> None:
     arm, paper = armkin.load(f"{path}.yaml"), armkin.load("three_dof")
     q = np.random.default_rng(1).uniform(-3, 3, (50, 3))
     assert np.array_equal(armkin.fk(arm, q), armkin.fk(paper, q))
-    assert robot_file.read(f"{path}.yaml").source == 'the "paper": Table 1'
+    assert robot_file.read_robot_file(f"{path}.yaml").source == 'the "paper": Table 1'
     assert run("fk", f"{path}.yaml", "home").code == 0
     again = run("new", path, *TABLE, "--convention", "standard")
     assert again.code == 1
@@ -72,7 +72,7 @@ def test_the_comments_become_keys_when_they_are_taken_out() -> None:
         bare = line.strip().removeprefix("# ")
         is_key = line.strip().startswith("# ") and bare.split(":")[0].isidentifier() and "`" not in bare.split("#")[0]
         lines.append(line.replace("# ", "", 1) if is_key else line)
-    file = robot_file.parse("\n".join(lines), "arm.yaml")
+    file = robot_file.parse_robot_file("\n".join(lines), "arm.yaml")
     assert file.board is not None
     assert file.gripper is not None
     assert file.poses is not None
@@ -115,8 +115,8 @@ def test_the_questions_of_a_terminal(tmp_path: Path) -> None:
     os.close(master)
     assert "d: 'a lot' is not a number" in said
     assert "floor is hit in every posture" in said
-    assert [entry.floor for entry in robot_file.read(tmp_path / "asked.yaml").keep_out] == [-20]
-    first, second = robot_file.read(tmp_path / "asked.yaml").joints
+    assert [entry.floor for entry in robot_file.read_robot_file(tmp_path / "asked.yaml").keep_out] == [-20]
+    first, second = robot_file.read_robot_file(tmp_path / "asked.yaml").joints
     assert first.dh is not None
     assert second.dh is not None
     assert (first.dh.alpha, first.dh.d, first.limits) == (90, 170, (-90, 90))

@@ -83,5 +83,5 @@ def test_poses_in_python(arm_file: str) -> None:
 def test_poses_are_validated(poses: str, says: str) -> None:
     text = (ROOT / THREE_DOF).read_text() + f"poses: {poses}\n"
     with pytest.raises(RobotFileError, match=r"^arm.yaml:\d+: ") as caught:
-        robot_file.parse(text, "arm.yaml")
+        robot_file.parse_robot_file(text, "arm.yaml")
     assert says in str(caught.value)

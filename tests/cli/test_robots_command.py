@@ -12,7 +12,7 @@ from command_line import ROOT, run
 
 def test_every_shipped_robot_is_listed_with_what_it_can_do() -> None:
     found = {entry["robot_file"]: entry for entry in run("robots", "--json").json["robots"]}
-    assert list(found) == list(catalogue.names())
+    assert list(found) == list(catalogue.robot_names())
     assert found["three_dof"]["can"] == {"ik": True, "pulses": True, "simulate": True, "send": True, "home": False}
     assert found["panda"]["can"]["ik"]
     assert found["ur5e"]["target_labels"] == ["x", "y", "z", "roll", "pitch", "yaw"]
@@ -31,7 +31,7 @@ def listed() -> dict[str, Any]:
     return {entry["robot_file"]: entry for entry in run("robots", "--json").json["robots"]}
 
 
-@pytest.mark.parametrize("name", catalogue.names())
+@pytest.mark.parametrize("name", catalogue.robot_names())
 def test_what_a_robot_can_do_is_what_the_commands_do(name: str) -> None:
     entry = listed()[name]
     can = entry["can"]

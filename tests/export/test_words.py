@@ -20,7 +20,7 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.arm import actual, from_links
 from armkin.model.build_arm import build
 from armkin.robot_file import urdf_reader
-from armkin.robot_file.robot_file_text import text
+from armkin.robot_file.robot_file_text import format_robot_file
 from command_line import ROOT, run
 
 FILES = sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests/robots").glob("*.yaml"))
@@ -50,7 +50,7 @@ def numbers(element: ET.Element | None, name: str) -> np.ndarray:
 
 
 def again(data: dict[str, Any]) -> armkin.Arm:
-    return build(robot_file.parse(text(data)))
+    return build(robot_file.parse_robot_file(format_robot_file(data)))
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -74,7 +74,7 @@ def test_a_table_is_the_same_arm(path: Path) -> None:
 def test_out_to_urdf_and_back_is_the_same_arm(path: Path) -> None:
     arm = armkin.load(path)
     turned = actual(arm)
-    other = again(urdf_reader.parse(write_urdf(arm).encode()).data)
+    other = again(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)
     q = values(arm)
     off = np.abs(armkin.fk(other, q) - armkin.fk(turned, q))
     assert off[:, :3, 3].max() < 1e-9

@@ -51,6 +51,6 @@ def _each_robot_file_is_read_once() -> Iterator[None]:
         return arms[id(file)][1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(robot_file, "parse", lru_cache(KEPT)(robot_file.parse))
+        patch.setattr(robot_file, "parse_robot_file", lru_cache(KEPT)(robot_file.parse_robot_file))
         patch.setattr(build_arm, "build", build_once)
         yield

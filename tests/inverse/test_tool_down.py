@@ -15,7 +15,7 @@ from armkin.inverse.elimination import choose_variable, method, pencil, roots
 from armkin.inverse.elimination.closed_loop import roles
 from armkin.model.build_arm import build
 from armkin.model.rotation import inverse, rotation_about
-from armkin.robot_file import parse
+from armkin.robot_file import parse_robot_file
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ joints:
 def known(name: str) -> tuple[Arm, Screws]:
     if name != "gen3_lite":
         return shipped(name)
-    file = parse(GEN3_LITE)
+    file = parse_robot_file(GEN3_LITE)
     return build(file), screws(file)
 
 

@@ -131,7 +131,7 @@ def test_both_files_are_kept_and_the_greater_clearance_holds(tmp_path: Path) -> 
     more.write_text("clearance: 2\nkeep_out: [floor: -60, capsule: {from: [0, 900, 0], to: [0, 900, 9], radius: 1}]\n")
     arm = armkin.load(robot, scene=more)
     assert arm.clearance == 7.0
-    assert keep_out_keys.names(arm.keep_out) == ["self", "floor", "floor 2", "capsule 1"]
+    assert keep_out_keys.keep_out_names(arm.keep_out) == ["self", "floor", "floor 2", "capsule 1"]
 
 
 def test_a_floor_that_swallows_the_arm_is_refused(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_a_floor_that_swallows_the_arm_is_refused(tmp_path: Path) -> None:
 )
 def test_a_malformed_scene_is_refused_in_words(text: str, words: str) -> None:
     with pytest.raises(RobotFileError) as raised:
-        scene_file.parse(text, "scene.yaml")
+        scene_file.parse_scene(text, "scene.yaml")
     assert words in str(raised.value)
     assert "scene.yaml" in str(raised.value)
 

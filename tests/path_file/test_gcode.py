@@ -24,7 +24,7 @@ AS_IT_IS = Placing((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0
 def moves(text: str, **options: Any) -> list[tuple[str, Any]]:
     """Kinds and values of the moves, polylines and targets rounded."""
     out: list[tuple[str, Any]] = []
-    for move in gcode.parse(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions(**options)).moves:
+    for move in gcode.parse_gcode(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions(**options)).moves:
         value = getattr(move, move.kind)
         if move.kind in ("polyline", "point"):
             value = np.round(value, 6).tolist()
@@ -131,7 +131,7 @@ def test_a_checksum_counts_the_comments_before_it(comment: str) -> None:
 
 def test_events_and_speeds() -> None:
     text = "G0 X1\nM3 S1000\nG1 X2 F120\nX3 F240\nM4\nG4 P0.5\nG4 S2\nM5\nM0\nG0 X4\nG28"
-    file = gcode.parse(text.encode(), "t.nc", AS_IT_IS, DrawingOptions(grip_by="M3"))
+    file = gcode.parse_gcode(text.encode(), "t.nc", AS_IT_IS, DrawingOptions(grip_by="M3"))
     found = [(move.kind, move.tool_speed) for move in file.moves]
     assert found == [
         ("point", None), ("grip", None), ("polyline", 2.0), ("polyline", 4.0), ("wait", None), ("wait", None),
@@ -139,7 +139,7 @@ def test_events_and_speeds() -> None:
     ]  # fmt: skip
     assert [move.grip for move in file.moves if move.grip] == ["closed", "open"]
     assert [move.wait for move in file.moves if move.wait] == [0.5, 2.0, "enter"]
-    fan = gcode.parse(
+    fan = gcode.parse_gcode(
         b"G0 X1\nM106 S255\nG1 X2\nM106 S0\nG1 X3\nM107", "t", AS_IT_IS, DrawingOptions(3.0, grip_by="M106")
     )
     assert [move.grip for move in fan.moves if move.grip] == ["closed", "open"]
@@ -148,7 +148,7 @@ def test_events_and_speeds() -> None:
 
 def test_what_is_ignored_is_noted_once_a_word() -> None:
     text = "M104 S200\nM104 S210\nT0\nG0 X1 E2\nG1 X2\nG10\nG11\nG40 G49 G61 G80 G94\nG64 P0.1\nG91.1\nG29 P1 X2"
-    notes = gcode.parse(text.encode(), "t", AS_IT_IS, DrawingOptions()).notes
+    notes = gcode.parse_gcode(text.encode(), "t", AS_IT_IS, DrawingOptions()).notes
     words = [note.split()[0] for note in notes]
     assert words == ["M104", "S", "T", "E", "G10", "G11", "G40", "G49", "G61", "G80", "G94", "G64", "G91.1", "G29"]
     assert notes[0] == "M104 is ignored (line 1, and 1 more)"
@@ -156,7 +156,9 @@ def test_what_is_ignored_is_noted_once_a_word() -> None:
 
 def test_s_is_noted_where_nothing_takes_it() -> None:
     def words(text: str, grip_by: str | None = None) -> list[str]:
-        notes = gcode.parse(f"{text}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, DrawingOptions(grip_by=grip_by)).notes
+        notes = gcode.parse_gcode(
+            f"{text}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, DrawingOptions(grip_by=grip_by)
+        ).notes
         return [note.split()[0] for note in notes]
 
     assert words("S100") == ["S"]
@@ -166,10 +168,10 @@ def test_s_is_noted_where_nothing_takes_it() -> None:
 
 
 def test_the_number_of_a_cam_program_is_noted_and_a_macro_of_that_letter_refused() -> None:
-    file = gcode.parse(b"%\nO1001 (pocket)\nG0 X1\nG1 X2 F60\nM30\n%", "t", AS_IT_IS, DrawingOptions())
+    file = gcode.parse_gcode(b"%\nO1001 (pocket)\nG0 X1\nG1 X2 F60\nM30\n%", "t", AS_IT_IS, DrawingOptions())
     assert file.notes == ("O is ignored (line 2)",)
     with pytest.raises(PathFileError, match="t:1: 'SUB' is no word"):
-        gcode.parse(b"O100 SUB\nG0 X1\nG1 X2 F60", "t", AS_IT_IS, DrawingOptions())
+        gcode.parse_gcode(b"O100 SUB\nG0 X1\nG1 X2 F60", "t", AS_IT_IS, DrawingOptions())
 
 
 def test_a_program_has_as_many_points_as_any_path() -> None:
@@ -180,18 +182,21 @@ def test_a_program_has_as_many_points_as_any_path() -> None:
 
 def test_a_cycle_that_ends_leaves_the_motion_as_it_was() -> None:
     one, other = (
-        gcode.parse(f"G0 X1\nG1 X2 F60{word}\nX3".encode(), "t", AS_IT_IS, DrawingOptions()) for word in ("\nG80", "")
+        gcode.parse_gcode(f"G0 X1\nG1 X2 F60{word}\nX3".encode(), "t", AS_IT_IS, DrawingOptions())
+        for word in ("\nG80", "")
     )
     assert one.moves == other.moves
-    assert gcode.parse(b"G80 G0 X1\nG1 X2 F60", "t", AS_IT_IS, DrawingOptions()).notes == ("G80 is ignored (line 1)",)
+    assert gcode.parse_gcode(b"G80 G0 X1\nG1 X2 F60", "t", AS_IT_IS, DrawingOptions()).notes == (
+        "G80 is ignored (line 1)",
+    )
 
 
 def test_home_takes_the_flags_that_slicers_give_it() -> None:
     for line in ("G28 W ; home all without mesh bed level", "G28 X Y", "G28 X0 Y0", "N1 G28 O"):
-        file = gcode.parse(f"{line}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, DrawingOptions())
+        file = gcode.parse_gcode(f"{line}\nG0 X1\nG1 X2 F60".encode(), "t", AS_IT_IS, DrawingOptions())
         assert [move.kind for move in file.moves] == ["joint", "point", "polyline"]
     with pytest.raises(PathFileError, match="t:1: 'X' is no word"):
-        gcode.parse(b"G1 X", "t", AS_IT_IS, DrawingOptions())
+        gcode.parse_gcode(b"G1 X", "t", AS_IT_IS, DrawingOptions())
 
 
 @pytest.mark.parametrize(
@@ -276,7 +281,7 @@ def test_lines_that_are_read_in_one_step_are_read_as_word_by_word(monkeypatch: p
 
     def read(text: str) -> object:
         try:
-            file = gcode.parse(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions())
+            file = gcode.parse_gcode(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions())
         except PathFileError as error:
             return str(error)
         return [move.model_dump() for move in file.moves], file.notes
@@ -293,7 +298,7 @@ def test_an_arc_without_radius_draws_nothing() -> None:
 
     def planned(text: str) -> float:
         return armkin.path(
-            arm, gcode.parse(text.encode(), "t.gcode", place_drawing(arm, [330, -10, 250]), DrawingOptions())
+            arm, gcode.parse_gcode(text.encode(), "t.gcode", place_drawing(arm, [330, -10, 250]), DrawingOptions())
         ).length
 
     with pytest.raises(UsageError, match=r"t\.gcode:1: .*its points are all the same"):

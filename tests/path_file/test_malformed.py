@@ -43,7 +43,9 @@ def damaged(text: str, rng: np.random.Generator, markup: bool) -> bytes:
 @pytest.mark.parametrize("kind", ["gcode", "svg", "attributes"])
 def test_what_is_damaged_is_read_or_refused_with_its_line(kind: str) -> None:
     rng, refused = np.random.default_rng(24), []
-    make, parse = (random_drawings.program, gcode.parse) if kind == "gcode" else (random_drawings.drawing, svg.parse)
+    make, parse = (
+        (random_drawings.program, gcode.parse_gcode) if kind == "gcode" else (random_drawings.drawing, svg.parse_svg)
+    )
     for seed in range(40):
         raw = damaged(make(seed), rng, kind != "attributes")
         try:
@@ -60,7 +62,7 @@ def test_what_is_damaged_is_read_or_refused_with_its_line(kind: str) -> None:
 def test_a_cell_without_end_is_refused_with_its_line() -> None:
     """Python's own reader of CSV gives up at 131,072 characters: an internal error."""
     with pytest.raises(PathFileError, match=r"^t:2: no row of numbers: field larger than"):
-        csv_path.parse(b"1,2,3\n" + b"9" * 200_000 + b",1,2\n", "t")
+        csv_path.parse_csv(b"1,2,3\n" + b"9" * 200_000 + b",1,2\n", "t")
 
 
 @pytest.mark.parametrize(
@@ -74,5 +76,5 @@ def test_a_cell_without_end_is_refused_with_its_line() -> None:
 )
 def test_a_table_s_columns_and_numbers_are_those_of_a_path(text: str, said: str) -> None:
     with pytest.raises(PathFileError) as found:
-        csv_path.parse(text.encode(), "t.csv")
+        csv_path.parse_csv(text.encode(), "t.csv")
     assert str(found.value).startswith(said)

@@ -20,7 +20,7 @@ def drawn(body: str, head: str = BOX, lift: float = 0.0) -> np.ndarray:
     """All points, (N, 3) [mm]."""
     text = f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="x" {head}>\n{body}</svg>'
     out: list[list[float]] = []
-    for move in svg.parse(text.encode(), "t.svg", AS_IT_IS, DrawingOptions(lift=lift)).moves:
+    for move in svg.parse_svg(text.encode(), "t.svg", AS_IT_IS, DrawingOptions(lift=lift)).moves:
         if move.point is not None:
             out.append(list(move.point))
         out += move.polyline or []
@@ -135,20 +135,20 @@ def test_what_is_refused_names_line_and_element(body: str, words: str) -> None:
 )
 def test_files_that_are_no_drawing_are_refused_with_their_line(raw: bytes, words: str) -> None:
     with pytest.raises(PathFileError) as refused:
-        svg.parse(raw, "t.svg", AS_IT_IS, DrawingOptions())
+        svg.parse_svg(raw, "t.svg", AS_IT_IS, DrawingOptions())
     assert words in str(refused.value)
 
 
 def test_a_document_type_elsewhere_is_not_fetched() -> None:
     head = b'<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://127.0.0.1:9/svg11.dtd">'
-    drawn_ = svg.parse(head + b'<svg viewBox="0 0 1 1"><line x2="1"/></svg>', "t.svg", AS_IT_IS, DrawingOptions())
+    drawn_ = svg.parse_svg(head + b'<svg viewBox="0 0 1 1"><line x2="1"/></svg>', "t.svg", AS_IT_IS, DrawingOptions())
     assert len(drawn_.moves) > 0
 
 
 def test_entities_and_bombs_of_uses_are_refused() -> None:
     bomb = b'<!DOCTYPE svg [<!ENTITY a "aaaa">]><svg><path d="&a;"/></svg>'
     with pytest.raises(PathFileError, match="entities"):
-        svg.parse(bomb, "t.svg", AS_IT_IS, DrawingOptions())
+        svg.parse_svg(bomb, "t.svg", AS_IT_IS, DrawingOptions())
     uses = '<g id="g0"/>'
     for k in range(1, 12):
         uses += f'<g id="g{k}">' + 10 * f'<use href="#g{k - 1}"/>' + "</g>"

@@ -169,13 +169,13 @@ def boxes(figure: Any) -> tuple[Any, Any]:
     return _visible_corners(axes), None if legend is None else legend.get_window_extent(renderer)
 
 
-@pytest.mark.parametrize("first", range(0, len(catalogue.names()), 2))
+@pytest.mark.parametrize("first", range(0, len(catalogue.robot_names()), 2))
 def test_nothing_of_a_shipped_robot_is_cut_off_or_covered(
     first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sample: Callable[[int, int], int]
 ) -> None:
     drawn: list[Any] = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))  # the pixels take half of it
-    for name in catalogue.names()[first : first + sample(2, 1)]:
+    for name in catalogue.robot_names()[first : first + sample(2, 1)]:
         drawn.clear()
         _is_seen_whole(armkin.load(name), tmp_path, drawn)
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_every_shipped_robot_has_a_name() -> None:
-    assert catalogue.names() == tuple(sorted(path.stem for path in (ROOT / "robots").glob("*.yaml")))
+    assert catalogue.robot_names() == tuple(sorted(path.stem for path in (ROOT / "robots").glob("*.yaml")))
 
 
 def test_the_wheel_holds_the_robots_where_the_catalogue_looks() -> None:

@@ -21,7 +21,7 @@ CASES = cases()
 
 def message(raw: bytes | str) -> str:
     with pytest.raises(RobotFileError) as caught:
-        robot_file.parse(raw, "arm.yaml")
+        robot_file.parse_robot_file(raw, "arm.yaml")
     return str(caught.value)
 
 
@@ -40,7 +40,7 @@ def _update() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_hostile_file_is_refused_in_the_reviewed_words(name: str) -> None:
-    robot_file.parse(DH)  # the model is built once in a process; that is not the file's time
+    robot_file.parse_robot_file(DH)  # the model is built once in a process; that is not the file's time
     texts: list[str] = []
     seconds = least(lambda: texts.append(message(CASES[name])), 2)
     text = texts[0]
@@ -57,7 +57,7 @@ def test_every_snapshot_belongs_to_a_case() -> None:
 
 @pytest.mark.parametrize("name", VALID)
 def test_the_files_that_the_cases_spoil_are_valid(name: str) -> None:
-    assert robot_file.parse(VALID[name]).name == "arm"
+    assert robot_file.parse_robot_file(VALID[name]).name == "arm"
 
 
 def shipped() -> list[Path]:
@@ -66,7 +66,7 @@ def shipped() -> list[Path]:
 
 @pytest.mark.parametrize("path", shipped(), ids=lambda path: path.stem)
 def test_shipped_robot(path: Path) -> None:
-    robot = robot_file.read(path)
+    robot = robot_file.read_robot_file(path)
     assert robot.name == path.stem
     assert robot.path == str(path)
     head = path.read_text().splitlines()[0]
@@ -85,12 +85,12 @@ def test_shipped_robot(path: Path) -> None:
 def test_an_error_carries_every_problem() -> None:
     text = DH.replace("home: 0", "home: tall").replace("gear: 2.5", "gear: 0").replace("a: 258, d: 0", "a: x")
     with pytest.raises(RobotFileError) as caught:
-        robot_file.parse(text, "arm.yaml")
+        robot_file.parse_robot_file(text, "arm.yaml")
     problems = caught.value.problems
     assert [problem.split(": ")[0] for problem in problems] == [f"arm.yaml:{n}" for n in (10, 13, 23, 23)]
     assert str(caught.value) == "\n".join(problems)
     with pytest.raises(RobotFileError) as caught:
-        robot_file.parse("name: 017", "arm.yaml")
+        robot_file.parse_robot_file("name: 017", "arm.yaml")
     assert caught.value.problems == (str(caught.value),)
 
 
@@ -121,12 +121,14 @@ def test_schema_helps_with_every_key_and_knows_no_null() -> None:
 
 def test_schema_examples_are_valid_files_of_each_convention() -> None:
     examples = robot_file.json_schema()["examples"]
-    read = [robot_file.parse(json.dumps(example)) for example in examples]  # JSON is YAML too
+    read = [robot_file.parse_robot_file(json.dumps(example)) for example in examples]  # JSON is YAML too
     assert [robot.convention for robot in read] == ["standard", "modified", "screws"]
 
 
 def test_what_is_absent_is_absent() -> None:
-    robot = robot_file.parse("name: arm\nconvention: standard\njoints: [{name: q1, dh: {alpha: 0, a: 1, d: 2}}]")
+    robot = robot_file.parse_robot_file(
+        "name: arm\nconvention: standard\njoints: [{name: q1, dh: {alpha: 0, a: 1, d: 2}}]"
+    )
     joint = robot.joints[0]
     assert (robot.task, robot.zero_pose, robot.motors, robot.gripper, robot.board) == (None,) * 5
     assert (joint.limits, joint.max_speed, joint.max_accel, joint.drive, joint.homing) == (None,) * 5
@@ -139,7 +141,7 @@ def test_what_is_absent_is_absent() -> None:
 
 
 def test_the_model_is_immutable() -> None:
-    robot = robot_file.parse(DH)
+    robot = robot_file.parse_robot_file(DH)
     with pytest.raises(ValidationError):
         robot.name = "other"
     with pytest.raises(ValidationError):
@@ -155,7 +157,7 @@ def test_rules_hold_without_a_file_too() -> None:
 
 
 def test_chain_of_the_published_arm() -> None:
-    motors = robot_file.read(ROOT / "robots" / "three_dof.yaml").motor_list()
+    motors = robot_file.read_robot_file(ROOT / "robots" / "three_dof.yaml").motor_list()
     assert [motor.pulses_per_turn() for motor in motors] == [12800, 42962, 24000]
     assert [round(1 / motor.pulses_per_unit(), 7) for motor in motors] == [0.028125, 0.0083795, 0.015]
     assert [(motor.name, motor.axis, motor.joints) for motor in motors] == [
@@ -166,22 +168,22 @@ def test_chain_of_the_published_arm() -> None:
 
 
 def test_teeth_are_a_ratio_of_joint_to_motor() -> None:
-    robot = robot_file.parse(DH.replace("gear: 2.5", "gear: {motor: 16, joint: 80}"))
+    robot = robot_file.parse_robot_file(DH.replace("gear: 2.5", "gear: {motor: 16, joint: 80}"))
     assert robot.joints[0].drive is not None
     assert robot.joints[0].drive.gear == 5.0
     assert robot.joints[0].drive.pulses_per_turn() == 200 * 16 * 5 * 4
 
 
 def test_lead_and_servo_give_pulses_per_unit() -> None:
-    lift = robot_file.parse(DH).motor_list()[1]
+    lift = robot_file.parse_robot_file(DH).motor_list()[1]
     assert lift.pulses_per_unit() == 200 * 8 / 8  # a turn is 8 mm
-    servo = robot_file.parse(SERVO).motor_list()[1]
+    servo = robot_file.parse_robot_file(SERVO).motor_list()[1]
     assert servo.invert
     assert servo.pulses_per_unit() == pytest.approx(2000 / 180)
 
 
 def test_differential_wrist() -> None:
-    robot = robot_file.read(ROOT / "tests" / "robots" / "differential_wrist.yaml")
+    robot = robot_file.read_robot_file(ROOT / "tests" / "robots" / "differential_wrist.yaml")
     motors = {motor.name: motor.joints for motor in robot.motor_list()}
     assert len(motors) == 7
     assert motors["M5"] == {"J5": 1.0, "J6": 2.0}
@@ -190,47 +192,47 @@ def test_differential_wrist() -> None:
 
 def test_twist_sheds_the_rounding_of_a_printed_table() -> None:
     text = SCREWS.replace("w: [0, 0, 1], v: [0, 0, 0]", "w: [0.7071, 0, 0.7071], v: [0, 100.01, 0.002]")
-    w, v = robot_file.parse(text).joints[0].twist()
+    w, v = robot_file.parse_robot_file(text).joints[0].twist()
     assert sum(x * x for x in w) == pytest.approx(1, abs=1e-15)
     assert sum(x * y for x, y in zip(w, v, strict=True)) == pytest.approx(0, abs=1e-12)
     assert v[1] == pytest.approx(100.01, rel=1e-4)
     # A point gives v = -w x q: q3 of SCREWS turns about -y through (0, 0, 115).
-    assert robot_file.parse(SCREWS).joints[2].twist() == ((0, -1, 0), (115, 0, 0))
-    assert robot_file.parse(SCREWS).joints[1].twist() == ((0, 0, 0), (0, 0, 1))
+    assert robot_file.parse_robot_file(SCREWS).joints[2].twist() == ((0, -1, 0), (115, 0, 0))
+    assert robot_file.parse_robot_file(SCREWS).joints[1].twist() == ((0, 0, 0), (0, 0, 1))
 
 
 def test_a_motor_may_mix_revolute_and_prismatic_joints() -> None:
     """A ball-screw spline: without a lead, the prismatic joint's weight is in degrees per mm."""
     text = MOTORS.replace("joints: {J3: 1}", "joints: {J1: 1, J3: 45}").replace(", lead: 8", "")
-    assert robot_file.parse(text).motor_list()[2].joints == {"J1": 1.0, "J3": 45.0}
+    assert robot_file.parse_robot_file(text).motor_list()[2].joints == {"J1": 1.0, "J3": 45.0}
 
 
 def test_byte_order_mark_and_windows_lines_are_fine() -> None:
-    windows = robot_file.parse(b"\xef\xbb\xbf" + DH.replace("\n", "\r\n").encode())
-    assert windows.model_dump() == robot_file.parse(DH).model_dump()
+    windows = robot_file.parse_robot_file(b"\xef\xbb\xbf" + DH.replace("\n", "\r\n").encode())
+    assert windows.model_dump() == robot_file.parse_robot_file(DH).model_dump()
 
 
 def test_twelve_joints_load() -> None:
     rows = "".join(f"  - {{name: q{i}, dh: {{alpha: 0, a: 1, d: 0}}}}\n" for i in range(12))
-    assert len(robot_file.parse(f"name: arm\nconvention: standard\njoints:\n{rows}").joints) == 12
+    assert len(robot_file.parse_robot_file(f"name: arm\nconvention: standard\njoints:\n{rows}").joints) == 12
 
 
 def test_sha256_is_that_of_the_bytes() -> None:
     import hashlib
 
     path = ROOT / "robots" / "ra02.yaml"
-    assert robot_file.read(path).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert robot_file.read_robot_file(path).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"none\.yaml: cannot read the robot file: No such file"):
-        robot_file.read(tmp_path / "none.yaml")
+        robot_file.read_robot_file(tmp_path / "none.yaml")
     with pytest.raises(FileError, match="Is a directory; name a file"):
-        robot_file.read(tmp_path)
+        robot_file.read_robot_file(tmp_path)
     with pytest.raises(FileError, match="null byte"):
-        robot_file.read("arm\0.yaml")
+        robot_file.read_robot_file("arm\0.yaml")
     with pytest.raises(FileError, match="File name too long"):
-        robot_file.read("x" * 5000)
+        robot_file.read_robot_file("x" * 5000)
 
 
 def test_a_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,7 +244,7 @@ def test_a_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(FileError, match=r"arm\.yaml: cannot read the robot file: Permission denied"):
-        robot_file.read(path)
+        robot_file.read_robot_file(path)
 
 
 def test_a_huge_file_is_not_read_to_its_end(tmp_path: Path) -> None:
@@ -250,7 +252,7 @@ def test_a_huge_file_is_not_read_to_its_end(tmp_path: Path) -> None:
     with path.open("wb") as file:
         file.truncate(1 << 36)  # sparse: 64 GB that take no room
     with pytest.raises(RobotFileError, match="larger than 256 kB"):
-        robot_file.read(path)
+        robot_file.read_robot_file(path)
 
 
 SNIPPETS = [
@@ -275,7 +277,7 @@ def test_mutated_files_load_or_are_refused(text: str, edits: list[tuple[float, i
         text = text[:at] + snippet + text[at + length :]
     robot, refusal = None, ""
     try:
-        robot = robot_file.parse(text.encode(errors="surrogatepass"), "arm.yaml")
+        robot = robot_file.parse_robot_file(text.encode(errors="surrogatepass"), "arm.yaml")
     except ArmkinError as error:
         refusal = str(error)
     if robot is None:
@@ -290,4 +292,4 @@ def test_mutated_files_load_or_are_refused(text: str, edits: list[tuple[float, i
 @given(st.binary(max_size=300))
 def test_arbitrary_bytes_are_refused(raw: bytes) -> None:
     with pytest.raises(RobotFileError):
-        robot_file.parse(raw)
+        robot_file.parse_robot_file(raw)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armkin.robot_file import strict_yaml
-from armkin.robot_file.strict_yaml import StrictYamlError, loads
+from armkin.robot_file.strict_yaml import StrictYamlError, load_yaml
 from hostile_robot_files import VALID, cases
 
 
@@ -51,16 +51,16 @@ from hostile_robot_files import VALID, cases
 def test_values(text: str, value: object) -> None:
     if value is None:
         with pytest.raises(StrictYamlError):
-            loads(f"a: {text}")
+            load_yaml(f"a: {text}")
         return
-    found = loads(f"a: {text}").data["a"]
+    found = load_yaml(f"a: {text}").data["a"]
     assert found == value
     assert type(found) is type(value)
 
 
 @pytest.mark.parametrize("text", ["1", "-3", "0.25", "-1.5e-3", "text", "'017'", "true", ".5", "10."])
 def test_accepted_values_are_what_pyyaml_reads(text: str) -> None:
-    assert loads(f"a: {text}").data == yaml.safe_load(f"a: {text}")
+    assert load_yaml(f"a: {text}").data == yaml.safe_load(f"a: {text}")
 
 
 @settings(max_examples=300, deadline=None)
@@ -68,7 +68,7 @@ def test_accepted_values_are_what_pyyaml_reads(text: str) -> None:
 def test_a_plain_scalar_is_read_as_pyyaml_does_or_refused(text: str) -> None:
     """No number is silently another number, and no text silently a number."""
     try:
-        found = loads(f"a: {text}").data["a"]
+        found = load_yaml(f"a: {text}").data["a"]
     except StrictYamlError:
         return
     expected = yaml.safe_load(f"a: {text}")["a"]
@@ -80,11 +80,11 @@ def test_a_plain_scalar_is_read_as_pyyaml_does_or_refused(text: str) -> None:
 @settings(max_examples=100, deadline=None)
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_numbers_as_pyyaml_writes_them_come_back(number: float) -> None:
-    assert loads(yaml.safe_dump({"a": number})).data == {"a": number}
+    assert load_yaml(yaml.safe_dump({"a": number})).data == {"a": number}
 
 
 def test_lines_are_those_of_keys_and_items() -> None:
-    document = loads("# head\na: 1\nb:\n  - c: 2\n    d:\n      [1,\n       2]\n  - 3\n")
+    document = load_yaml("# head\na: 1\nb:\n  - c: 2\n    d:\n      [1,\n       2]\n  - 3\n")
     lines = {(): 2, ("a",): 2, ("b",): 3, ("b", 0): 4, ("b", 0, "c"): 4, ("b", 0, "d"): 5}
     assert document.lines == lines | {("b", 0, "d", 0): 6, ("b", 0, "d", 1): 7, ("b", 1): 8}
     assert document.line(("b", 0, "d", 1)) == 7
@@ -93,7 +93,7 @@ def test_lines_are_those_of_keys_and_items() -> None:
 
 def test_error_carries_line_and_problem() -> None:
     with pytest.raises(StrictYamlError) as caught:
-        loads("a: 1\nb: 017\n")
+        load_yaml("a: 1\nb: 017\n")
     assert caught.value.line == 2
     assert caught.value.problem.startswith("017 begins with 0")
     assert str(caught.value) == f"2: {caught.value.problem}"
@@ -102,14 +102,14 @@ def test_error_carries_line_and_problem() -> None:
 def test_mac_and_windows_line_ends_count_as_lines() -> None:
     for end in ("\n", "\r\n", "\r"):
         with pytest.raises(StrictYamlError, match=r"^3: "):
-            loads(end.join(["a: 1", "b: 2", "c: 017"]))
+            load_yaml(end.join(["a: 1", "b: 2", "c: 017"]))
 
 
 @pytest.mark.parametrize("name", VALID)
 def test_both_parsers_read_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    fast = loads(VALID[name])
+    fast = load_yaml(VALID[name])
     monkeypatch.setattr(strict_yaml, "_LOADER", yaml.SafeLoader)
-    slow = loads(VALID[name])
+    slow = load_yaml(VALID[name])
     assert (slow.data, slow.lines) == (fast.data, fast.lines)
 
 
@@ -118,7 +118,7 @@ def test_both_parsers_refuse_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def outcome(raw: bytes) -> str:
         try:
-            loads(raw)
+            load_yaml(raw)
         except StrictYamlError as error:
             return "not YAML" if error.problem.startswith("not YAML") else str(error)
         return "read"

@@ -14,7 +14,7 @@ from armkin.errors import ArmkinError, FileError, RobotFileError, UsageError
 from armkin.export.urdf_writer import urdf as write_urdf
 from armkin.model.build_arm import build
 from armkin.robot_file import urdf_reader
-from armkin.robot_file.robot_file_text import angles, number, text
+from armkin.robot_file.robot_file_text import format_robot_file, number_text, rpy_angles
 from command_line import ROOT, run
 from quick import least
 from urdf_chains import CHAINS, moving, pose
@@ -22,8 +22,8 @@ from urdf_chains import text as as_urdf
 
 
 def imported(chain: dict[str, Any], **settings: Any) -> armkin.Arm:
-    found = urdf_reader.parse(as_urdf(chain).encode(), base=chain["base"], tip=chain["tip"], **settings)
-    return build(robot_file.parse(text(found.data, found.notes)))
+    found = urdf_reader.parse_urdf(as_urdf(chain).encode(), base=chain["base"], tip=chain["tip"], **settings)
+    return build(robot_file.parse_robot_file(format_robot_file(found.data, found.notes)))
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -47,7 +47,7 @@ def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
 def test_a_real_chain_goes_out_to_urdf_and_comes_back(name: str) -> None:
     """The same poses to 1e-9 mm, the same limits, and the same solver class."""
     arm = imported(CHAINS[name])
-    again = build(robot_file.parse(text(urdf_reader.parse(write_urdf(arm).encode()).data)))
+    again = build(robot_file.parse_robot_file(format_robot_file(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)))
     slides = np.where(arm.prismatic, 100.0, 1.0)
     q = np.random.default_rng(8).uniform(-2, 2, (20, arm.n)) * slides
     off = np.abs(armkin.fk(again, q) - armkin.fk(arm, q))
@@ -169,7 +169,7 @@ def test_a_trap_is_named_in_two_lines_and_two_seconds(name: str) -> None:
 
     def tried() -> None:
         with pytest.raises((RobotFileError, UsageError)) as caught:
-            urdf_reader.parse(raw, "arm.urdf")
+            urdf_reader.parse_urdf(raw, "arm.urdf")
         texts.append(str(caught.value))
 
     assert least(tried, 2) < 2
@@ -179,7 +179,7 @@ def test_a_trap_is_named_in_two_lines_and_two_seconds(name: str) -> None:
 
 
 def test_the_arm_that_the_traps_spoil_is_one() -> None:
-    file = robot_file.parse(text(urdf_reader.parse(document()).data))
+    file = robot_file.parse_robot_file(format_robot_file(urdf_reader.parse_urdf(document()).data))
     assert [joint.name for joint in file.joints] == ["shoulder", "elbow", "wrist"]
     assert file.joints[0].limits == pytest.approx([-114.591559, 114.591559])
     assert file.joints[0].screw is not None
@@ -188,7 +188,7 @@ def test_the_arm_that_the_traps_spoil_is_one() -> None:
 
 
 def test_axis_is_x_by_default_and_need_not_be_of_length_1() -> None:
-    data = urdf_reader.parse(
+    data = urdf_reader.parse_urdf(
         document(('<axis xyz="0 0 1"/>', ""), ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -3"/>'))
     ).data
     assert data["joints"][0]["screw"]["w"] == [1, 0, 0]
@@ -197,24 +197,26 @@ def test_axis_is_x_by_default_and_need_not_be_of_length_1() -> None:
 
 def test_limits_of_zero_none_and_away_from_zero() -> None:
     changes = (('lower="-2" upper="2"', 'lower="0" upper="0"'), ('lower="-2" upper="2"', 'lower="0.5" upper="1.5"'))
-    found = urdf_reader.parse(document(*changes))
+    found = urdf_reader.parse_urdf(document(*changes))
     assert "limits" not in found.data["joints"][0]
     assert found.data["joints"][1]["home"] == pytest.approx(np.degrees(1.0))
     assert len(found.notes) == 2
-    robot_file.parse(text(found.data))
-    none = urdf_reader.parse(document(('<limit lower="-2" upper="2" velocity="1.5" effort="-1"/>', "")))
+    robot_file.parse_robot_file(format_robot_file(found.data))
+    none = urdf_reader.parse_urdf(document(('<limit lower="-2" upper="2" velocity="1.5" effort="-1"/>', "")))
     assert none.notes == ("joint shoulder has no <limit>: read as no limits",)
 
 
 def test_limits_lose_the_noise_of_radians() -> None:
-    joint = urdf_reader.parse(document(('lower="-2" upper="2"', 'lower="-6.28318530718" upper="6.28318530718"'))).data[
-        "joints"
-    ][0]
+    joint = urdf_reader.parse_urdf(
+        document(('lower="-2" upper="2"', 'lower="-6.28318530718" upper="6.28318530718"'))
+    ).data["joints"][0]
     assert joint["limits"] == [-360, 360]
 
 
 def test_names_that_a_robot_file_cannot_have_are_changed_and_said() -> None:
-    found = urdf_reader.parse(document(('name="shoulder"', 'name="/px100/1st joint"'), ('name="elbow"', 'name="2"')))
+    found = urdf_reader.parse_urdf(
+        document(('name="shoulder"', 'name="/px100/1st joint"'), ('name="elbow"', 'name="2"'))
+    )
     assert [joint["name"] for joint in found.data["joints"]] == ["_px100_1st_joint", "_2", "wrist"]
     assert found.notes == ("joint /px100/1st joint is named _px100_1st_joint", "joint 2 is named _2")
 
@@ -223,27 +225,29 @@ def test_a_joint_and_a_link_may_share_a_name_and_transmissions_do_not_count() ->
     body = document(('name="elbow"', 'name="upper"')).replace(
         b"</robot>", b'<transmission name="t"><joint name="upper"/><actuator name="m"/></transmission></robot>'
     )
-    assert [joint["name"] for joint in urdf_reader.parse(body).data["joints"]] == ["shoulder", "upper", "wrist"]
+    assert [joint["name"] for joint in urdf_reader.parse_urdf(body).data["joints"]] == ["shoulder", "upper", "wrist"]
 
 
 def test_an_empty_line_first_and_elements_of_simulators_do_no_harm() -> None:
     body = document(("<axis", '<dynamics damping="nan"/><safety_controller k_velocity="x"/><axis'))
     with_more = body.replace(b"</robot>", b'<gazebo reference="upper"><mu1>x</mu1></gazebo></robot>')
-    assert urdf_reader.parse(b'\n <?xml version="1.0"?>' + with_more).data == urdf_reader.parse(document()).data
+    assert (
+        urdf_reader.parse_urdf(b'\n <?xml version="1.0"?>' + with_more).data == urdf_reader.parse_urdf(document()).data
+    )
 
 
 def test_base_and_tip_choose_a_part_of_the_chain() -> None:
-    found = urdf_reader.parse(document(), base="upper", tip="hand")
+    found = urdf_reader.parse_urdf(document(), base="upper", tip="hand")
     assert [joint["name"] for joint in found.data["joints"]] == ["elbow", "wrist"]
     with pytest.raises(UsageError, match="there is no link hnd for the tip; the links are base, upper, lower, hand"):
-        urdf_reader.parse(document(), tip="hnd")
+        urdf_reader.parse_urdf(document(), tip="hnd")
     with pytest.raises(UsageError, match="tip base does not hang on base upper"):
-        urdf_reader.parse(document(), base="upper", tip="base")
+        urdf_reader.parse_urdf(document(), base="upper", tip="base")
 
 
 def test_a_mimic_joint_off_the_chain_is_ignored() -> None:
     more = TWO_ENDS.replace("<limit", '<mimic joint="wrist"/><limit')
-    found = urdf_reader.parse(
+    found = urdf_reader.parse_urdf(
         document(('</joint>\n<joint name="elbow', f'</joint>{more}\n<joint name="elbow')), tip="tcp"
     )
     assert len(found.data["joints"]) == 3
@@ -261,19 +265,19 @@ def test_nothing_but_the_file_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_pat
         return real(self, *words, **named)
 
     monkeypatch.setattr(Path, "open", noted)
-    urdf_reader.read(path)
+    urdf_reader.read_urdf(path)
     assert opened == [str(path)]
 
 
 def test_without_defusedxml_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "defusedxml.common", None)
     with pytest.raises(ArmkinError, match=r"pip install defusedxml"):
-        urdf_reader.parse(document())
+        urdf_reader.parse_urdf(document())
 
 
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(FileError, match=r"nowhere\.urdf: cannot read the URDF"):
-        urdf_reader.read("nowhere.urdf")
+        urdf_reader.read_urdf("nowhere.urdf")
 
 
 def rough_wrist() -> str:
@@ -290,7 +294,11 @@ def rough_wrist() -> str:
 
 def test_snapping_makes_right_angles_and_the_class_that_they_buy() -> None:
     exact, snapped = (
-        build(robot_file.parse(text(urdf_reader.parse(rough_wrist().encode(), snap=snap).data)))
+        build(
+            robot_file.parse_robot_file(
+                format_robot_file(urdf_reader.parse_urdf(rough_wrist().encode(), snap=snap).data)
+            )
+        )
         for snap in (False, True)
     )
     assert armkin.method(exact)[0] == "general elimination"
@@ -340,8 +348,8 @@ def test_exit_codes(raw: bytes, code: int, tmp_path: Path) -> None:
 
 def test_numbers_are_written_without_exponents_and_come_back() -> None:
     for value in (1e-5, -1.5e-12, 1 / 3, 123456789.123, 2e22, 0.1 + 0.2):
-        assert "e" not in number(value)
-        assert float(number(value)) == value
+        assert "e" not in number_text(value)
+        assert float(number_text(value)) == value
 
 
 def test_angles_come_back_also_where_the_pitch_is_a_quarter_turn() -> None:
@@ -351,7 +359,7 @@ def test_angles_come_back_also_where_the_pitch_is_a_quarter_turn() -> None:
     for pitch in (0.3, np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-10, -np.pi / 2 + 3e-8):
         roll, yaw = rng.uniform(-3, 3, 2)
         R = turn([0, 0, 1], yaw) @ turn([0, 1, 0], pitch) @ turn([1, 0, 0], roll)
-        r, p, y = angles(R.tolist())
+        r, p, y = rpy_angles(R.tolist())
         again = turn([0, 0, 1], y) @ turn([0, 1, 0], p) @ turn([1, 0, 0], r)
         assert np.abs(again - R).max() < 1e-15 * 8
 
@@ -367,18 +375,18 @@ def test_radii_come_from_round_collision_shapes_and_no_others() -> None:
         "hand": solid('<sphere radius="0.5"/>', "visual"),
     }
     raw = document(*((f'<link name="{name}"/>', f'<link name="{name}">{of}</link>') for name, of in links.items()))
-    data = urdf_reader.parse(raw).data
+    data = urdf_reader.parse_urdf(raw).data
     assert data["base"] == {"body": {"radius": 60.0}}
     assert [joint.get("body") for joint in data["joints"]] == [{"radius": 50.0}, None, None]
-    assert robot_file.parse(text(data)).joints[0].body is not None
+    assert robot_file.parse_robot_file(format_robot_file(data)).joints[0].body is not None
     fixed = '<link name="tcp"><collision><geometry><cylinder radius="0.02"/></geometry></collision></link>'
     joint = '<joint name="to_tcp" type="fixed"><parent link="hand"/><child link="tcp"/></joint>'
-    assert urdf_reader.parse(document(('<link name="hand"/>', f'<link name="hand"/>{fixed}{joint}'))).data["joints"][2][
-        "body"
-    ] == {"radius": 20.0}
+    assert urdf_reader.parse_urdf(document(('<link name="hand"/>', f'<link name="hand"/>{fixed}{joint}'))).data[
+        "joints"
+    ][2]["body"] == {"radius": 20.0}
     for odd in ("-1", "nan", "", "1e9", "x"):
         raw = document(('<link name="upper"/>', f'<link name="upper">{solid(f"""<sphere radius="{odd}"/>""")}</link>'))
-        assert "body" not in urdf_reader.parse(raw).data["joints"][0]
+        assert "body" not in urdf_reader.parse_urdf(raw).data["joints"][0]
 
 
 def test_shipped_file_is_data_of_this_project() -> None:

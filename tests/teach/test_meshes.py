@@ -15,8 +15,8 @@ from armkin import robot_file
 from armkin.errors import UsageError
 from armkin.model.build_arm import build
 from armkin.robot_file import urdf_reader
-from armkin.robot_file.robot_file_text import text
-from armkin.robot_file.urdf_document import document
+from armkin.robot_file.robot_file_text import format_robot_file
+from armkin.robot_file.urdf_document import parse_document
 from armkin.teach.mesh_files import read_triangles
 from armkin.teach.one_file import arm_html
 from armkin.teach.urdf_meshes import MOST, meshes_json
@@ -77,10 +77,10 @@ def written(folder: Path, mesh: str = "package://arm/meshes/link.stl") -> Path:
 
 
 def loaded(file: Path, base: list[float] | None = None) -> Any:
-    found = urdf_reader.read(file, tip="l3").data
+    found = urdf_reader.read_urdf(file, tip="l3").data
     if base is not None:
         found = {"base": {"xyz": base, "rpy": [0, 0, 30]}} | found
-    return build(robot_file.parse(text(found), "arm.yaml"))
+    return build(robot_file.parse_robot_file(format_robot_file(found), "arm.yaml"))
 
 
 def corners(drawn: dict[str, Any], body: int) -> np.ndarray:
@@ -94,9 +94,9 @@ def test_a_mesh_stands_where_the_urdf_has_it(tmp_path: Path, base: list[float] |
     arm = loaded(file, base)
     drawn = meshes_json(arm, str(file))
     poses = {"base": np.eye(4)}
-    _, robot = document(file.read_bytes(), "arm")
+    _, robot = parse_document(file.read_bytes(), "arm")
     for name, joint in (("l1", "q1"), ("l2", "q2"), ("l3", "q3")):  # at joint values 0
-        T = urdf_reader.origin(robot.parent[name], "arm")
+        T = urdf_reader.joint_origin(robot.parent[name], "arm")
         poses[name] = poses[{"l1": "base", "l2": "l1", "l3": "l2"}[name]] @ T
         assert robot.parent[name].name == joint
     frames = [np.eye(4), arm.link[0], arm.link[0] @ arm.link[1], arm.link[0] @ arm.link[1] @ arm.link[2]]

@@ -153,7 +153,7 @@ def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser, tm
     for name, colours in (("panda", "light"), ("three_dof", "dark")):
         arm = armkin.load(name)
         ends = {"moves": [{"joint": arm.home.tolist()}, {"joint": (arm.home + 0.1).tolist()}]}
-        plan = path(arm, path_file.validated(ends)) if name == "three_dof" else None
+        plan = path(arm, path_file.validate_path(ends)) if name == "three_dof" else None
         with opened(browser, written(tmp_path, name, plan), color_scheme=colours) as page:
             page.get_by_role("button", name="Copy as Python").click()
             found = Axe().run(page).response["violations"]
@@ -226,7 +226,7 @@ def test_a_fragment_that_is_no_posture_is_home(browser: Browser, tmp_path: Path)
 
 def test_a_path_is_played(browser: Browser, tmp_path: Path) -> None:
     arm = armkin.load("three_dof")
-    file = path_file.validated({"moves": [{"joint": [0, 90, -90]}, {"line": [258, 110, 367]}, {"wait": 0.2}]})
+    file = path_file.validate_path({"moves": [{"joint": [0, 90, -90]}, {"line": [258, 110, 367]}, {"wait": 0.2}]})
     plan = path(arm, file)
     with opened(browser, written(tmp_path, "three_dof", plan)) as page:
         page.locator("#when").evaluate("(bar) => { bar.value = bar.max; bar.dispatchEvent(new Event('input')); }")

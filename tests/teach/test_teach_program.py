@@ -49,7 +49,7 @@ def test_what_is_recorded_is_a_path_file(program: Program, tmp_path: Path) -> No
     assert "- {line: [334.737402, -111.192673, 295.805775], blend: 10}  # above the bin" in text
     file = tmp_path / "program.yaml"
     file.write_text(text)
-    read = path_file.read(str(file))
+    read = path_file.read_path_file(str(file))
     assert [move.kind for move in read.moves] == ["joint", "line", "arc", "wait", "grip"]
     assert (read.robot, read.tool_speed, read.speed) == ("three_dof", 100, 80)
 
@@ -191,7 +191,7 @@ def test_a_name_is_saved_as_a_path_file_may_have_it(program: Program, tmp_path: 
     assert program.names[0].isprintable()
     file = tmp_path / "named.yaml"
     file.write_text(program.text())
-    assert len(path_file.read(str(file)).moves) == len(program.moves)
+    assert len(path_file.read_path_file(str(file)).moves) == len(program.moves)
 
 
 def test_what_is_played_is_where_the_tip_is_however_long_it_takes(arm: armkin.Arm) -> None:

@@ -21,7 +21,7 @@ from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.forward import as_joints
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.robot_file.robot_file_text import text
+from armkin.robot_file.robot_file_text import format_robot_file
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -65,7 +65,7 @@ class Calibration:
     @property
     def text(self) -> str:
         """The corrected robot file."""
-        return text(self.data)
+        return format_robot_file(self.data)
 
     @property
     def kinds(self) -> list[str]:

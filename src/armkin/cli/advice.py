@@ -25,7 +25,7 @@ from armkin.errors import (
     UnfinishedError,
     UsageError,
 )
-from armkin.robot_file.catalogue import shipped
+from armkin.robot_file.catalogue import shipped_file
 
 
 def next_step(error: ArmkinError) -> str:
@@ -64,7 +64,7 @@ def _missing_keys_advice(error: ArmkinError) -> str:
     if error.fields.get("undriven"):
         return "armkin info ROBOT shows lines to add"
     name = error.fields.get("robot_file")
-    if not error.fields.get("lines_to_add") or not name or shipped(name) is None or os.path.isfile(name):
+    if not error.fields.get("lines_to_add") or not name or shipped_file(name) is None or os.path.isfile(name):
         return error.advice
     copy = f"armkin info {name} shows lines to add, to a copy: armkin export {name} --dh -o my_{name}.yaml"
     return f"{copy}\nor rehearse with --accel 60, for example" if error.fields.get("option") == "--accel" else copy

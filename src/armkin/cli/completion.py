@@ -46,7 +46,7 @@ def robots(ctx: typer.Context) -> Iterable[str]:
     """Shipped robots."""
     from armkin.robot_file import catalogue
 
-    return catalogue.names()
+    return catalogue.robot_names()
 
 
 @_without_errors

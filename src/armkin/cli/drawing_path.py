@@ -45,7 +45,7 @@ def drawing_moves(
     from armkin.motion.drawings import drawing
 
     options = {"--at": at, "--scale": scale, "--feed": feed, "--lift": lift, "--grip-by": grip_by}
-    if file is None or path_file.foreign(file) is None:
+    if file is None or path_file.drawing_language(file) is None:
         if (first := next((name for name, value in options.items() if value is not None), None)) is not None:
             raise UsageError(f"{first} belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
         return None

@@ -30,7 +30,7 @@ def record_zeros(
 
     check: compares them with the servos, where a port is named, and says which that is.
     """
-    from armkin.robot_file import parse
+    from armkin.robot_file import parse_robot_file
     from armkin.robot_file.catalogue import locate
     from armkin.robot_file.replace_values import with_values
 
@@ -46,7 +46,7 @@ def record_zeros(
     port = check(calibration)
     if out is not None:
         text = with_values(Path(locate(robot)).read_text(encoding="utf-8"), calibration.edits)
-        parse(text, out)  # nothing is written that no command would take
+        parse_robot_file(text, out)  # nothing is written that no command would take
         with output.destination(out) as write:
             write(text)
     if out == "-":

@@ -19,7 +19,7 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
 from armkin.model.build_arm import build
 from armkin.model.rotation import FLIP, inverse, transform
-from armkin.robot_file.robot_file_text import pose, text, tidy
+from armkin.robot_file.robot_file_text import format_robot_file, pose_keys, tidy
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -46,7 +46,7 @@ def screws(arm: Arm, tool: Array | None = None) -> dict[str, Any]:
         rows.append({"screw": {"w": [0, 0, 0], "v": direction} if arm.prismatic[i] else {"w": direction, "q": point}})
     tool = tool_of(arm) if tool is None else tool
     zero = T @ links[-1] @ inverse(tool)
-    return _file(arm, "screws", rows, arm.base, tool, {"zero_pose": pose(zero.tolist())})
+    return _file(arm, "screws", rows, arm.base, tool, {"zero_pose": pose_keys(zero.tolist())})
 
 
 def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
@@ -188,7 +188,7 @@ def _file(
     data: dict[str, Any] = {**head, "convention": convention}
     for key, frame in (("base", base), ("tool", tool)):
         if np.abs(frame - np.eye(4)).max() > 1e-15:
-            data[key] = pose(frame.tolist())
+            data[key] = pose_keys(frame.tolist())
     order = ("name", "type")
     data |= keys | {
         "joints": [
@@ -262,7 +262,7 @@ def differences(arm: Arm, data: dict[str, Any]) -> list[str]:
 
 
 def _built(data: dict[str, Any]) -> Arm:
-    return build(robot_file.parse(text(data), str(data["name"])))
+    return build(robot_file.parse_robot_file(format_robot_file(data), str(data["name"])))
 
 
 def _check(arm: Arm, data: dict[str, Any], links: Array) -> None:

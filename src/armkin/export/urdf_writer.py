@@ -16,7 +16,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.model.arm import actual
-from armkin.robot_file.robot_file_text import angles, number
+from armkin.robot_file.robot_file_text import number_text, rpy_angles
 from armkin.view.skeleton import shape
 
 if TYPE_CHECKING:
@@ -97,12 +97,12 @@ def _place(T: Array, parent: str, child: str) -> list[str]:
 
 def _origin(T: Array) -> str:
     xyz = " ".join(_real(x / METRE) for x in T[:3, 3])
-    rpy = " ".join(_real(angle) for angle in angles(T.tolist()))
+    rpy = " ".join(_real(angle) for angle in rpy_angles(T.tolist()))
     return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
 
 
 def _real(value: float) -> str:
-    return number(0.0 if abs(value) < 1e-18 else float(value))
+    return number_text(0.0 if abs(value) < 1e-18 else float(value))
 
 
 def _link(name: str, pieces: list[list[str]]) -> list[str]:
@@ -147,4 +147,4 @@ def _visual(material: str, origin: str, form: str) -> list[str]:
 
 def _size(value: float) -> str:
     """Millimetres of a picture, in metres."""
-    return number(round(float(value) / METRE, 7))
+    return number_text(round(float(value) / METRE, 7))

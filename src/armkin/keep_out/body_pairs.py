@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array
 from armkin.keep_out.bodies import Bodies, bodies, segment_ends
 from armkin.keep_out.shapes import Shape, shape_of
 from armkin.keep_out.shapes.segment_distances import segment_distance
-from armkin.robot_file.keep_out_keys import SELF, names, problems
+from armkin.robot_file.keep_out_keys import SELF, keep_out_names, keep_out_problems
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -134,7 +134,7 @@ class Guard:
 @lru_cache(maxsize=64)
 def guard(arm: Arm) -> Guard:
     """The pairs of an arm with keep-outs; pairs of bodies that overlap in all postures looked at are left out."""
-    entries = list(zip(names(arm.keep_out), arm.keep_out, strict=True))
+    entries = list(zip(keep_out_names(arm.keep_out), arm.keep_out, strict=True))
     obstacles = tuple((name, shape_of(entry)) for name, entry in entries if entry.kind != SELF)
     if not any(entry.kind == SELF for _, entry in entries):
         return _guard_of_pairs(arm, obstacles, [], ())
@@ -198,7 +198,7 @@ def _radical_inverse(index: int, base: int) -> float:
 def check_keep_out(arm: Arm) -> None:
     """Raise RobotFileError for names that clash, and for an obstacle that is hit in every posture looked at."""
     source = arm.scene or arm.path or arm.name
-    for path, text in problems(arm.keep_out, ["base", *arm.joint_names]):
+    for path, text in keep_out_problems(arm.keep_out, ["base", *arm.joint_names]):
         raise RobotFileError(f"{source}: keep_out {int(path[1]) + 1}: {text}", file=source)
     held = guard(arm)
     apart = held.clearances(sample_postures(arm))

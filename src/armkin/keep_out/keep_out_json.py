@@ -10,7 +10,7 @@ from armkin.forward import frames
 from armkin.keep_out.bodies import segment_ends
 from armkin.keep_out.body_pairs import guard
 from armkin.keep_out.clearance import hits
-from armkin.robot_file.keep_out_keys import names
+from armkin.robot_file.keep_out_keys import keep_out_names
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -36,7 +36,7 @@ def keep_out_fields(arm: Arm) -> dict[str, Any]:
     [(_, at_home)] = hits(arm, home)
     return {
         "clearance_mm": arm.clearance,
-        "keep_out": names(arm.keep_out),
+        "keep_out": keep_out_names(arm.keep_out),
         "bodies": bodies,
         "pairs_left_out": [list(pair) for pair in held.left_out],
         "hits_at_home": at_home,

@@ -39,11 +39,11 @@ def load(
     """
     from armkin import robot_file
 
-    file, around = robot_file.read(path), None
+    file, around = robot_file.read_robot_file(path), None
     if scene is not None:
-        from armkin.robot_file.scene_file import read
+        from armkin.robot_file.scene_file import read_scene
 
-        around = read(scene)
+        around = read_scene(scene)
     return arm_in_scene(file, around, tool)
 
 

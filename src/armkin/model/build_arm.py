@@ -25,7 +25,7 @@ def load(path: str | PathLike[str]) -> Arm:
     """
     from armkin import robot_file
 
-    return build(robot_file.read(path))
+    return build(robot_file.read_robot_file(path))
 
 
 def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:

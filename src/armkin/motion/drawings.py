@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from armkin.errors import UsageError
 from armkin.model.arm import Arm
 from armkin.motion.tool_path.drawing_frame import place_drawing
-from armkin.path_file import PathFile, foreign, read_drawing
+from armkin.path_file import PathFile, drawing_language, read_drawing
 from armkin.path_file.drawing import DrawingOptions
 
 
@@ -50,7 +50,7 @@ def drawing(
     [324.0, -44.0, 205.0]
     """
     name = os.fspath(file)
-    if foreign(name) is None:
+    if drawing_language(name) is None:
         raise UsageError(f"{name}: a drawing's name ends in .gcode, .gco, .nc, .ngc or .svg")
     if len(at) not in (3, 6):
         raise UsageError(f"at: where the drawing's zero lies is x y z, or x y z roll pitch yaw; got {len(at)} numbers")

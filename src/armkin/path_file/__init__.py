@@ -37,97 +37,99 @@ __all__ = [
     "Move",
     "PathFile",
     "check_robot",
-    "foreign",
+    "drawing_language",
     "json_schema",
-    "parse",
-    "read",
+    "parse_path_file",
     "read_drawing",
-    "validated",
+    "read_path_file",
+    "validate_path",
 ]
 
 
-def read(name: str) -> PathFile:
+def read_path_file(name: str) -> PathFile:
     """Read a path file, by its ending YAML or CSV. Raises FileError, or PathFileError with the line."""
-    if foreign(name):
+    if drawing_language(name):
         raise PathFileError(
             f"{name}: a drawing does not say where its zero lies for the arm; armkin.drawing(arm, file, at) does",
             file=name,
         )
-    return parse(_bytes(name), name)
+    return parse_path_file(_read_bytes(name), name)
 
 
-def foreign(name: str) -> str | None:
+def drawing_language(name: str) -> str | None:
     """Which language a file that only draws is in, by its ending: gcode, svg; None: it is a path file."""
     return _FOREIGN.get(os.path.splitext(name)[1].lower())
 
 
 def read_drawing(name: str, placing: Placing, options: DrawingOptions) -> PathFile:
     """Read G-code or SVG as a path. Raises FileError, or PathFileError with line and word."""
-    raw = _bytes(name)
-    if foreign(name) == "svg":
+    raw = _read_bytes(name)
+    if drawing_language(name) == "svg":
         from armkin.path_file import svg
 
-        return svg.parse(raw, name, placing, options)
+        return svg.parse_svg(raw, name, placing, options)
     from armkin.path_file import gcode
 
-    return gcode.parse(raw, name, placing, options)
+    return gcode.parse_gcode(raw, name, placing, options)
 
 
-def _bytes(name: str) -> bytes:
+def _read_bytes(name: str) -> bytes:
     try:
         with open(name, "rb") as file:
             raw = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        hint = _alike(name) if isinstance(error, FileNotFoundError) else ""
+        hint = _similar_files_text(name) if isinstance(error, FileNotFoundError) else ""
         raise FileError(f"{name}: cannot read the path file: {reason}{hint}", file=name) from None
     if len(raw) > LARGEST:
         raise FileError(f"{name} is larger than {LARGEST // 1_000_000} MB: this is no path file", file=name)
     return raw
 
 
-def parse(raw: bytes | str, name: str = "path.yaml") -> PathFile:
+def parse_path_file(raw: bytes | str, name: str = "path.yaml") -> PathFile:
     """Validate the text of a path; `name` is what messages call it. Text without a colon in its head is CSV."""
-    data = raw.encode() if isinstance(raw, str) else raw
-    if not data.strip():
-        raise _invalid(name, [(0, "the path is empty; it needs moves, or one row of CSV a corner")])
-    if name.endswith(".csv") or not (name.endswith((".yaml", ".yml")) or _is_yaml(data)):
+    encoded = raw.encode() if isinstance(raw, str) else raw
+    if not encoded.strip():
+        raise _invalid_error(name, [(0, "the path is empty; it needs moves, or one row of CSV a corner")])
+    if name.endswith(".csv") or not (name.endswith((".yaml", ".yml")) or _is_yaml(encoded)):
         from armkin.path_file import csv_path
 
-        return csv_path.parse(data, name)
+        return csv_path.parse_csv(encoded, name)
     try:
-        document = strict_yaml.loads(data, _KIND)
+        document = strict_yaml.load_yaml(encoded, _KIND)
     except strict_yaml.StrictYamlError as error:
-        raise _invalid(name, [(error.line, error.problem)]) from None
+        raise _invalid_error(name, [(error.line, error.problem)]) from None
     try:
-        return PathFile.model_validate(_lists(document.data)).read_from(Source(name, document.lines))
+        return PathFile.model_validate(_tuples_to_lists(document.data)).read_from(Source(name, document.lines))
     except ValidationError as error:
         from armkin.path_file import path_key_errors
 
-        raise _invalid(name, [(document.line(at), text) for at, text in path_key_errors.problems(error)]) from None
+        raise _invalid_error(
+            name, [(document.line(key), text) for key, text in path_key_errors.problems(error)]
+        ) from None
 
 
-def validated(data: dict[str, Any], name: str = "path") -> PathFile:
+def validate_path(data: dict[str, Any], name: str = "path") -> PathFile:
     """Validate a path that is data already, as the page or a program has it."""
     try:
-        return PathFile.model_validate(_lists(data))
+        return PathFile.model_validate(_tuples_to_lists(data))
     except ValidationError as error:
         from armkin.path_file import path_key_errors
 
-        raise _invalid(name, [(0, text) for _, text in path_key_errors.problems(error)]) from None
+        raise _invalid_error(name, [(0, text) for _, text in path_key_errors.problems(error)]) from None
 
 
 def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:
     """Raise PathFileError if a path says that it is of another robot than this, by its name or its file."""
-    said = file.robot
+    stated = file.robot
     if (
-        said is None
-        or said in (name, robot_file)
-        or (robot_file is not None and _is_same_robot(said, robot_file, file.folder))
+        stated is None
+        or stated in (name, robot_file)
+        or (robot_file is not None and _is_same_robot(stated, robot_file, file.folder))
     ):
         return
     raise PathFileError(
-        f"{file.place('robot')}: this is a path of {said}, and the arm is {name}; plan it for {said}, "
+        f"{file.place('robot')}: this is a path of {stated}, and the arm is {name}; plan it for {stated}, "
         f"or write robot: {name} if it is meant for this arm",
         robot=name,
     )
@@ -135,9 +137,9 @@ def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:
 
 def _is_same_robot(stated: str, robot_file: str, folder: str) -> bool:
     """Whether a shipped robot's name, or a file's as seen from here or from the path's folder, is the robot file."""
-    for one in (stated, os.path.join(folder, stated)):
+    for robot in (stated, os.path.join(folder, stated)):
         with suppress(OSError, ValueError, FileError):
-            if os.path.samefile(catalogue.locate(one), catalogue.locate(robot_file)):
+            if os.path.samefile(catalogue.locate(robot), catalogue.locate(robot_file)):
                 return True
     return False
 
@@ -149,24 +151,24 @@ def json_schema() -> dict[str, Any]:
     return made_from(PathFile, "armkin path file")
 
 
-def _alike(name: str) -> str:
+def _similar_files_text(name: str) -> str:
     """Path files of the same folder with such a name, as the end of a message."""
     import difflib
 
     folder = Path(name).parent
     try:
-        there = [one.name for one in folder.iterdir() if one.suffix in (".yaml", ".yml", ".csv")]
+        names = [file.name for file in folder.iterdir() if file.suffix in (".yaml", ".yml", ".csv")]
     except OSError:
         return f"; there is no folder {folder}"
-    near = difflib.get_close_matches(Path(name).name, there, 1)
+    near = difflib.get_close_matches(Path(name).name, names, 1)
     return f"; did you mean {folder / near[0]}?" if near else ""
 
 
-def _lists(value: Any) -> Any:
+def _tuples_to_lists(value: Any) -> Any:
     """Data with its tuples (the reader's, or a program's) turned into lists."""
     if isinstance(value, Mapping):
-        return {key: _lists(part) for key, part in value.items()}
-    return [_lists(part) for part in value] if isinstance(value, list | tuple) else value
+        return {key: _tuples_to_lists(part) for key, part in value.items()}
+    return [_tuples_to_lists(part) for part in value] if isinstance(value, list | tuple) else value
 
 
 def _is_yaml(data: bytes) -> bool:
@@ -178,7 +180,7 @@ def _is_yaml(data: bytes) -> bool:
     return True
 
 
-def _invalid(name: str, problems: list[tuple[int, str]]) -> PathFileError:
-    told = [f"{name}:{line}: {text}" if line else f"{name}: {text}" for line, text in sorted(problems)]
-    more = f"\n{len(told) - 2} more problems" if len(told) > 2 else ""
-    return PathFileError("\n".join(told[:2]) + more, problems=told, file=name)
+def _invalid_error(name: str, problems: list[tuple[int, str]]) -> PathFileError:
+    lines = [f"{name}:{line}: {text}" if line else f"{name}: {text}" for line, text in sorted(problems)]
+    more_text = f"\n{len(lines) - 2} more problems" if len(lines) > 2 else ""
+    return PathFileError("\n".join(lines[:2]) + more_text, problems=lines, file=name)

@@ -19,7 +19,7 @@ Row = tuple[int, list[str]]  # its number in the file, its cells
 _UNITS = ("_mm", "_deg", "/mm", "/deg")
 
 
-def parse(raw: bytes, name: str) -> PathFile:
+def parse_csv(raw: bytes, name: str) -> PathFile:
     """Rows as moves: a point first, then lines (targets), or joint moves (joint names).
 
     Targets without a blend column are dense points: corners are passed by the tolerance.
@@ -42,7 +42,7 @@ def parse(raw: bytes, name: str) -> PathFile:
         )
     if not rows:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
-    moves = [_move(header, row, first=not k, line=(name, number)) for k, (number, row) in enumerate(rows)]
+    moves = [_row_to_move(header, row, first=not k, line=(name, number)) for k, (number, row) in enumerate(rows)]
     places: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}
     smooth = moves[0].point is not None and "blend" not in (header or ())
     return PathFile.model_construct(moves=moves, corners="tolerance" if smooth else None).read_from(
@@ -52,14 +52,14 @@ def parse(raw: bytes, name: str) -> PathFile:
 
 def _header_and_rows(rows: list[Row], name: str) -> tuple[list[str] | None, list[Row]]:
     """The columns' names, None where the first row has numbers alone, and the rows below without a batch's words."""
-    if all(_value(cell) is not None for cell in rows[0][1]):
+    if all(_cell_number(cell) is not None for cell in rows[0][1]):
         return None, rows
-    kept = [i for i, cell in enumerate(rows[0][1]) if cell.strip() not in _OF_ANSWERS]
-    first, *rest = [(number, [row[i] for i in kept if i < len(row)]) for number, row in rows]
-    return _header(first[1], name), rest
+    indices = [i for i, cell in enumerate(rows[0][1]) if cell.strip() not in _OF_ANSWERS]
+    first, *rows_below = [(number, [row[i] for i in indices if i < len(row)]) for number, row in rows]
+    return _check_header(first[1], name), rows_below
 
 
-def _header(cells: list[str], name: str) -> list[str]:
+def _check_header(cells: list[str], name: str) -> list[str]:
     """The columns' names: of targets or of joints, each once."""
     header = [_cell_text(cell) for cell in cells]
     if doubled := sorted({key for key in header if header.count(key) > 1}):
@@ -92,20 +92,20 @@ def _numbers_by_column(header: list[str] | None, row: list[str], line: tuple[str
     """A row's numbers by their columns, by their places without a header; an empty cell of an option is none."""
     values: dict[str, float] = {}
     for i, cell in enumerate(row):
-        value, key = _value(cell), f"{i}" if header is None else header[i] if i < len(header) else ""
+        value, key = _cell_number(cell), f"{i}" if header is None else header[i] if i < len(header) else ""
         if value is None and key in _OPTIONS and not cell.strip():
             continue
         if value is None or abs(value) > LARGEST:
-            what = "is no number" if value is None else f"is beyond {LARGEST:g}"
-            raise PathFileError(f"{line[0]}:{line[1]}: '{cell[:40]}' {what}", file=line[0], line=line[1])
+            problem = "is no number" if value is None else f"is beyond {LARGEST:g}"
+            raise PathFileError(f"{line[0]}:{line[1]}: '{cell[:40]}' {problem}", file=line[0], line=line[1])
         values[key] = value
     if len(row) != len(header or row):
-        what = f"{len(row)} cells, {len(header or [])} columns"
-        raise PathFileError(f"{line[0]}:{line[1]}: {what}", file=line[0], line=line[1])
+        problem = f"{len(row)} cells, {len(header or [])} columns"
+        raise PathFileError(f"{line[0]}:{line[1]}: {problem}", file=line[0], line=line[1])
     return values
 
 
-def _move(header: list[str] | None, row: list[str], *, first: bool, line: tuple[str, int]) -> Move:
+def _row_to_move(header: list[str] | None, row: list[str], *, first: bool, line: tuple[str, int]) -> Move:
     named = _numbers_by_column(header, row, line)
     extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
     if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < LEAST_TOOL_SPEED:
@@ -130,7 +130,7 @@ def _cell_text(cell: str) -> str:
     return text
 
 
-def _value(cell: str) -> float | None:
+def _cell_number(cell: str) -> float | None:
     if len(cell) > 100:
         return None
     try:

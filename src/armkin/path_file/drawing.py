@@ -32,10 +32,10 @@ class Placing:
 
     def points(self, points: Iterable[Sequence[float]]) -> list[list[float]]:
         """Points of the drawing in the arm's frame."""
-        k, (ox, oy, oz), ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = self.scale, self.origin, self.axes
+        k, (ox, oy, oz), ((ax, ay, az), (bx, by_, bz), (cx, cy, cz)) = self.scale, self.origin, self.axes
         scaled = ((x * k, y * k, z * k) for x, y, z in points)
         return [
-            [ox + ax * x + ay * y + az * z, oy + bx * x + by * y + bz * z, oz + cx * x + cy * y + cz * z]
+            [ox + ax * x + ay * y + az * z, oy + bx * x + by_ * y + bz * z, oz + cx * x + cy * y + cz * z]
             for x, y, z in scaled
         ]
 
@@ -72,9 +72,9 @@ class Pen:
     def line(self, p: Sequence[float], speed: float | None, line: int) -> None:
         """A straight line; speed: [mm/s], None: as fast as the joints go."""
         if self._open is None or speed != self._speed:
-            own = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
+            speed_key = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
             opened: list[Sequence[float]] = []
-            self._add(Move.model_construct({"polyline"}, polyline=opened, **own), line)
+            self._add(Move.model_construct({"polyline"}, polyline=opened, **speed_key), line)
             self._open, self._speed = opened, speed
             self._drawn.append(opened)
         self._open.append(p)
@@ -85,32 +85,33 @@ class Pen:
     ) -> None:
         """An arc or helix from a to b about an axis, by an angle [rad] (positive: right-handed)."""
         self.points += 1
-        own = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
+        speed_key = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
         rise = sum(n * (y - x) for n, x, y in zip(normal, a, b, strict=True))
-        out = [x - c for x, c in zip(a, centre, strict=True)]
-        lift = sum(n * o for n, o in zip(normal, out, strict=True))
-        out = [o - lift * n for o, n in zip(out, normal, strict=True)]
-        radius = math.sqrt(sum(o * o for o in out))
+        radial = [x - c for x, c in zip(a, centre, strict=True)]
+        lift = sum(n * o for n, o in zip(normal, radial, strict=True))
+        radial = [o - lift * n for o, n in zip(radial, normal, strict=True)]
+        radius = math.sqrt(sum(o * o for o in radial))
         if radius < _NO_ARC:
             self.line(b, speed, line)
             return
-        base = [x - o for x, o in zip(a, out, strict=True)]
+        base = [x - o for x, o in zip(a, radial, strict=True)]
         if abs(rise) < _NO_ARC and abs(angle) < _THREE_POINTS:
-            across = cross(normal, (out[0], out[1], out[2]))
+            across = cross(normal, (radial[0], radial[1], radial[2]))
             end = math.dist(base, b)  # it may differ a little from the radius at the start
             half, mean = angle / 2, (radius + end) / 2 / radius
             via = [
-                c + mean * (math.cos(half) * o + math.sin(half) * w) for c, o, w in zip(base, out, across, strict=True)
+                c + mean * (math.cos(half) * o + math.sin(half) * w)
+                for c, o, w in zip(base, radial, across, strict=True)
             ]
             made = Arc.model_construct(via=self.placing.point(via), to=self.placing.point(b))
-            self._add(Move.model_construct({"arc"}, arc=made, **own), line)
+            self._add(Move.model_construct({"arc"}, arc=made, **speed_key), line)
             return
         direction = self.placing.direction(normal)
         turns, scale = angle / _FULL, self.placing.scale
         made_circle = Circle.model_construct(
             centre=self.placing.point(base), normal=direction, turns=turns, rise=rise * scale
         )
-        self._add(Move.model_construct({"circle"}, circle=made_circle, **own), line)
+        self._add(Move.model_construct({"circle"}, circle=made_circle, **speed_key), line)
 
     def home(self, line: int) -> None:
         """A joint move home."""

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from armkin.errors import PathFileError
 from armkin.path_file import gcode_arcs
 from armkin.path_file.drawing import LARGEST, DrawingOptions, Pen, Placing, Point
-from armkin.path_file.gcode_words import PLAIN, Words, lines, words_of, wrong
+from armkin.path_file.gcode_words import PLAIN, Words, line_error, lines, words_of
 from armkin.path_file.path_keys import MOST_POINTS, PathFile
 
 AXES = "XYZ"
@@ -37,7 +37,7 @@ _KNOWN_G = {*_GROUP, *_IGNORED_G, 53.0}
 _PAUSES, _ENDS = (0.0, 1.0), (2.0, 30.0)  # M codes
 
 
-def parse(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> PathFile:
+def parse_gcode(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> PathFile:
     """The path of a program. Raises PathFileError with line and word for what is refused."""
     if b"\0" in raw:
         line = raw.partition(b"\0")[0].count(b"\n") + 1
@@ -73,17 +73,17 @@ class _Program:
         """Read lines until the program's end."""
         for self.line, text in program:
             if self.pen.points > MOST_POINTS:
-                raise self._wrong(f"is behind {MOST_POINTS} points, and a path has no more: give the program in parts")
+                raise self._error(f"is behind {MOST_POINTS} points, and a path has no more: give the program in parts")
             plain = PLAIN.fullmatch(text)
             if plain is not None and self._plain_line(*plain.groups()):
                 continue
             self.words = words_of(text, self.name, self.line)
-            if self._line():
+            if self._do_line():
                 return
 
-    def _plain_line(self, g: str | None, early: str | None, *rest: str | None) -> bool:
+    def _plain_line(self, g: str | None, early: str | None, *words: str | None) -> bool:
         """Do a line of G0 or G1, F, X, Y, Z, E alone as `_line` does, sooner; False: `_line` has to."""
-        *axes, e, late = rest
+        *axes, e, late = words
         motion = self.motion if g is None else float(g)
         if motion is None or motion > 1 or not (early is None or late is None):
             return False
@@ -94,19 +94,19 @@ class _Program:
             self._ignore("E")
         if axes != _NO_AXES:
             goal = self._goal([number if number is None else float(number) for number in axes], machine=False)
-            self._straight(goal, _MOTION[motion])
+            self._move_straight(goal, _MOTION[motion])
         return True
 
-    def _wrong(self, text: str) -> PathFileError:
-        return wrong(self.name, self.line, text)
+    def _error(self, text: str) -> PathFileError:
+        return line_error(self.name, self.line, text)
 
     def _ignore(self, word: str) -> None:
         self.ignored[word] += 1
         self.first.setdefault(word, self.line)
 
-    def _line(self) -> bool:
+    def _do_line(self) -> bool:
         """One line, in RS-274's order of execution; True: the program ends."""
-        codes, m_codes, values = self._sorted()
+        codes, m_codes, values = self._sort_words()
         self._take_feed(codes, values)
         gripped = values.pop("S", None)
         for switch in (code for code in m_codes if code not in _PAUSES + _ENDS):
@@ -116,12 +116,12 @@ class _Program:
             self._ignore("S")
         if 4.0 in codes:
             self._dwell(values, gripped)
-        self._modes(codes)
+        self._set_modes(codes)
         self._passed_over(codes, values)
         self._offsets_and_motion(codes, values)
         if values:
             letter = next(iter(values))
-            raise self._wrong(f"{letter} belongs to no word of this line")
+            raise self._error(f"{letter} belongs to no word of this line")
         for _ in (code for code in m_codes if code in _PAUSES):
             self.pen.pause(self.line)
         return not set(m_codes).isdisjoint(_ENDS)
@@ -130,7 +130,7 @@ class _Program:
         if "F" in values:
             self.feed = values.pop("F") * self._unit_after(codes)
             if self.feed < 0:
-                raise self._wrong("F below 0 is no feed")
+                raise self._error("F below 0 is no feed")
 
     def _passed_over(self, codes: list[float], values: dict[str, float]) -> None:
         """G codes without a meaning for an arm, and the words that belong to them."""
@@ -142,7 +142,7 @@ class _Program:
                 if code == 64.0:
                     values.pop("P", None)
 
-    def _sorted(self) -> tuple[list[float], list[float], dict[str, float]]:
+    def _sort_words(self) -> tuple[list[float], list[float], dict[str, float]]:
         """The line's G and M codes, and its other words."""
         codes: list[float] = []
         m_codes: list[float] = []
@@ -152,10 +152,10 @@ class _Program:
             if letter == "G":
                 code = round(number, 2)
                 if code not in _KNOWN_G:
-                    raise self._wrong(f"{word} is not known")
+                    raise self._error(f"{word} is not known")
                 group = _GROUP.get(code, word)
                 if group in groups and code in _GROUP:
-                    raise self._wrong(f"{groups[group]} and {word} stand on one line")
+                    raise self._error(f"{groups[group]} and {word} stand on one line")
                 groups[group] = word
                 codes.append(code)
             elif letter == "M":
@@ -163,7 +163,7 @@ class _Program:
             elif letter in "TEO":  # O: the number that a CAM program has on its first line
                 self._ignore(letter)
             elif letter in values:
-                raise self._wrong(f"{letter} stands twice on one line")
+                raise self._error(f"{letter} stands twice on one line")
             else:
                 values[letter] = number
         return codes, m_codes, values
@@ -173,10 +173,10 @@ class _Program:
 
     def _switch(self, code: float, speed: float | None) -> None:
         """An M word: the gripper's, or ignored."""
-        by, close = self.options.grip_by, None
-        if by == "M3" and code in (3.0, 4.0, 5.0):
+        grip_word, close = self.options.grip_by, None
+        if grip_word == "M3" and code in (3.0, 4.0, 5.0):
             close = code != 5.0
-        elif by == "M106" and code in (106.0, 107.0):
+        elif grip_word == "M106" and code in (106.0, 107.0):
             close = code == 106.0 and speed != 0
         if close is None:
             self._ignore(f"M{code:g}")
@@ -190,11 +190,11 @@ class _Program:
         if time is None:
             time = 0.0
         if not 0 <= time <= 86400:
-            raise self._wrong(f"G4 waits 0 to 86400 seconds, not {time:g}")
+            raise self._error(f"G4 waits 0 to 86400 seconds, not {time:g}")
         if time > 0:
             self.pen.wait(time, self.line)
 
-    def _modes(self, codes: list[float]) -> None:
+    def _set_modes(self, codes: list[float]) -> None:
         for code in codes:
             if code in _PLANES:
                 self.plane = code
@@ -219,7 +219,7 @@ class _Program:
             self._set_shift(values, 52.0 in codes)
         elif not _PLACES.isdisjoint(values):
             if 4.0 in codes or 29.0 in codes:
-                raise self._wrong("an axis' word beside G4")
+                raise self._error("an axis' word beside G4")
             self._move(values, machine=53.0 in codes)
 
     def _set_system(self, values: dict[str, float]) -> None:
@@ -230,10 +230,10 @@ class _Program:
             values.clear()
             return
         if kind not in (2.0, 20.0):
-            raise self._wrong(f"G10 L{kind:g} is not known; L2 and L20 are")
+            raise self._error(f"G10 L{kind:g} is not known; L2 and L20 are")
         number = int(values.pop("P", 0.0)) or self.system
         if number not in self.systems:
-            raise self._wrong(f"G10 P{number} is no coordinate system; 1 to 6 are")
+            raise self._error(f"G10 P{number} is no coordinate system; 1 to 6 are")
         zero = self.systems[number]
         for k, letter in enumerate(AXES):
             if letter in values:
@@ -243,11 +243,11 @@ class _Program:
     def _set_shift(self, values: dict[str, float], local: bool) -> None:
         """G52 sets a local zero, G92 one so that the present point has these values."""
         word = "G52" if local else "G92"
-        given = [(k, values.pop(letter) * self.unit) for k, letter in enumerate(AXES) if letter in values]
-        if not given and not any(letter == "E" for letter, *_ in self.words):
-            raise self._wrong(f"{word} needs X, Y or Z")
+        values_by_axis = [(k, values.pop(letter) * self.unit) for k, letter in enumerate(AXES) if letter in values]
+        if not values_by_axis and not any(letter == "E" for letter, *_ in self.words):
+            raise self._error(f"{word} needs X, Y or Z")
         zero = self.systems[self.system]
-        for k, value in given:
+        for k, value in values_by_axis:
             if local:
                 self.local[k] = value
             else:
@@ -262,30 +262,30 @@ class _Program:
                 start = zero[k] + self.local[k] + self.shift[k] if self.absolute else goal[k]
                 goal[k] = value if machine else start + value
                 if not abs(goal[k]) <= LARGEST:
-                    raise self._wrong(f"{AXES[k]}{value:g} is farther away than {LARGEST:g} mm")
+                    raise self._error(f"{AXES[k]}{value:g} is farther away than {LARGEST:g} mm")
         return goal[0], goal[1], goal[2]
 
     def _move(self, values: dict[str, float], machine: bool) -> None:
         if self.motion is None:
-            raise self._wrong("axes' words, and neither G0, G1, G2 nor G3 before them")
+            raise self._error("axes' words, and neither G0, G1, G2 nor G3 before them")
         word = _MOTION[self.motion]
         if machine and self.motion > 1:
-            raise self._wrong(f"G53 goes with G0 and G1, not with {word}")
+            raise self._error(f"G53 goes with G0 and G1, not with {word}")
         goal = self._goal([values.pop(letter, None) for letter in AXES], machine)
         if self.motion <= 1:
-            self._straight(goal, word)
+            self._move_straight(goal, word)
             return
         try:
             centre, normal, angle = gcode_arcs.arc(word, _PLANES[self.plane], values, self.unit, self.position, goal)
         except gcode_arcs.ArcError as error:
-            raise self._wrong(str(error)) from None
+            raise self._error(str(error)) from None
         speed = self._speed(word)
         if not self.drawn:
             self.pen.jump(self.position, self.line)
         self.pen.arc(self.position, centre, goal, normal, angle, speed, self.line)
         self.position, self.drawn = goal, True
 
-    def _straight(self, goal: Point, word: str) -> None:
+    def _move_straight(self, goal: Point, word: str) -> None:
         """A line by G0 or G1; to the first point, a joint move."""
         speed = None if word == "G0" else self._speed(word)
         if not self.drawn:
@@ -299,5 +299,5 @@ class _Program:
         if self.feed is None:
             return self.options.feed
         if self.feed == 0:
-            raise self._wrong(f"{word} with F0 never arrives")
+            raise self._error(f"{word} with F0 never arrives")
         return self.feed / 60

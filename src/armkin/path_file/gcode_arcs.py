@@ -27,10 +27,10 @@ def arc(
     if turns != int(turns) or not 1 <= turns <= 1000:
         raise ArcError(f"{word} P{turns:g}: turns are whole, 1 to 1000")
     centre = _centre(word, plane, values, unit, a, b, sense)
-    radius, off = _radius(plane, centre, a, b)
-    if off > _OFF[2] or (off > _OFF[0] and off > _OFF[1] * radius):
-        raise ArcError(f"{word} ends {off:.4g} mm off its circle of {radius:.6g} mm")
-    centre = _evened(plane, centre, a, b, off)
+    radius, miss = _radius(plane, centre, a, b)
+    if miss > _OFF[2] or (miss > _OFF[0] and miss > _OFF[1] * radius):
+        raise ArcError(f"{word} ends {miss:.4g} mm off its circle of {radius:.6g} mm")
+    centre = _equalised_centre(plane, centre, a, b, miss)
     u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
     angle = sense * (math.atan2(v[1], v[0]) - math.atan2(u[1], u[0])) % (2 * math.pi)
     same = math.hypot(a[x] - b[x], a[y] - b[y]) < 1e-9 * max(radius, 1.0)
@@ -63,7 +63,7 @@ def _radius(plane: tuple[int, int, int], centre: Point, a: Point, b: Point) -> t
     return radius, abs(math.hypot(b[x] - centre[x], b[y] - centre[y]) - radius)
 
 
-def _evened(plane: tuple[int, int, int], centre: Point, a: Point, b: Point, miss: float) -> Point:
+def _equalised_centre(plane: tuple[int, int, int], centre: Point, a: Point, b: Point, miss: float) -> Point:
     """The centre as far from both ends: what arcs miss, one after another, would add up. miss: see `_radius`."""
     x, y, _ = plane
     chord = b[x] - a[x], b[y] - a[y]

@@ -23,7 +23,7 @@ PLAIN = re.compile(rf"(?:G0?([01]) ?)?{_FEED}(?:X{_PLACE} ?)?(?:Y{_PLACE} ?)?(?:
 Words = tuple[tuple[str, float, str], ...]  # letter, number, as written
 
 
-def wrong(name: str, line: int, text: str) -> PathFileError:
+def line_error(name: str, line: int, text: str) -> PathFileError:
     """The error of a line of a file."""
     return PathFileError(f"{name}:{line}: {text}", file=name, line=line)
 
@@ -41,61 +41,63 @@ def lines(text: str, name: str) -> Iterator[tuple[int, str]]:
         if "(" in line or ")" in line:
             line = _COMMENT.sub(" ", line)
             if "(" in line or ")" in line:
-                raise wrong(name, number, "a comment's bracket ( or ) has no partner")
+                raise line_error(name, number, "a comment's bracket ( or ) has no partner")
         if not line or line.isspace():
             continue
         if "*" in line:
-            line = _checked(line, raw, name, number)
+            line = _strip_checksum(line, raw, name, number)
         yield number, line
 
 
-def _checked(line: str, raw: str, name: str, number: int) -> str:
+def _strip_checksum(line: str, raw: str, name: str, number: int) -> str:
     """A line without its comments and its checksum: the exclusive or of all bytes before the star, comments too."""
-    found = _CHECKSUM.search(line)
-    if found is None:
-        raise wrong(name, number, f"'{line[line.index('*') :].strip()[:20]}' is no checksum: * and a number up to 255")
-    body, total = line[: found.start()], 0
+    checksum = _CHECKSUM.search(line)
+    if checksum is None:
+        raise line_error(
+            name, number, f"'{line[line.index('*') :].strip()[:20]}' is no checksum: * and a number up to 255"
+        )
+    body, total = line[: checksum.start()], 0
     for byte in raw[: raw.split(";", 1)[0].rindex("*")].encode("utf-8", "replace"):
         total ^= byte
-    if total != int(found[1]):
-        raise wrong(name, number, f"its checksum is {total}, and it says *{found[1]}: the line was damaged")
+    if total != int(checksum[1]):
+        raise line_error(name, number, f"its checksum is {total}, and it says *{checksum[1]}: the line was damaged")
     return body
 
 
 def _why_no_words(line: str, packed: str) -> str:
     """What is wrong with a line that is more than words; packed: the line without its blanks."""
-    at = 0
-    while (one := _WORD.match(packed, at)) is not None:
-        at = one.end()
-    rest = packed[at:]
-    if rest[0] in "#=[]" or rest[1:2] in ("#", "["):
-        return f"'{rest[:20]}': expressions, parameters and macros are not known"
-    near = next((some for some in line.split() if not _is_words(some)), rest)
+    index = 0
+    while (word := _WORD.match(packed, index)) is not None:
+        index = word.end()
+    unread = packed[index:]
+    if unread[0] in "#=[]" or unread[1:2] in ("#", "["):
+        return f"'{unread[:20]}': expressions, parameters and macros are not known"
+    near = next((part for part in line.split() if not _is_words(part)), unread)
     return f"'{near[:20]}' is no word of G-code: a letter and a number, such as X10"
 
 
 def words_of(line: str, name: str, number: int) -> Words:
     """The words of a line. Raises PathFileError with line and word."""
     line = line.upper()
-    own = _OWN_WORDS.match(line) if "M" in line else None
-    if own is not None and own[1] is not None and int(own[1]) not in _MACHINE_M:
+    own_words = _OWN_WORDS.match(line) if "M" in line else None
+    if own_words is not None and own_words[1] is not None and int(own_words[1]) not in _MACHINE_M:
         # M201 X500: what follows is the M word's own; of a fan the S counts
-        speed = re.search(r"\bS\s*([0-9.]+)", line[own.end() :])
-        word = ("M", float(own[1]), f"M{int(own[1])}")
+        speed = re.search(r"\bS\s*([0-9.]+)", line[own_words.end() :])
+        word = ("M", float(own_words[1]), f"M{int(own_words[1])}")
         return (word, ("S", _number(speed[1]), "S")) if speed else (word,)
     if len(line) > _LONGEST:
-        raise wrong(name, number, f"has {len(line)} characters; a line of G-code has at most {_LONGEST}")
+        raise line_error(name, number, f"has {len(line)} characters; a line of G-code has at most {_LONGEST}")
     if "28" in line and _HOME.match(line) is not None:
         line = _FLAG.sub(" ", line)
     packed = "".join(line.split())
     if packed.startswith("/"):
-        raise wrong(name, number, "'/' marks a line that a machine's switch leaves out: write it or leave it out")
-    found = _WORD.findall(packed)
-    words = [letter + number for letter, number in found]
+        raise line_error(name, number, "'/' marks a line that a machine's switch leaves out: write it or leave it out")
+    pairs = _WORD.findall(packed)
+    words = [letter + number for letter, number in pairs]
     if "".join(words) != packed:
-        raise wrong(name, number, _why_no_words(line, packed))
+        raise line_error(name, number, _why_no_words(line, packed))
     return tuple(
-        (letter, float(number), word) for (letter, number), word in zip(found, words, strict=True) if letter != "N"
+        (letter, float(number), word) for (letter, number), word in zip(pairs, words, strict=True) if letter != "N"
     )
 
 

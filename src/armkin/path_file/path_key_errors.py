@@ -25,26 +25,26 @@ _SYNONYMS = {
 def problems(error: ValidationError) -> Iterator[tuple[Place, str]]:
     """Places and texts, each place once: of a key that takes several shapes, the shape that came nearest."""
     best: dict[Place, Any] = {}
-    for one in error.errors(include_url=False):
-        at = _place(one["loc"])
-        if at not in best or len(one["loc"]) > len(best[at]["loc"]):
-            best[at] = one
-    for at in list(best):  # what is wrong inside a value says more than that the value is wrong
-        if any(len(other) > len(at) and other[: len(at)] == at for other in best):
-            del best[at]
-    for at, one in best.items():
-        yield at, f"{_place_text(at)}{_text(at, one)}"
+    for problem in error.errors(include_url=False):
+        place = _place_of(problem["loc"])
+        if place not in best or len(problem["loc"]) > len(best[place]["loc"]):
+            best[place] = problem
+    for place in list(best):  # what is wrong inside a value says more than that the value is wrong
+        if any(len(deeper) > len(place) and deeper[: len(place)] == place for deeper in best):
+            del best[place]
+    for place, problem in best.items():
+        yield place, f"{_place_text(place)}{_problem_text(place, problem)}"
 
 
-def _place(loc: tuple[str | int, ...]) -> Place:
+def _place_of(loc: tuple[str | int, ...]) -> Place:
     """pydantic's location without the names of the shapes it has tried: only our keys, and item numbers."""
     owners: list[type[BaseModel]] = [PathFile, *_OWNERS.values()]
     keys = {*KINDS, *(key for owner in owners for key in owner.model_fields)}
-    out: list[str | int] = []
+    keys_of_place: list[str | int] = []
     for k, part in enumerate(loc):
         if isinstance(part, int) or part in keys or (k == len(loc) - 1 and not _is_shape(part)):
-            out.append(part)
-    return tuple(out)
+            keys_of_place.append(part)
+    return tuple(keys_of_place)
 
 
 def _is_shape(part: str) -> bool:
@@ -63,7 +63,7 @@ def _place_text(place: Place) -> str:
     return "".join(f"{word}: " for word in words)
 
 
-def _text(place: Place, error: Any) -> str:
+def _problem_text(place: Place, error: Any) -> str:
     names = [part for part in place if isinstance(part, str)]
     words = _WORDS.get(error["type"])
     if words is not None:
@@ -72,43 +72,43 @@ def _text(place: Place, error: Any) -> str:
     return f"is {value_text(error['input'])}" + (f"; for example {example}" if example else f": {error['msg'].lower()}")
 
 
-def _unknown(names: list[str], error: Any) -> str:
+def _unknown_text(names: list[str], error: Any) -> str:
     owner = _OWNERS.get(names[-2], PathFile) if len(names) > 1 else PathFile
-    near = _nearest(names[-1] if names else "", list(owner.model_fields))
+    near = _nearest_key(names[-1] if names else "", list(owner.model_fields))
     hint = f"did you mean {near}?" if near else f"the keys here are {', '.join(owner.model_fields)}"
     return f"unknown key; {hint}"
 
 
-def _missing(names: list[str], error: Any) -> str:
+def _missing_text(names: list[str], error: Any) -> str:
     example = ": a list of moves, for example - line: [390, 160, 300]" if names[-1:] == ["moves"] else ""
     return f"is required{example}"
 
 
-def _bound(sign: str, key: str) -> Words:
-    return lambda names, one: f"must be {sign} {one['ctx'][key]:g}, not {value_text(one['input'])}"
+def _bound_text(sign: str, key: str) -> Words:
+    return lambda names, error: f"must be {sign} {error['ctx'][key]:g}, not {value_text(error['input'])}"
 
 
-def _length(names: list[str], error: Any) -> str:
+def _length_text(names: list[str], error: Any) -> str:
     context, count = error["ctx"], error["ctx"]["actual_length"]
     bound = f"at least {context['min_length']}" if "min_length" in context else f"at most {context['max_length']}"
     return f"has {count} item{'s' * (count != 1)}, and must have {bound}"
 
 
 _WORDS: dict[str, Words] = {  # pydantic's kind of error -> what is said of it
-    "extra_forbidden": _unknown,
-    "missing": _missing,
+    "extra_forbidden": _unknown_text,
+    "missing": _missing_text,
     "problem": lambda names, one: str(one["msg"]),
-    "greater_than": _bound("above", "gt"),
-    "greater_than_equal": _bound("at least", "ge"),
-    "less_than_equal": _bound("at most", "le"),
-    "less_than": _bound("below", "lt"),
-    "too_short": _length,
-    "too_long": _length,
+    "greater_than": _bound_text("above", "gt"),
+    "greater_than_equal": _bound_text("at least", "ge"),
+    "less_than_equal": _bound_text("at most", "le"),
+    "less_than": _bound_text("below", "lt"),
+    "too_short": _length_text,
+    "too_long": _length_text,
     "finite_number": lambda names, one: "must be a finite number",
 }
 
 
-def _nearest(word: str, choices: list[str]) -> str | None:
+def _nearest_key(word: str, choices: list[str]) -> str | None:
     low = word.strip().lower().replace("-", "_")
     if _SYNONYMS.get(low) in choices:
         return _SYNONYMS[low]

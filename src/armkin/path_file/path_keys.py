@@ -75,7 +75,7 @@ class Start(_Model):
     point: Values | None = Field(None, description="A target.")
 
     @model_validator(mode="after")
-    def _one(self) -> Start:
+    def _check_one_given(self) -> Start:
         if (self.joints is None) == (self.point is None):
             raise PydanticCustomError("problem", "give joints: or point:, one of them")
         return self
@@ -111,12 +111,12 @@ class Move(_Model):
         return next(kind for kind in KINDS if getattr(self, kind) is not None)
 
     @model_validator(mode="after")
-    def _one(self) -> Move:
-        given = [kind for kind in KINDS if getattr(self, kind) is not None]
-        if len(given) != 1:
-            text = f"has {' and '.join(given)}: one of them" if given else f"is none of {', '.join(KINDS)}"
+    def _check_one_kind(self) -> Move:
+        kinds = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(kinds) != 1:
+            text = f"has {' and '.join(kinds)}: one of them" if kinds else f"is none of {', '.join(KINDS)}"
             raise PydanticCustomError("problem", "{text}", {"text": text})
-        if self.branch is not None and given != ["point"]:
+        if self.branch is not None and kinds != ["point"]:
             raise PydanticCustomError("problem", "branch: belongs to point:")
         return self
 
@@ -179,8 +179,8 @@ class PathFile(_Model):
         if source is not None and source.rows:
             a, b = (source.lines["moves", k] for k in (first, last))
             return f"{source.name}: row {a}" if a == b else f"{source.name}: rows {a} to {b}"
-        which = f"move {first + 1}" if first == last else f"moves {first + 1} to {last + 1}"
+        numbers = f"move {first + 1}" if first == last else f"moves {first + 1} to {last + 1}"
         if source is None:
-            return "" if (first, last) == (0, len(self.moves) - 1) else which
-        where = f"{source.name}:{source.lines['moves', first]}"
-        return where if len(self.moves) == 1 else f"{where}: {which}"
+            return "" if (first, last) == (0, len(self.moves) - 1) else numbers
+        line = f"{source.name}:{source.lines['moves', first]}"
+        return line if len(self.moves) == 1 else f"{line}: {numbers}"

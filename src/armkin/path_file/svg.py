@@ -15,11 +15,11 @@ from armkin.path_file.svg_shapes import (
     Point,
     ShapeError,
     above_zero,
-    length,
-    numbers,
+    multiply,
     outlines,
-    times,
-    transform,
+    parse_length,
+    parse_numbers,
+    parse_transform,
 )
 
 _MM = 25.4 / 96  # of a px
@@ -40,25 +40,25 @@ class _Element:
 
     def style(self, key: str) -> str | None:
         """A property, by its attribute or in style."""
-        for one in self.attributes.get("style", "").split(";"):
-            name, _, value = one.partition(":")
+        for declaration in self.attributes.get("style", "").split(";"):
+            name, _, value = declaration.partition(":")
             if name.strip() == key:
                 return value.strip()
         return self.attributes.get(key)
 
 
-def parse(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> PathFile:
+def parse_svg(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> PathFile:
     """The path of a drawing: x right, y up, zero at the viewBox's lower left corner.
 
     Raises PathFileError with the line of what is refused.
     """
-    root = _tree(raw, name)
+    root = _parse_tree(raw, name)
     if root.tag != "svg":
         raise PathFileError(f"{name}:{root.line}: is <{root.tag}>, and no <svg>", file=name, line=root.line)
-    named = {one.attributes["id"]: one for one in _elements(root) if "id" in one.attributes}
+    named = {element.attributes["id"]: element for element in _elements(root) if "id" in element.attributes}
     pen = _Drawer(name, Pen(placing), options, options.lift / placing.scale)
     try:
-        frame = _frame(root)
+        frame = _drawing_frame(root)
     except ShapeError as error:
         raise PathFileError(f"{name}:{root.line}: <svg>: {error}", file=name, line=root.line) from None
     for child in root.children:
@@ -67,7 +67,7 @@ def parse(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> P
     return pen.pen.file(name, (), raw, f"it needs an outline of {', '.join(sorted(SHAPES))}")
 
 
-def _tree(raw: bytes, name: str) -> _Element:
+def _parse_tree(raw: bytes, name: str) -> _Element:
     """The document's elements, their names without prefixes."""
     text = raw.lstrip()
     reader = _Reader(name, raw[: len(raw) - len(text)].count(b"\n"))
@@ -103,8 +103,8 @@ class _Reader:
         self._open[-1].children.append(made)
         self._open.append(made)
         if len(self._open) > 4 * _DEEPEST:
-            where = f"{self.name}:{made.line}"
-            raise PathFileError(f"{where}: elements in each other deeper than {4 * _DEEPEST}", file=self.name)
+            place = f"{self.name}:{made.line}"
+            raise PathFileError(f"{place}: elements in each other deeper than {4 * _DEEPEST}", file=self.name)
 
     def _end(self, tag: str) -> None:
         self._open.pop()
@@ -120,13 +120,13 @@ def _elements(element: _Element) -> Iterator[_Element]:
         yield from _elements(child)
 
 
-def _frame(root: _Element) -> Matrix:
+def _drawing_frame(root: _Element) -> Matrix:
     """From the drawing's coordinates to millimetres, x right and y up from the viewBox's lower left corner."""
-    said = {key: text for key, text in root.attributes.items() if not text.strip().endswith("%")}
-    size = above_zero(said, "width", "height")
+    attributes = {key: text for key, text in root.attributes.items() if not text.strip().endswith("%")}
+    size = above_zero(attributes, "width", "height")
     if 0.0 in size:
         raise ShapeError("width and height are above 0, or left out")
-    box = numbers(root.attributes.get("viewBox", ""))
+    box = parse_numbers(root.attributes.get("viewBox", ""))
     if box and (len(box) != 4 or box[2] <= 0 or box[3] <= 0):
         raise ShapeError("viewBox needs x y width height, the last two above 0")
     if not box:
@@ -141,8 +141,8 @@ def _scales(size: Sequence[float | None], box: Sequence[float], ratio: str) -> t
     sx, sy = across or down or 1.0, down or across or 1.0
     if ratio.split()[:1] == ["none"]:
         return sx, sy
-    both = max(sx, sy) if "slice" in ratio else min(sx, sy)
-    return both, both
+    scale = max(sx, sy) if "slice" in ratio else min(sx, sy)
+    return scale, scale
 
 
 @dataclass
@@ -163,15 +163,15 @@ class _Drawer:
         if not self._is_drawn(element, depth):
             return
         try:
-            m = times(m, transform(element.attributes.get("transform", "")))
+            m = multiply(m, parse_transform(element.attributes.get("transform", "")))
             if element.tag == "use":
-                shift = (length(element.attributes.get("x")), length(element.attributes.get("y")))
-                self._use(element, times(m, (1.0, 0.0, 0.0, 1.0, *shift)), named, depth)
+                shift = (parse_length(element.attributes.get("x")), parse_length(element.attributes.get("y")))
+                self._draw_used(element, multiply(m, (1.0, 0.0, 0.0, 1.0, *shift)), named, depth)
             elif element.tag in SHAPES:
                 for stroke in outlines(element.tag, element.attributes, m):
-                    self._stroke(element, stroke)
+                    self._draw_stroke(element, stroke)
         except ShapeError as error:
-            raise self._wrong(element, str(error)) from None
+            raise self._error(element, str(error)) from None
         if element.tag in _GROUPS and (element.tag != "symbol" or depth):
             for child in element.children:
                 self.draw(child, m, named, depth + 1)
@@ -180,40 +180,40 @@ class _Drawer:
         """Whether an element can be seen. Raises PathFileError for one that would be drawn wrongly."""
         self.elements += 1
         if self.elements > _MOST:
-            raise self._wrong(element, f"is one of more than {_MOST} elements")
+            raise self._error(element, f"is one of more than {_MOST} elements")
         if depth > _DEEPEST:
-            raise self._wrong(element, f"stands in others deeper than {_DEEPEST}, or uses itself")
+            raise self._error(element, f"stands in others deeper than {_DEEPEST}, or uses itself")
         if element.tag in _REFUSED:
-            raise self._wrong(element, "is not drawn: make its outlines a path first")
-        known = element.tag in SHAPES or element.tag in _GROUPS or element.tag == "use"
-        if not known or element.style("display") == "none" or element.style("visibility") == "hidden":
+            raise self._error(element, "is not drawn: make its outlines a path first")
+        is_known = element.tag in SHAPES or element.tag in _GROUPS or element.tag == "use"
+        if not is_known or element.style("display") == "none" or element.style("visibility") == "hidden":
             return False
         for key in ("clip-path", "mask"):
             if element.style(key) not in (None, "none"):
-                raise self._wrong(element, f"has {key}: cut its outlines off first")
+                raise self._error(element, f"has {key}: cut its outlines off first")
         if element.tag == "svg":
-            raise self._wrong(element, "stands inside of another <svg>")
+            raise self._error(element, "stands inside of another <svg>")
         return True
 
-    def _use(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
+    def _draw_used(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
         href = element.attributes.get("href", element.attributes.get("xlink:href", ""))
         if href[:1] != "#" or href[1:] not in named:
-            raise self._wrong(element, f"uses '{href[:40]}', which is not in this file")
+            raise self._error(element, f"uses '{href[:40]}', which is not in this file")
         used = named[href[1:]]
         if used.tag != "symbol":
             self.draw(used, m, named, depth + 1)
             return
         if "viewBox" in used.attributes:
-            raise self._wrong(element, "uses a symbol with a viewBox")
+            raise self._error(element, "uses a symbol with a viewBox")
         for child in used.children:
             self.draw(child, m, named, depth + 1)
 
-    def _stroke(self, element: _Element, stroke: list[Point]) -> None:
+    def _draw_stroke(self, element: _Element, stroke: list[Point]) -> None:
         self.points += len(stroke)
         if self.points > MOST_POINTS:
-            raise self._wrong(element, f"is beyond {MOST_POINTS} points: give the drawing in parts")
+            raise self._error(element, f"is beyond {MOST_POINTS} points: give the drawing in parts")
         if not all(abs(x) <= LARGEST for p in stroke for x in p):
-            raise self._wrong(element, f"is farther away than {LARGEST:g} mm")
+            raise self._error(element, f"is farther away than {LARGEST:g} mm")
         line, (x, y) = element.line, stroke[0]
         if self.position is None:
             self.pen.jump((x, y, self.height), line)
@@ -235,6 +235,6 @@ class _Drawer:
         if self.position is not None and self.height > 0:
             self.pen.line((*self.position, self.height), None, self.line)
 
-    def _wrong(self, element: _Element, text: str) -> PathFileError:
-        where = f"{self.name}:{element.line}: <{element.tag}>"
-        return PathFileError(f"{where} {text}", file=self.name, line=element.line)
+    def _error(self, element: _Element, text: str) -> PathFileError:
+        place = f"{self.name}:{element.line}: <{element.tag}>"
+        return PathFileError(f"{place} {text}", file=self.name, line=element.line)

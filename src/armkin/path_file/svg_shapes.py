@@ -24,59 +24,59 @@ class ShapeError(ValueError):
     """What is wrong with a shape, in words."""
 
 
-def length(text: str | None, default: float = 0.0) -> float:
+def parse_length(text: str | None, default: float = 0.0) -> float:
     """A length in px."""
     if text is None:
         return default
-    found = _NUMBER.match(text.strip())
-    unit = text.strip()[found.end() :].strip().lower() if found else ""
-    if found is None or unit not in _UNITS:
+    number = _NUMBER.match(text.strip())
+    unit = text.strip()[number.end() :].strip().lower() if number else ""
+    if number is None or unit not in _UNITS:
         raise ShapeError(f"'{text[:20]}' is no length: a number, or one with {', '.join(u for u in _UNITS if u)}")
-    return _bounded(float(found[0])) * _UNITS[unit]
+    return _check_bound(float(number[0])) * _UNITS[unit]
 
 
 def above_zero(attributes: Mapping[str, str], *keys: str) -> list[float | None]:
     """Sizes of an element [px], which are not below 0; None where one is not there."""
-    out: list[float | None] = []
+    sizes: list[float | None] = []
     for key in keys:
         text = attributes.get(key)
-        out.append(None if text is None else length(text))
-        if (out[-1] or 0.0) < 0:
+        sizes.append(None if text is None else parse_length(text))
+        if (sizes[-1] or 0.0) < 0:
             raise ShapeError(f"{key} {text} is below 0")
-    return out
+    return sizes
 
 
-def _bounded(value: float) -> float:
+def _check_bound(value: float) -> float:
     if not abs(value) <= _LARGEST:
         raise ShapeError(f"the number {value:g} is larger than {_LARGEST:g}")
     return value
 
 
-def numbers(text: str) -> list[float]:
+def parse_numbers(text: str) -> list[float]:
     """Numbers between spaces and commas."""
-    found = _NUMBER.findall(text)
+    words = _NUMBER.findall(text)
     if _NUMBER.sub("", text).strip(" ,\t\r\n"):
         raise ShapeError(f"'{text.strip()[:20]}' has what is no number")
-    return [_bounded(float(x)) for x in found]
+    return [_check_bound(float(x)) for x in words]
 
 
-def times(m: Matrix, n: Matrix) -> Matrix:
+def multiply(m: Matrix, n: Matrix) -> Matrix:
     """First n, then m."""
     a, b, c, d, e, f = m
     A, B, C, D, E, F = n
     return a * A + c * B, b * A + d * B, a * C + c * D, b * C + d * D, a * E + c * F + e, b * E + d * F + f
 
 
-def transform(text: str) -> Matrix:
+def parse_transform(text: str) -> Matrix:
     """The matrix of a transform attribute."""
-    whole: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    at = 0
-    while found := _TRANSFORM.match(text, at):
-        at = found.end()
-        whole = times(whole, _one_transform(found[1], numbers(found[2])))
-    if text[at:].strip(" ,\t\r\n"):
-        raise ShapeError(f"transform '{text[at:].strip()[:30]}' is not known")
-    return whole
+    matrix: Matrix = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+    index = 0
+    while step := _TRANSFORM.match(text, index):
+        index = step.end()
+        matrix = multiply(matrix, _one_transform(step[1], parse_numbers(step[2])))
+    if text[index:].strip(" ,\t\r\n"):
+        raise ShapeError(f"transform '{text[index:].strip()[:30]}' is not known")
+    return matrix
 
 
 def _one_transform(kind: str, v: list[float]) -> Matrix:
@@ -104,45 +104,45 @@ def outlines(tag: str, attributes: Mapping[str, str], m: Matrix) -> list[list[Po
     return [stroke for stroke in pen.strokes if len(stroke) > 1]
 
 
-def _line(pen: _Outline, attributes: Mapping[str, str]) -> None:
-    x1, y1, x2, y2 = (length(attributes.get(key)) for key in ("x1", "y1", "x2", "y2"))
+def _draw_line(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    x1, y1, x2, y2 = (parse_length(attributes.get(key)) for key in ("x1", "y1", "x2", "y2"))
     pen.move((x1, y1))
     pen.line((x2, y2))
 
 
-def _polyline(pen: _Outline, attributes: Mapping[str, str]) -> None:
-    values = numbers(attributes.get("points", ""))
+def _draw_polyline(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    values = parse_numbers(attributes.get("points", ""))
     if len(values) % 2:
         raise ShapeError("points has an odd count of numbers")
     for k in range(0, len(values), 2):
         (pen.line if k else pen.move)((values[k], values[k + 1]))
 
 
-def _polygon(pen: _Outline, attributes: Mapping[str, str]) -> None:
-    _polyline(pen, attributes)
+def _draw_polygon(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    _draw_polyline(pen, attributes)
     pen.close()
 
 
-def _circle(pen: _Outline, attributes: Mapping[str, str]) -> None:
+def _draw_circle(pen: _Outline, attributes: Mapping[str, str]) -> None:
     (radius,) = above_zero(attributes, "r")
-    _round(pen, attributes, radius, radius)
+    _draw_round(pen, attributes, radius, radius)
 
 
-def _ellipse(pen: _Outline, attributes: Mapping[str, str]) -> None:
+def _draw_ellipse(pen: _Outline, attributes: Mapping[str, str]) -> None:
     rx, ry = above_zero(attributes, "rx", "ry")
-    _round(pen, attributes, ry if rx is None else rx, rx if ry is None else ry)
+    _draw_round(pen, attributes, ry if rx is None else rx, rx if ry is None else ry)
 
 
-def _round(pen: _Outline, attributes: Mapping[str, str], rx: float | None, ry: float | None) -> None:
-    x, y = length(attributes.get("cx")), length(attributes.get("cy"))
+def _draw_round(pen: _Outline, attributes: Mapping[str, str], rx: float | None, ry: float | None) -> None:
+    x, y = parse_length(attributes.get("cx")), parse_length(attributes.get("cy"))
     if rx and ry:
         pen.move((x + rx, y))
         pen.ellipse((x, y), rx, ry, 0.0, 0.0, 2 * math.pi)
         pen.close()
 
 
-def _rectangle(pen: _Outline, attributes: Mapping[str, str]) -> None:
-    x, y = length(attributes.get("x")), length(attributes.get("y"))
+def _draw_rectangle(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    x, y = parse_length(attributes.get("x")), parse_length(attributes.get("y"))
     wide, high, round_x, round_y = above_zero(attributes, "width", "height", "rx", "ry")
     w, h = wide or 0.0, high or 0.0
     if w == 0 or h == 0:
@@ -178,9 +178,9 @@ class _Outline:
     def line(self, p: Point) -> None:
         """A straight line to p; a stroke begins with its first."""
         if not self.open:
-            self.strokes.append([self._placed(self.position)])
+            self.strokes.append([self._place(self.position)])
             self.open = True
-        self.strokes[-1].append(self._placed(p))
+        self.strokes[-1].append(self._place(p))
         self.position = p
 
     def close(self) -> None:
@@ -196,7 +196,7 @@ class _Outline:
             math.hypot(s[0] - 2 * a[0] + b[0], s[1] - 2 * a[1] + b[1]),
             math.hypot(a[0] - 2 * b[0] + p[0], a[1] - 2 * b[1] + p[1]),
         )
-        n = _chords(math.sqrt(6 * bend * self.scale / (8 * CLOSE)), 12 if bend > 1e-12 else 1)
+        n = _chord_count(math.sqrt(6 * bend * self.scale / (8 * CLOSE)), 12 if bend > 1e-12 else 1)
         for k in range(1, n + 1):
             t = k / n
             u = 1 - t
@@ -210,34 +210,34 @@ class _Outline:
         """An arc of an ellipse about c, its axes turned [rad], from `begin` over `angle`."""
         size = max(rx, ry) * self.scale
         step = min(_TURN, 2 * math.acos(1 - min(CLOSE / size, 1.0))) if size > 0 else _TURN
-        n = _chords(abs(angle) / step, 1)
+        n = _chord_count(abs(angle) / step, 1)
         cos, sin = math.cos(turned), math.sin(turned)
         for k in range(1, n + 1):
             t = begin + angle * k / n
             x, y = rx * math.cos(t), ry * math.sin(t)
             self.line((c[0] + cos * x - sin * y, c[1] + sin * x + cos * y))
 
-    def _placed(self, p: Point) -> Point:
+    def _place(self, p: Point) -> Point:
         a, b, c, d, e, f = self.m
         return a * p[0] + c * p[1] + e, b * p[0] + d * p[1] + f
 
 
-def _chords(wanted: float, least: int) -> int:
-    if not wanted <= _MOST:
+def _chord_count(count: float, least: int) -> int:
+    if not count <= _MOST:
         raise ShapeError(f"a curve needs more than {_MOST} chords: is the drawing this large?")
-    return max(math.ceil(wanted), least)
+    return max(math.ceil(count), least)
 
 
-def _path(pen: _Outline, d: str) -> None:
+def _draw_path(pen: _Outline, d: str) -> None:
     """Path data: both cases of M L H V C S Q T A Z (SVG 1.1, section 8.3)."""
-    command, at, size = "", 0, len(d)
+    command, index, size = "", 0, len(d)
     bent: tuple[str, Point] | None = None  # the curve before, and its last control point
     while True:
-        at = _gap(d, at)
-        if at >= size:
+        index = _skip_gap(d, index)
+        if index >= size:
             return
-        if d[at].isalpha():
-            command, at = d[at], at + 1
+        if d[index].isalpha():
+            command, index = d[index], index + 1
             begun = pen.strokes or command.upper() == "M" or pen.position != (0, 0) or d.lstrip()[0] in "Mm"
             if command.upper() not in _COMMANDS or not begun:
                 raise ShapeError(f"path data: '{command}' is not known here; it begins with M")
@@ -246,55 +246,57 @@ def _path(pen: _Outline, d: str) -> None:
                 bent = None
                 continue
         elif command in ("", "Z", "z"):
-            raise ShapeError(f"path data: '{d[at : at + 12]}' stands where a command must")
-        values, at = _values(d, at, command)
-        bent = _command(pen, command, values, bent)
+            raise ShapeError(f"path data: '{d[index : index + 12]}' stands where a command must")
+        values, index = _command_values(d, index, command)
+        bent = _draw_command(pen, command, values, bent)
         if command in "Mm":
             command = "L" if command == "M" else "l"
 
 
-def _gap(d: str, index: int) -> int:
+def _skip_gap(d: str, index: int) -> int:
     """Behind the space, and one comma, that may stand between numbers."""
-    found = _GAP.match(d, index)
-    return index if found is None else found.end()
+    gap = _GAP.match(d, index)
+    return index if gap is None else gap.end()
 
 
-def _values(d: str, index: int, command: str) -> tuple[list[float], int]:
-    out: list[float] = []
+def _command_values(d: str, index: int, command: str) -> tuple[list[float], int]:
+    values: list[float] = []
     for k in range(_COMMANDS[command.upper()]):
-        index = _gap(d, index)
+        index = _skip_gap(d, index)
         if command in "Aa" and k in (3, 4):  # flags need no space between them
             if d[index : index + 1] not in ("0", "1"):
                 raise ShapeError(f"path data: an arc's flag is 0 or 1, not '{d[index : index + 6]}'")
-            out.append(float(d[index]))
+            values.append(float(d[index]))
             index += 1
             continue
-        found = _NUMBER.match(d, index)
-        if found is None:
+        number = _NUMBER.match(d, index)
+        if number is None:
             raise ShapeError(
                 f"path data: {command} needs {_COMMANDS[command.upper()]} numbers, not '{d[index : index + 12]}'"
             )
-        out.append(_bounded(float(found[0])))
-        index = found.end()
-    return out, index
+        values.append(_check_bound(float(number[0])))
+        index = number.end()
+    return values, index
 
 
-def _command(pen: _Outline, command: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point] | None:
+def _draw_command(
+    pen: _Outline, command: str, v: list[float], bent: tuple[str, Point] | None
+) -> tuple[str, Point] | None:
     """Draw one command; returns what a smooth one after it mirrors."""
     kind, (x, y) = command.upper(), pen.position
-    v = _absolute(command, v, pen.position)
+    v = _absolute_values(command, v, pen.position)
     if kind in "CSQT":
-        return _curve(pen, kind, v, bent)
+        return _draw_curve(pen, kind, v, bent)
     if kind == "M":
         pen.move((v[0], v[1]))
     elif kind == "A":
-        _arc(pen, v)
+        _draw_arc(pen, v)
     else:
         pen.line({"H": (v[0], y), "V": (x, v[0])}.get(kind) or (v[0], v[1]))
     return None
 
 
-def _absolute(command: str, v: list[float], position: Point) -> list[float]:
+def _absolute_values(command: str, v: list[float], position: Point) -> list[float]:
     """A command's numbers from the drawing's zero: small letters count from where the pen is."""
     if command.isupper():
         return v
@@ -304,22 +306,22 @@ def _absolute(command: str, v: list[float], position: Point) -> list[float]:
     return [value + shift[k % len(shift)] for k, value in enumerate(v)]
 
 
-def _curve(pen: _Outline, kind: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point]:
+def _draw_curve(pen: _Outline, kind: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point]:
     """A cubic (C, S) or quadratic (Q, T) curve; S and T mirror the last control point of a curve before, `bent`."""
-    curve, at, first, end = "C" if kind in "CS" else "Q", pen.position, (v[0], v[1]), (v[-2], v[-1])
+    curve, start, first, end = "C" if kind in "CS" else "Q", pen.position, (v[0], v[1]), (v[-2], v[-1])
     if kind in "ST":
-        before = bent[1] if bent is not None and bent[0] == curve else at
-        first = (2 * at[0] - before[0], 2 * at[1] - before[1])
+        before = bent[1] if bent is not None and bent[0] == curve else start
+        first = (2 * start[0] - before[0], 2 * start[1] - before[1])
     if curve == "C":
         second = (v[-4], v[-3])
         pen.bezier(first, second, end)
         return "C", second
-    a, b = ((p[0] + 2 * (first[0] - p[0]) / 3, p[1] + 2 * (first[1] - p[1]) / 3) for p in (at, end))
+    a, b = ((p[0] + 2 * (first[0] - p[0]) / 3, p[1] + 2 * (first[1] - p[1]) / 3) for p in (start, end))
     pen.bezier(a, b, end)
     return "Q", first
 
 
-def _arc(pen: _Outline, v: list[float]) -> None:
+def _draw_arc(pen: _Outline, v: list[float]) -> None:
     """An elliptical arc by its ends (SVG 1.1, appendix F.6.5)."""
     (x1, y1), (x2, y2) = pen.position, (v[5], v[6])
     rx, ry, turned, large, sweep = abs(v[0]), abs(v[1]), math.radians(v[2]), v[3] == 1, v[4] == 1
@@ -345,11 +347,11 @@ def _arc(pen: _Outline, v: list[float]) -> None:
 
 
 SHAPES: dict[str, Callable[[_Outline, Mapping[str, str]], None]] = {  # element -> how it is drawn
-    "path": lambda pen, attributes: _path(pen, attributes.get("d", "")),
-    "line": _line,
-    "polyline": _polyline,
-    "polygon": _polygon,
-    "rect": _rectangle,
-    "circle": _circle,
-    "ellipse": _ellipse,
+    "path": lambda pen, attributes: _draw_path(pen, attributes.get("d", "")),
+    "line": _draw_line,
+    "polyline": _draw_polyline,
+    "polygon": _draw_polygon,
+    "rect": _draw_rectangle,
+    "circle": _draw_circle,
+    "ellipse": _draw_ellipse,
 }

@@ -16,7 +16,7 @@ from armkin.keep_out.body_pairs import guard
 from armkin.keep_out.clearance import hits_nothing
 from armkin.model.rotation import rotation_about
 from armkin.model.units import DEGREE
-from armkin.robot_file.scene_file import read
+from armkin.robot_file.scene_file import read_scene
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -42,7 +42,7 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
     own, obstacles = arm.keep_out[:count], list(arm.keep_out[count:])
     clearance, sha256 = arm.clearance, arm.scene_sha256
     if scene is not None:
-        added = read(os.fspath(scene))
+        added = read_scene(os.fspath(scene))
         obstacles, clearance, sha256 = [*obstacles, *added.keep_out], max(clearance, added.clearance), added.sha256
     if not obstacles:
         return arm, Obstacles()

@@ -40,9 +40,9 @@ def path_of(targets: Any) -> PathFile | None:
         if Path(name).suffix.lower() not in (".yaml", ".yml"):
             raise UsageError(f"{name}: a path to place an arm for is a .yaml file; targets are given as an array")
 
-        return path_file.read(name)
+        return path_file.read_path_file(name)
     if isinstance(targets, Mapping):
-        return path_file.validated(dict(targets))
+        return path_file.validate_path(dict(targets))
     return targets if hasattr(targets, "moves") else None
 
 

@@ -38,15 +38,15 @@ __all__ = [
     "RobotFile",
     "Screw",
     "json_schema",
-    "parse",
-    "read",
+    "parse_robot_file",
+    "read_robot_file",
 ]
 
 
 _TOLD = 20  # problems of one file that are told at once
 
 
-def read(path: str | os.PathLike[str]) -> RobotFile:
+def read_robot_file(path: str | os.PathLike[str]) -> RobotFile:
     """Read and validate a robot file, given its path or the name of a shipped robot.
 
     Raises FileError if it cannot be read, RobotFileError (``file:line: what; what is allowed``) if it
@@ -62,22 +62,22 @@ def read(path: str | os.PathLike[str]) -> RobotFile:
         is_folder = isinstance(error, IsADirectoryError)
         hint = "; name a file, for example robots/three_dof.yaml" if is_folder else ""
         raise FileError(f"{name}: cannot read the robot file: {reason}{hint}", file=name) from None
-    return parse(raw, name)
+    return parse_robot_file(raw, name)
 
 
-def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
+def parse_robot_file(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
     """Validate the text of a robot file; ``name`` is what messages call it."""
     if isinstance(raw, str):
         raw = raw.encode()
     try:
-        document = strict_yaml.loads(raw)
+        document = strict_yaml.load_yaml(raw)
     except strict_yaml.StrictYamlError as error:
-        raise _invalid(name, [(error.line, error.problem)]) from None
+        raise _invalid_error(name, [(error.line, error.problem)]) from None
     if "moves" in document.data and "joints" not in document.data:
         line = document.line(("moves",))
-        raise _invalid(name, [(line, "moves: this is a path file, not a robot; write armkin path ROBOT FILE")])
+        raise _invalid_error(name, [(line, "moves: this is a path file, not a robot; write armkin path ROBOT FILE")])
     try:
-        robot = _validated(document.data)
+        robot = _validate(document.data)
     except ValidationError as error:
         from armkin.robot_file import robot_key_errors  # for invalid files only
 
@@ -86,7 +86,7 @@ def parse(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
             for path, text in robot_key_errors.problems(error.errors(include_url=False))
         ]
         problems.sort(key=lambda problem: problem[0])
-        raise _invalid(name, problems) from None
+        raise _invalid_error(name, problems) from None
     robot._path = name
     robot._sha256 = hashlib.sha256(raw).hexdigest()
     return robot
@@ -99,7 +99,7 @@ def json_schema() -> dict[str, Any]:
     return robot_schema.json_schema()
 
 
-def _validated(data: dict[str, Any]) -> RobotFile:
+def _validate(data: dict[str, Any]) -> RobotFile:
     if not RobotFile.__pydantic_complete__:
         # Looking for pydantic's plugins reads the metadata of every installed package, which takes
         # longer than all the rest of a robot file; nothing here is for them to observe.
@@ -115,17 +115,17 @@ def _validated(data: dict[str, Any]) -> RobotFile:
     return RobotFile.model_validate(data)
 
 
-def _located(name: str, line: int, text: str) -> str:
+def _with_line(name: str, line: int, text: str) -> str:
     return f"{name}:{line}: {text}" if line else f"{name}: {text}"
 
 
-def _invalid(name: str, problems: list[tuple[int, str]]) -> RobotFileError:
+def _invalid_error(name: str, problems: list[tuple[int, str]]) -> RobotFileError:
     """All problems, a line each; of very many, the first and how many more there are."""
-    told = tuple(_located(name, line, text) for line, text in problems)
-    message = "\n".join(told[:_TOLD])
-    if len(told) > _TOLD:
-        message += f"\nand {len(told) - _TOLD} more problems"
-    return RobotFileError(message, file=name, line=problems[0][0] or None, problems=list(told))
+    lines = tuple(_with_line(name, line, text) for line, text in problems)
+    message = "\n".join(lines[:_TOLD])
+    if len(lines) > _TOLD:
+        message += f"\nand {len(lines) - _TOLD} more problems"
+    return RobotFileError(message, file=name, line=problems[0][0] or None, problems=list(lines))
 
 
 def _place_text(path: strict_yaml.Path, data: dict[str, Any]) -> str:
@@ -134,9 +134,9 @@ def _place_text(path: strict_yaml.Path, data: dict[str, Any]) -> str:
     if len(path) > 1 and path[0] in ("joints", "motors") and isinstance(path[1], int):
         item = data[path[0]][path[1]]
         name = item.get("name") if isinstance(item, dict) else None
-        what = str(path[0])[:-1]
+        kind = str(path[0])[:-1]
         named = isinstance(name, str) and 0 < len(name) <= 40 and name.isprintable()
-        words.append(f"{what} {name}" if named else f"{what} number {path[1] + 1}")
+        words.append(f"{kind} {name}" if named else f"{kind} number {path[1] + 1}")
         path = path[2:]
     while path and isinstance(path[-1], int):  # the line is the item's; its number says nothing
         path = path[:-1]

@@ -16,22 +16,22 @@ _FOLDERS = (_HERE / "robots", _HERE.parents[1] / "robots")
 _SUFFIXES = (".yaml", ".yml")
 
 
-def names() -> tuple[str, ...]:
+def robot_names() -> tuple[str, ...]:
     """Names of the shipped robots, in alphabetical order.
 
-    >>> "three_dof" in names()
+    >>> "three_dof" in robot_names()
     True
     """
-    return tuple(sorted(path.stem for path in _folder().glob("*.yaml")))
+    return tuple(sorted(path.stem for path in _robots_folder().glob("*.yaml")))
 
 
-def shipped(name: str) -> Path | None:
+def shipped_file(name: str) -> Path | None:
     """File of a shipped robot; None if there is none of that name.
 
-    >>> shipped("three_dof").name, shipped("robots/three_dof.yaml")
+    >>> shipped_file("three_dof").name, shipped_file("robots/three_dof.yaml")
     ('three_dof.yaml', None)
     """
-    return _folder() / f"{name}.yaml" if name in names() else None
+    return _robots_folder() / f"{name}.yaml" if name in robot_names() else None
 
 
 def locate(robot: str) -> str:
@@ -43,21 +43,21 @@ def locate(robot: str) -> str:
     try:
         if os.path.exists(robot) and not os.path.isdir(robot):
             return robot
-        found = shipped(robot)
-        if found is not None:
-            return str(found)
+        file = shipped_file(robot)
+        if file is not None:
+            return str(file)
         if os.path.isdir(robot):
             return robot
         os.stat(robot)
     except FileNotFoundError:
-        raise FileError(_missing(robot), file=robot) from None
+        raise FileError(_missing_text(robot), file=robot) from None
     except (OSError, ValueError):
         pass
     return robot
 
 
-def _missing(robot: str) -> str:
-    near = _near(robot)
+def _missing_text(robot: str) -> str:
+    near = _similar_names(robot)
     if near:
         return f"there is no robot {robot}; did you mean {' or '.join(near)}?"
     if os.path.dirname(robot) or robot.endswith(_SUFFIXES):
@@ -65,7 +65,7 @@ def _missing(robot: str) -> str:
     return f"there is no robot {robot}: neither a file nor a shipped robot (three_dof, ur5e, ...: armkin robots)"
 
 
-def _near(robot: str) -> list[str]:
+def _similar_names(robot: str) -> list[str]:
     """What may have been meant: a file beside it, a shipped robot, or those whose names it begins."""
     from difflib import get_close_matches
 
@@ -77,19 +77,19 @@ def _near(robot: str) -> list[str]:
         beside = [entry for entry in sorted(os.listdir(folder or ".")) if entry.endswith(_SUFFIXES)]
     except OSError:
         beside = []
-    for choices, where, cutoff in ((beside, folder, 0.75), (list(names()), "", 0.76)):  # arm is no xarm6
+    for choices, parent, cutoff in ((beside, folder, 0.75), (list(robot_names()), "", 0.76)):  # arm is no xarm6
         # Case, dashes and the suffix are what people get wrong most: compare without them.
-        plain = {_comparable(choice): choice for choice in choices}
-        close = get_close_matches(_comparable(base), plain, n=1, cutoff=cutoff)
+        plain = {_comparable_name(choice): choice for choice in choices}
+        close = get_close_matches(_comparable_name(base), plain, n=1, cutoff=cutoff)
         if close:
-            return [os.path.join(where, plain[close[0]])]
-    begun = [name for name in names() if len(stem) > 1 and name.startswith(_comparable(base))]
+            return [os.path.join(parent, plain[close[0]])]
+    begun = [name for name in robot_names() if len(stem) > 1 and name.startswith(_comparable_name(base))]
     return begun[:4]
 
 
-def _comparable(name: str) -> str:
+def _comparable_name(name: str) -> str:
     return os.path.splitext(name)[0].lower().replace("-", "_").replace(" ", "_")
 
 
-def _folder() -> Path:
+def _robots_folder() -> Path:
     return next((folder for folder in _FOLDERS if folder.is_dir()), _FOLDERS[0])

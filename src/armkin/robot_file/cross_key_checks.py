@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from armkin import board_catalogue
 from armkin.board_catalogue import BOARDS
-from armkin.robot_file.drive_checks import Path, Problem, of_drive, reach_of_drive
+from armkin.robot_file.drive_checks import Path, Problem, check_drive, check_drive_reach
 from armkin.robot_file.robot_keys import Triple, dot
 
 if TYPE_CHECKING:
@@ -37,20 +37,20 @@ def problems(robot: RobotKeys) -> Iterator[Problem]:
     if robot.convention != "screws" and robot.zero_pose is not None:
         message = f"belongs to convention screws, not to {robot.convention}; a fixed last frame is tool"
         yield ("zero_pose",), message
-    yield from _repeated("joint", [joint.name for joint in robot.joints], "joints")
+    yield from _check_repeated("joint", [joint.name for joint in robot.joints], "joints")
     for i, joint in enumerate(robot.joints):
-        for path, message in _joint(joint, robot.convention):
+        for path, message in _check_joint(joint, robot.convention):
             yield ("joints", i, *path), message
-    yield from _poses(robot)
-    yield from _motors(robot)
-    yield from _axes(robot)
+    yield from _check_poses(robot)
+    yield from _check_motors(robot)
+    yield from _check_axes(robot)
     if robot.keep_out:
         from armkin.robot_file import keep_out_keys  # for files that have some alone
 
-        yield from keep_out_keys.problems(robot.keep_out, ["base", *(joint.name for joint in robot.joints)])
+        yield from keep_out_keys.keep_out_problems(robot.keep_out, ["base", *(joint.name for joint in robot.joints)])
 
 
-def _poses(robot: RobotKeys) -> Iterator[Problem]:
+def _check_poses(robot: RobotKeys) -> Iterator[Problem]:
     """Named joint values: one a joint, within its limits."""
     n = len(robot.joints)
     for name, values in (robot.poses or {}).items():
@@ -65,7 +65,7 @@ def _poses(robot: RobotKeys) -> Iterator[Problem]:
                 yield ("poses", name), f"{joint.name} = {value:g} is outside its limits {low:g} to {high:g}"
 
 
-def _repeated(kind: str, names: list[str], key: str) -> Iterator[Problem]:
+def _check_repeated(kind: str, names: list[str], key: str) -> Iterator[Problem]:
     seen: set[str] = set()
     for i, name in enumerate(names):
         if name in seen:
@@ -73,7 +73,7 @@ def _repeated(kind: str, names: list[str], key: str) -> Iterator[Problem]:
         seen.add(name)
 
 
-def _joint(joint: Joint, convention: str) -> Iterator[Problem]:
+def _check_joint(joint: Joint, convention: str) -> Iterator[Problem]:
     if joint.sign == 0:
         yield ("sign",), "must be 1 or -1, not 0"
     if convention == "screws":
@@ -82,17 +82,17 @@ def _joint(joint: Joint, convention: str) -> Iterator[Problem]:
         elif joint.screw is None:
             yield (), "has no screw; convention screws needs one: screw: {w: [0, 0, 1], v: [0, 0, 0]}"
         else:
-            yield from _screw(joint)
+            yield from _check_screw(joint)
     elif joint.screw is not None:
         yield ("screw",), f"convention {convention} takes no screw; write dh, or change convention"
     elif joint.dh is None:
         yield (), f"has no dh; convention {convention} needs a row: dh: {{alpha: 90, a: 0, d: 170}}"
-    yield from _range(joint)
+    yield from _check_range(joint)
     if joint.homing is not None:
-        yield from _homing(joint)
+        yield from _check_homing(joint)
 
 
-def _range(joint: Joint) -> Iterator[Problem]:
+def _check_range(joint: Joint) -> Iterator[Problem]:
     if joint.limits is None:
         return
     lower, upper = joint.limits
@@ -107,12 +107,12 @@ def _range(joint: Joint) -> Iterator[Problem]:
             yield ("limits",), f"home is 0 unless given, and outside {lower:g} to {upper:g}; add home:"
 
 
-def _screw(joint: Joint) -> Iterator[Problem]:
+def _check_screw(joint: Joint) -> Iterator[Problem]:
     assert joint.screw is not None
-    return (_direction if joint.type == "prismatic" else _axis)(joint.screw)
+    return (_check_direction if joint.type == "prismatic" else _check_axis)(joint.screw)
 
 
-def _direction(screw: Screw) -> Iterator[Problem]:
+def _check_direction(screw: Screw) -> Iterator[Problem]:
     """A prismatic joint's screw."""
     if math.hypot(*screw.w) != 0:
         yield ("screw", "w"), "must be [0, 0, 0] for a prismatic joint; its direction is v"
@@ -121,17 +121,17 @@ def _direction(screw: Screw) -> Iterator[Problem]:
     if screw.v is None:
         yield ("screw",), "has no v; for a prismatic joint v is its direction, for example [0, 0, 1]"
     else:
-        yield from _unit("v", screw.v)
+        yield from _check_unit("v", screw.v)
 
 
-def _axis(screw: Screw) -> Iterator[Problem]:
+def _check_axis(screw: Screw) -> Iterator[Problem]:
     """A revolute joint's screw."""
     w, v = screw.w, screw.v
     length = math.hypot(*w)
     if length == 0:
         yield ("screw", "w"), "is zero; give the axis direction, or type: prismatic"
         return
-    yield from _unit("w", w)
+    yield from _check_unit("w", w)
     if (v is None) == (screw.q is None):
         has = "neither v nor q" if v is None else "both v and q"
         yield ("screw",), f"has {has}; give v, or a point q on the axis"
@@ -141,7 +141,7 @@ def _axis(screw: Screw) -> Iterator[Problem]:
             yield ("screw", "v"), f"v.w is {pitch:g} and must be 0: a revolute joint has no pitch"
 
 
-def _unit(key: str, vector: Triple) -> Iterator[Problem]:
+def _check_unit(key: str, vector: Triple) -> Iterator[Problem]:
     length = math.hypot(*vector)
     if length == 0:
         yield ("screw", key), "is zero; give the direction of motion, of length 1"
@@ -150,7 +150,7 @@ def _unit(key: str, vector: Triple) -> Iterator[Problem]:
         yield ("screw", key), f"has length {length:g}, must be 1; write [{better}]"
 
 
-def _homing(joint: Joint) -> Iterator[Problem]:
+def _check_homing(joint: Joint) -> Iterator[Problem]:
     assert joint.homing is not None
     homing = joint.homing
     if homing.direction == 0:
@@ -161,26 +161,26 @@ def _homing(joint: Joint) -> Iterator[Problem]:
         yield ("homing",), "a servo knows its angle and has no switch; remove homing"
 
 
-def _motors(robot: RobotKeys) -> Iterator[Problem]:
+def _check_motors(robot: RobotKeys) -> Iterator[Problem]:
     for i, joint in enumerate(robot.joints):
         if joint.drive is not None:
-            for path, message in _own_drive(joint, joint.drive, only_drive=robot.motors is None):
+            for path, message in _check_own_drive(joint, joint.drive, only_drive=robot.motors is None):
                 yield ("joints", i, *path), message
     if robot.motors is not None:
-        yield from _repeated("motor", [motor.name for motor in robot.motors], "motors")
+        yield from _check_repeated("motor", [motor.name for motor in robot.motors], "motors")
         for i, motor in enumerate(robot.motors):
-            for path, message in (*of_drive(motor), *_weights(motor, robot)):
+            for path, message in (*check_drive(motor), *_check_weights(motor, robot)):
                 yield ("motors", i, *path), message
-        yield from _determined(robot, robot.motors)
+        yield from _check_determined(robot, robot.motors)
     if robot.gripper is not None:
-        yield from _gripper(robot)
+        yield from _check_gripper(robot)
 
 
-def _own_drive(joint: Joint, drive: Drive, *, only_drive: bool) -> Iterator[Problem]:
+def _check_own_drive(joint: Joint, drive: Drive, *, only_drive: bool) -> Iterator[Problem]:
     """A joint's own drive: all drives stand at joints or none, and it moves as the joint does."""
     if not only_drive:
         yield ("drive",), "the file also has motors; put all drives there, or use drives only"
-    for path, message in of_drive(drive):
+    for path, message in check_drive(drive):
         yield ("drive", *path), message
     if joint.type == "prismatic":
         if drive.kind != "stepper":
@@ -191,10 +191,10 @@ def _own_drive(joint: Joint, drive: Drive, *, only_drive: bool) -> Iterator[Prob
     elif drive.lead is not None:
         yield ("drive", "lead"), "is for prismatic joints; use gear or pulley"
     else:
-        yield from reach_of_drive(drive, joint)
+        yield from check_drive_reach(drive, joint)
 
 
-def _weights(motor: Motor, robot: RobotKeys) -> Iterator[Problem]:
+def _check_weights(motor: Motor, robot: RobotKeys) -> Iterator[Problem]:
     types = {joint.name: joint.type for joint in robot.joints}
     for name, weight in motor.joints.items():
         if name not in types:
@@ -208,7 +208,7 @@ def _weights(motor: Motor, robot: RobotKeys) -> Iterator[Problem]:
         yield (), "a prismatic joint's stepper needs lead, the mm per turn"
 
 
-def _determined(robot: RobotKeys, motors: tuple[Motor, ...]) -> Iterator[Problem]:
+def _check_determined(robot: RobotKeys, motors: tuple[Motor, ...]) -> Iterator[Problem]:
     """The joints must follow from the motors: the weights' rank is the number of joints they name."""
     names = [joint.name for joint in robot.joints if any(joint.name in motor.joints for motor in motors)]
     rows = [[motor.joints.get(name, 0.0) for name in names] for motor in motors]
@@ -224,20 +224,20 @@ def _determined(robot: RobotKeys, motors: tuple[Motor, ...]) -> Iterator[Problem
         ]
 
 
-def _gripper(robot: RobotKeys) -> Iterator[Problem]:
+def _check_gripper(robot: RobotKeys) -> Iterator[Problem]:
     gripper = robot.gripper
     assert gripper is not None
-    for path, message in of_drive(gripper):
+    for path, message in check_drive(gripper):
         yield ("gripper", *path), message
     if gripper.open == gripper.closed:
         yield ("gripper", "closed"), f"is the same as open, {gripper.open:g}"
     if gripper.kind == "spindle":
-        yield from _spindle(gripper, robot.board)
+        yield from _check_spindle(gripper, robot.board)
     if gripper.kind == "servo" and gripper.travel is not None:
-        yield from _servo_travel(gripper, *gripper.travel)
+        yield from _check_servo_travel(gripper, *gripper.travel)
 
 
-def _spindle(gripper: Gripper, board: Board | None) -> Iterator[Problem]:
+def _check_spindle(gripper: Gripper, board: Board | None) -> Iterator[Problem]:
     if board is not None and board.kind != "grbl":
         yield ("gripper", "kind"), f"a spindle is GRBL's M3 output, which {board.kind} has not"
     for key in ("open", "closed"):
@@ -245,7 +245,7 @@ def _spindle(gripper: Gripper, board: Board | None) -> Iterator[Problem]:
             yield ("gripper", key), f"is an S word of M3, from 0 to GRBL's $30; {getattr(gripper, key):g} is none"
 
 
-def _servo_travel(gripper: Gripper, low: float, high: float) -> Iterator[Problem]:
+def _check_servo_travel(gripper: Gripper, low: float, high: float) -> Iterator[Problem]:
     turn = -1.0 if gripper.invert else 1.0
     for key in ("open", "closed"):
         angle = gripper.zero + turn * getattr(gripper, key)
@@ -253,7 +253,7 @@ def _servo_travel(gripper: Gripper, low: float, high: float) -> Iterator[Problem
             yield ("gripper", key), f"needs servo angle {angle:g}, outside the travel {low:g} to {high:g}"
 
 
-def _axes(robot: RobotKeys) -> Iterator[Problem]:
+def _check_axes(robot: RobotKeys) -> Iterator[Problem]:
     """Each axis is used once, and the board has it."""
     board = robot.board
     foreign = None if board is None else board_catalogue.foreign_board(board.kind)
@@ -268,9 +268,9 @@ def _axes(robot: RobotKeys) -> Iterator[Problem]:
                 yield (*path, key), f"{getattr(drive, key)} is used already; {_USED_ONCE[key]}"
         used |= {(key, getattr(drive, key)) for key in _USED_ONCE if getattr(drive, key) is not None}
         if drive.axis is not None:
-            yield from _lacks_axis(board, foreign, drive, path)
+            yield from _check_board_axis(board, foreign, drive, path)
     if board is not None:
-        yield from _board(robot, board)
+        yield from _check_board(robot, board)
 
 
 _USED_ONCE = {"id": "each servo has its own number on the bus", "axis": "each motor has its own axis"}
@@ -287,7 +287,7 @@ def _drives(robot: RobotKeys, foreign: ForeignBoard | None) -> Iterator[tuple[Pa
         yield ("gripper",), robot.gripper  # one of another kind is not the board's: `armkin grip` refuses
 
 
-def _lacks_axis(board: Board | None, foreign: ForeignBoard | None, drive: Drive, path: Path) -> Iterator[Problem]:
+def _check_board_axis(board: Board | None, foreign: ForeignBoard | None, drive: Drive, path: Path) -> Iterator[Problem]:
     """The board has no such axis."""
     if board is None:
         return
@@ -296,11 +296,11 @@ def _lacks_axis(board: Board | None, foreign: ForeignBoard | None, drive: Drive,
     else:
         allowed = BOARDS[board.kind].steppers if drive.kind == "stepper" else BOARDS[board.kind].servos
     if drive.axis not in allowed:
-        what = f"{board.kind} has no {drive.kind} axis {drive.axis}"
-        yield (*path, "axis"), f"{what}; it has {', '.join(allowed) or f'no {drive.kind}s at all'}"
+        problem = f"{board.kind} has no {drive.kind} axis {drive.axis}"
+        yield (*path, "axis"), f"{problem}; it has {', '.join(allowed) or f'no {drive.kind}s at all'}"
 
 
-def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
+def _check_board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
     if settings.kind not in BOARDS:
         for key in ("driver", "enable", "abort"):
             if getattr(settings, key) is not None:
@@ -310,10 +310,10 @@ def _board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
     for key in () if board.steppers else ("driver", "enable"):
         if getattr(settings, key) is not None:
             yield ("board", key), f"{settings.kind} has no stepper drivers; remove it"
-    yield from _inputs(robot, settings, board)
+    yield from _check_inputs(robot, settings, board)
 
 
-def _inputs(robot: RobotKeys, settings: Board, board: board_catalogue.Board) -> Iterator[Problem]:
+def _check_inputs(robot: RobotKeys, settings: Board, board: board_catalogue.Board) -> Iterator[Problem]:
     """The board senses what it is to sense."""
     if settings.power not in (None, board.power):
         yield ("board", "power"), f"{settings.kind} senses the motors' power at {board.power}, not {settings.power}"
@@ -321,6 +321,6 @@ def _inputs(robot: RobotKeys, settings: Board, board: board_catalogue.Board) -> 
         if joint.hard_limits and joint.homing is None:
             yield ("joints", i, "hard_limits"), "the joint has no limit switch; add homing:, which names it"
         if joint.homing is not None and joint.homing.switch not in board.switches:
-            what = f"{settings.kind} has no limit input {joint.homing.switch}"
-            message = f"{what}; it has {', '.join(board.switches) or 'none at all'}"
+            problem = f"{settings.kind} has no limit input {joint.homing.switch}"
+            message = f"{problem}; it has {', '.join(board.switches) or 'none at all'}"
             yield ("joints", i, "homing", "switch"), message

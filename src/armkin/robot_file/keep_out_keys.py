@@ -61,85 +61,85 @@ SHAPES = ("floor", "box", "capsule")
 _ITSELF = Entry.model_construct()
 
 
-def _read(value: Any) -> Any:
+def _to_entry(value: Any) -> Any:
     """``self`` as an entry; what is neither that nor a mapping is refused in words."""
     if value == SELF:
         return _ITSELF
     if isinstance(value, dict | Entry):
         return value
-    said = f"'{value}'" if isinstance(value, str) else "this"
-    raise PydanticCustomError("problem", "{said} is no keep-out; write {example}", {"said": said, "example": EXAMPLE})
+    shown = f"'{value}'" if isinstance(value, str) else "this"
+    raise PydanticCustomError("problem", "{said} is no keep-out; write {example}", {"said": shown, "example": EXAMPLE})
 
 
 EXAMPLE = "- self, - floor: 0, - box: {min: [200, -300, 0], max: [500, 300, 120]} or - capsule: {...}"
-ENTRIES: TypeAdapter[tuple[Entry, ...]] = TypeAdapter(tuple[Annotated[Entry, BeforeValidator(_read)], ...])
+ENTRIES: TypeAdapter[tuple[Entry, ...]] = TypeAdapter(tuple[Annotated[Entry, BeforeValidator(_to_entry)], ...])
 
 
-def read(values: Any) -> tuple[Entry, ...]:
+def read_keep_outs(values: Any) -> tuple[Entry, ...]:
     """The entries of a file. Raises PydanticCustomError with pydantic's `errors`, or with `problems`: path and text."""
-    found: list[tuple[Path, str]] = []
+    wrong: list[tuple[Path, str]] = []
     if not isinstance(values, tuple | list):
-        found = [(("keep_out",), f"must be a list; write {EXAMPLE}")]
+        wrong = [(("keep_out",), f"must be a list; write {EXAMPLE}")]
     elif len(values) > MOST:
-        found = [(("keep_out",), f"{len(values)} entries; a file has at most {MOST}: put a box around several")]
+        wrong = [(("keep_out",), f"{len(values)} entries; a file has at most {MOST}: put a box around several")]
     else:
         try:
             return ENTRIES.validate_python(tuple(values))
         except ValidationError as error:
-            errors = [{**one, "loc": ("keep_out", *one["loc"])} for one in error.errors(include_url=False)]
+            errors = [{**problem, "loc": ("keep_out", *problem["loc"])} for problem in error.errors(include_url=False)]
             raise PydanticCustomError("errors", "keep_out", {"errors": errors}) from None
-    raise PydanticCustomError("problems", "{text}", {"text": found[0][1], "problems": found})
+    raise PydanticCustomError("problems", "{text}", {"text": wrong[0][1], "problems": wrong})
 
 
-def names(entries: Iterable[Entry], used: Iterable[str] = ()) -> list[str]:
+def keep_out_names(entries: Iterable[Entry], used: Iterable[str] = ()) -> list[str]:
     """What each entry is called; defaults count the nameless ones of a kind."""
     count: dict[str, int] = {}
-    found = []
+    found_names = []
     for entry in entries:
         if entry.name is not None or entry.kind == SELF:
-            found.append(entry.name or SELF)
+            found_names.append(entry.name or SELF)
             continue
         number = count[entry.kind] = count.get(entry.kind, 0) + 1
-        found.append(entry.kind if entry.kind == "floor" and number == 1 else f"{entry.kind} {number}")
-    return found
+        found_names.append(entry.kind if entry.kind == "floor" and number == 1 else f"{entry.kind} {number}")
+    return found_names
 
 
-def problems(
+def keep_out_problems(
     entries: Iterable[Entry], bodies: Iterable[str] = (), earlier: Iterable[Entry] = ()
 ) -> Iterator[tuple[Path, str]]:
     """What is wrong with entries whose keys and types are right.
 
     bodies: names that the arm's own bodies have; earlier: the robot file's entries, where these are a scene's.
     """
-    own, given = set(bodies), list(earlier)
+    body_names, earlier_entries = set(bodies), list(earlier)
     entries = list(entries)
-    called = names([*given, *entries])
-    seen = set(called[: len(given)]) - {SELF}
-    for i, (entry, name) in enumerate(zip(entries, called[len(given) :], strict=True)):
-        for path, text in _shape(entry):
+    called = keep_out_names([*earlier_entries, *entries])
+    seen = set(called[: len(earlier_entries)]) - {SELF}
+    for i, (entry, name) in enumerate(zip(entries, called[len(earlier_entries) :], strict=True)):
+        for path, text in _check_shape(entry):
             yield ("keep_out", i, *path), text
         if entry.kind == SELF:
             continue
         if entry.name is not None and (not name.isprintable() or not name.strip() or name == SELF):
             yield ("keep_out", i, "name"), "must be a word or two of printable text, and not self"
-        if name in own:
+        if name in body_names:
             yield ("keep_out", i, "name"), f"{name} is the name of one of the arm's bodies; choose another one"
         if name in seen:
             yield ("keep_out", i), f"a keep-out named {name} is there already; give this one a name of its own"
         seen.add(name)
 
 
-def _shape(entry: Entry) -> Iterator[tuple[Path, str]]:
-    given = [kind for kind in SHAPES if getattr(entry, kind) is not None]
-    if not given and entry is not _ITSELF:
+def _check_shape(entry: Entry) -> Iterator[tuple[Path, str]]:
+    shapes = [kind for kind in SHAPES if getattr(entry, kind) is not None]
+    if not shapes and entry is not _ITSELF:
         yield (), f"is no keep-out: it has none of {', '.join(SHAPES)}; write {EXAMPLE}"
-    if len(given) > 1:
-        yield (), f"has {' and '.join(given)}; write an entry for each"
+    if len(shapes) > 1:
+        yield (), f"has {' and '.join(shapes)}; write an entry for each"
     if entry.box is not None:
-        yield from ((("box", *path), text) for path, text in _box(entry.box))
+        yield from ((("box", *path), text) for path, text in _check_box(entry.box))
 
 
-def _box(box: Box) -> Iterator[tuple[Path, str]]:
+def _check_box(box: Box) -> Iterator[tuple[Path, str]]:
     corners, placed = box.min is not None or box.max is not None, box.size is not None
     if corners and (placed or box.model_fields_set & {"xyz", "rpy"}):
         yield (), "has min or max and size, xyz or rpy; write {min, max}, or {size, xyz, rpy}"
@@ -148,10 +148,10 @@ def _box(box: Box) -> Iterator[tuple[Path, str]]:
     elif corners and (box.min is None or box.max is None):
         yield (), f"has no {'min' if box.min is None else 'max'}; a box has both corners"
     elif box.min is not None and box.max is not None:
-        yield from (((), text) for text in _thickness(box.min, box.max))
+        yield from (((), text) for text in _check_thickness(box.min, box.max))
 
 
-def _thickness(low_corner: Sequence[float], high_corner: Sequence[float]) -> Iterator[str]:
+def _check_thickness(low_corner: Sequence[float], high_corner: Sequence[float]) -> Iterator[str]:
     """What is wrong along each axis with a box of these corners."""
     for axis, low, high in zip("xyz", low_corner, high_corner, strict=True):
         if low == high:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armkin.robot_file.robot_file_text import number, scalar
+from armkin.robot_file.robot_file_text import number_text, scalar_text
 
 
 @dataclass(frozen=True)
@@ -53,35 +53,39 @@ _TAIL = """
 """
 
 
-def text(name: str, convention: str, rows: Sequence[Row], source: str = "", floor: float | None = None) -> str:
+def new_file_text(name: str, convention: str, rows: Sequence[Row], source: str = "", floor: float | None = None) -> str:
     """The file of a table.
 
     name, source: as the file shall say; convention: standard or modified; floor: z that the arm may not go below.
     """
     lines = [
         "# Millimetres and degrees throughout. `armkin info` prints the table as papers do: compare it line by line.",
-        f"name: {scalar(name)}",
-        f"source: {scalar(source)}" if source else "# source: where the numbers come from",
+        f"name: {scalar_text(name)}",
+        f"source: {scalar_text(source)}" if source else "# source: where the numbers come from",
         f"convention: {convention}   # {_HEAD[convention]}",
         "joints:",
     ]
     for i, row in enumerate(rows):
-        lines += _joint(row, _AXES[i % len(_AXES)], with_comments=i == 0)
-    entry = "# keep_out: [self, floor: 0]" if floor is None else f"keep_out: [floor: {_number(floor)}]"
-    fields = {"home": ", ".join(_number(row.home) for row in rows), "keep_out": f"{_KEEP_OUT}\n{entry}"}
+        lines += _joint_lines(row, _AXES[i % len(_AXES)], with_comments=i == 0)
+    entry = "# keep_out: [self, floor: 0]" if floor is None else f"keep_out: [floor: {_number_text(floor)}]"
+    fields = {"home": ", ".join(_number_text(row.home) for row in rows), "keep_out": f"{_KEEP_OUT}\n{entry}"}
     return "\n".join(lines) + "\n" + _TAIL % fields
 
 
-def _joint(row: Row, axis: str, *, with_comments: bool) -> list[str]:
+def _joint_lines(row: Row, axis: str, *, with_comments: bool) -> list[str]:
     unit = "mm" if row.prismatic else "deg"
-    dh = ", ".join(f"{key}: {_number(getattr(row, key))}" for key in ("alpha", "a", "d", "theta"))
+    dh = ", ".join(f"{key}: {_number_text(getattr(row, key))}" for key in ("alpha", "a", "d", "theta"))
     lower, upper = row.limits or (-90.0, 90.0)
     lead = ", lead: 8" if row.prismatic else ""
     entries = [
         ("type: prismatic", "its value is added to d", row.prismatic),
         (f"dh: {{{dh}}}", "theta, d: the constant part; the joint's value is added", True),
-        (f"limits: [{_number(lower)}, {_number(upper)}]", f"{unit}; absent: unlimited", row.limits is not None),
-        (f"home: {_number(row.home)}", "pulses are counted from here", True),
+        (
+            f"limits: [{_number_text(lower)}, {_number_text(upper)}]",
+            f"{unit}; absent: unlimited",
+            row.limits is not None,
+        ),
+        (f"home: {_number_text(row.home)}", "pulses are counted from here", True),
         ("sign: -1", "if the joint counts against its row", False),
         ("max_speed: 60", f"{unit}/s, for send", False),
         ("max_accel: 120", f"{unit}/s2, for send", False),
@@ -97,6 +101,6 @@ def _joint(row: Row, axis: str, *, with_comments: bool) -> list[str]:
     return lines
 
 
-def _number(value: float) -> str:
+def _number_text(value: float) -> str:
     """A number with at most ten digits, as people write it."""
-    return number(float(f"{value:.10g}"))
+    return number_text(float(f"{value:.10g}"))

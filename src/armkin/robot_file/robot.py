@@ -36,7 +36,7 @@ class RobotFile(RobotKeys):
         return self.model_copy(update={"tool": tool})
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _check_consistency(self) -> Self:
         if problems := list(cross_key_checks.problems(self)):
             raise PydanticCustomError("problems", "{text}", {"text": problems[0][1], "problems": problems})
         return self

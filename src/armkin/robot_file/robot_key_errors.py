@@ -119,7 +119,7 @@ _SYNONYMS: dict[str, str] = {
 
 def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
     """pydantic's error list (``ValidationError.errors()``) as paths and texts."""
-    suggested = _suggested(errors)
+    suggested = _suggested_keys(errors)
     wrong_lengths: set[Path] = set()
     for error in errors:
         path: Path = tuple(part for part in error["loc"] if part != "[key]")
@@ -134,29 +134,29 @@ def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
                 wrong_lengths.add(path[:-1])
                 yield path[:-1], f"is too short; write {_example(path[:-1])}"
         elif error["type"] != "missing" or path not in suggested:
-            yield path, _text(error)
+            yield path, _error_text(error)
 
 
-def _suggested(errors: list[Any]) -> set[Path]:
+def _suggested_keys(errors: list[Any]) -> set[Path]:
     """Keys that are meant by misspelt ones, and missing for that alone: it is said once."""
     unknown = [error["loc"] for error in errors if error["type"] == "extra_forbidden"]
     return {(*loc[:-1], key) for loc in unknown if (key := _suggestion(loc)) is not None}
 
 
-def _text(error: Any) -> str:
+def _error_text(error: Any) -> str:
     kind, path, value = error["type"], error["loc"], error["input"]
     context = error.get("ctx", {})
     if path and path[-1] in ("sign", "direction"):
         return f"must be 1 or -1, not {value_text(value)}"
     if kind in _BOUNDS:
         text = f"{_BOUNDS[kind].format(**context)}, not {value_text(value)}"
-        other = path[-1] in ("gear", "pulley") and value < 0
-        return f"{text}; for the other direction write invert: true" if other else text
+        is_negative_ratio = path[-1] in ("gear", "pulley") and value < 0
+        return f"{text}; for the other direction write invert: true" if is_negative_ratio else text
     words = _WORDS.get(kind)
     return str(error["msg"]) if words is None else words(path, value, context)
 
 
-def _missing(path: Path, value: Any, context: Any) -> str:
+def _missing_text(path: Path, value: Any, context: Any) -> str:
     key = str(path[-1])
     example = "text, for example three_dof" if path == ("name",) else _EXAMPLES.get(key)
     return f"is required: {example or _first_sentence(_owner(path), key)}"
@@ -176,17 +176,17 @@ def _another_type(path: Path, value: Any, context: Any) -> str:
     return f"must be {_example(path)}, not {value_text(value)}"
 
 
-def _not_a_number(what: str, path: Path, value: Any) -> str:
-    whole = what == "a whole number"
+def _not_a_number(kind: str, path: Path, value: Any) -> str:
+    is_whole = kind == "a whole number"
     if path[-1] in ("gear", "pulley"):
-        what += " or teeth {motor: 16, joint: 80}"
-    if whole and isinstance(value, float) and value.is_integer():
-        return f"must be {what}, not {value}; write {value:.0f}"
-    text = f"must be {what}, not {value_text(value)}"
-    return f"{text}{_instead(path[-1], value)}" if isinstance(value, str) else text
+        kind += " or teeth {motor: 16, joint: 80}"
+    if is_whole and isinstance(value, float) and value.is_integer():
+        return f"must be {kind}, not {value}; write {value:.0f}"
+    text = f"must be {kind}, not {value_text(value)}"
+    return f"{text}{_instead_text(path[-1], value)}" if isinstance(value, str) else text
 
 
-def _instead(key: str | int, value: str) -> str:
+def _instead_text(key: str | int, value: str) -> str:
     """What to write instead of text that is meant as a number; empty where that cannot be known."""
     bare = value.strip().lower()
     if key in ("theta", "d") and re.fullmatch(r"[+-]?(?:q|theta|th|d)_?[0-9]{0,2}\*?(?: *[+-].*)?", bare):
@@ -212,10 +212,10 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def _not_a_choice(value: str, expected: str, what: str) -> str:
+def _not_a_choice(value: str, expected: str, shown: str) -> str:
     choices = expected.replace(" or ", ", ").split(", ")
-    near = _nearest(value, choices)
-    return f"must be {expected}, not {what}" + (f"; did you mean {near}?" if near else "")
+    near = _nearest_key(value, choices)
+    return f"must be {expected}, not {shown}" + (f"; did you mean {near}?" if near else "")
 
 
 def _unknown_key(path: Path) -> str:
@@ -223,22 +223,22 @@ def _unknown_key(path: Path) -> str:
     near = _suggestion(path)
     if near is not None:
         return f"unknown key; did you mean {near}?"
-    for name, other in _models(path).items():
-        if key in other.model_fields and other is not owner and name:
-            return f"unknown key here; it belongs in {_place(name)}"
+    for name, model in _models(path).items():
+        if key in model.model_fields and model is not owner and name:
+            return f"unknown key here; it belongs in {_place_name(name)}"
     if key in robot_keys.RobotKeys.model_fields and path[0] != "keep_out":
         return "unknown key here; it belongs at the top of the file"
     return f"unknown key; the keys here are {', '.join(_keys(owner))}"
 
 
-def _place(name: str) -> str:
+def _place_name(name: str) -> str:
     return {"joints": "a joint", "motors": "motors"}.get(name, name)
 
 
 def _suggestion(path: Path) -> str | None:
     key, owner = str(path[-1]), _owner(path)
-    belongs = any(key in _keys(other) for other in _models(path).values())
-    return None if belongs else _nearest(key, _keys(owner), {} if path[0] == "keep_out" else _SYNONYMS)
+    belongs = any(key in _keys(model) for model in _models(path).values())
+    return None if belongs else _nearest_key(key, _keys(owner), {} if path[0] == "keep_out" else _SYNONYMS)
 
 
 def _keys(owner: type[BaseModel]) -> list[str]:
@@ -246,7 +246,7 @@ def _keys(owner: type[BaseModel]) -> list[str]:
     return [field.alias or name for name, field in owner.model_fields.items()]
 
 
-def _nearest(word: str, choices: list[str], synonyms: dict[str, str] = _SYNONYMS) -> str | None:
+def _nearest_key(word: str, choices: list[str], synonyms: dict[str, str] = _SYNONYMS) -> str | None:
     import difflib
 
     low = word.strip().lower().replace("-", "_").replace(" ", "_")
@@ -311,7 +311,7 @@ _BOUNDS = {
 # What is said of each kind of error, from its path, the value found and what pydantic says besides.
 _WORDS: dict[str, Callable[[Path, Any, Any], str]] = {
     "extra_forbidden": lambda path, _value, _context: _unknown_key(path),
-    "missing": _missing,
+    "missing": _missing_text,
     "too_long": _too_long,
     "too_short": _too_short,
     "tuple_type": _another_type,

@@ -26,20 +26,20 @@ Task = Literal["xy", "xy_theta", "xyz", "xyz_pitch", "xyz_yaw", "xyz_pitch_roll"
 Driver = Literal["A4988", "DRV8825", "TMC2208", "TMC2209"]
 
 
-def _installed(kind: str) -> str:
+def _check_kind(kind: str) -> str:
     if not board_catalogue.kind_exists(kind):
-        *others, last = map(repr, board_catalogue.kind_names())
+        *names, last = map(repr, board_catalogue.kind_names())
         raise PydanticCustomError(
-            "literal_error", "Input should be {expected}", {"expected": f"{', '.join(others)} or {last}"}
+            "literal_error", "Input should be {expected}", {"expected": f"{', '.join(names)} or {last}"}
         )
     return kind
 
 
-def _kinds(schema: dict[str, Any]) -> None:
+def _add_kinds(schema: dict[str, Any]) -> None:
     schema["enum"] = list(board_catalogue.kind_names())
 
 
-BoardKind = Annotated[str, AfterValidator(_installed), Field(json_schema_extra=_kinds)]
+BoardKind = Annotated[str, AfterValidator(_check_kind), Field(json_schema_extra=_add_kinds)]
 
 # Bounds that no arm comes near: they catch slips of units, and keep every later product finite.
 Value = Annotated[float, Field(ge=-1e6, le=1e6)]  # of a joint: degrees or millimetres
@@ -58,7 +58,7 @@ def _keep_out(values: Any) -> Any:
     """The entries of `armkin.robot_file.keep_out_keys`, whose models are built for files that have some alone."""
     from armkin.robot_file import keep_out_keys
 
-    return keep_out_keys.read(values)
+    return keep_out_keys.read_keep_outs(values)
 
 
 KeepOut = Annotated[tuple[Any, ...], BeforeValidator(_keep_out)]
@@ -74,13 +74,13 @@ def cross(a: Triple, b: Triple) -> Triple:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _ratio(value: Any) -> Any:
+def _teeth_to_ratio(value: Any) -> Any:
     """Teeth ``{motor: 16, joint: 80}`` to the reduction 5.0; a number stays what it is."""
     if not isinstance(value, dict):
         return value
     motor, joint = value.get("motor", 0), value.get("joint", 0)
-    whole = type(motor) is type(joint) is int and len(value) == 2
-    if whole and 1 <= motor <= 10_000 and 1 <= joint <= 10_000:
+    are_teeth = type(motor) is type(joint) is int and len(value) == 2
+    if are_teeth and 1 <= motor <= 10_000 and 1 <= joint <= 10_000:
         return joint / motor
     raise PydanticCustomError("problem", "teeth are whole numbers from 1 to 10000: {motor: 16, joint: 80}")
 
@@ -89,7 +89,7 @@ _TEETH = {"type": "integer", "minimum": 1, "maximum": 10_000}
 Ratio = Annotated[
     float,
     Field(ge=1e-6, le=1e6),
-    BeforeValidator(_ratio),
+    BeforeValidator(_teeth_to_ratio),
     WithJsonSchema(
         {
             "anyOf": [

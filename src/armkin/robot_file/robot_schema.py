@@ -94,7 +94,7 @@ def scene_schema() -> dict[str, Any]:
 
 def with_keep_out(schema: dict[str, Any]) -> dict[str, Any]:
     """A schema whose `keep_out` says what an entry is: the word self, or one of the shapes."""
-    made = _tidied(TypeAdapter(keep_out_keys.Entry).json_schema(schema_generator=_Generator))
+    made = _tidy_schema(TypeAdapter(keep_out_keys.Entry).json_schema(schema_generator=_Generator))
     schema.setdefault("$defs", {}).update(made.pop("$defs", {}))
     schema["$defs"]["Entry"] = made
     items = {"anyOf": [{"const": keep_out_keys.SELF}, {"$ref": "#/$defs/Entry"}]}
@@ -104,11 +104,11 @@ def with_keep_out(schema: dict[str, Any]) -> dict[str, Any]:
 
 def made_from(model: type[BaseModel], title: str, **more: Any) -> dict[str, Any]:
     """The schema of a kind of file; more: keys that stand before those of the model."""
-    made = _tidied(model.model_json_schema(schema_generator=_Generator))
+    made = _tidy_schema(model.model_json_schema(schema_generator=_Generator))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **more, **made}
 
 
-def _tidied(part: Any) -> Any:
+def _tidy_schema(part: Any) -> Any:
     """A schema that does not depend on pydantic's version: whole bounds as integers, a lone reference without allOf.
 
     Titles go ("Max Speed"), as they hide the descriptions in editors' hovers.
@@ -116,12 +116,12 @@ def _tidied(part: Any) -> Any:
     if isinstance(part, float) and part.is_integer():
         return int(part)
     if isinstance(part, list):
-        return [_tidied(value) for value in part]
+        return [_tidy_schema(value) for value in part]
     if not isinstance(part, dict):
         return part
-    kept = {k: _tidied(v) for k, v in part.items() if not (k == "title" and isinstance(v, str))}
-    match kept.get("allOf"):
+    tidy = {k: _tidy_schema(v) for k, v in part.items() if not (k == "title" and isinstance(v, str))}
+    match tidy.get("allOf"):
         case [{"$ref": str(reference)}]:
-            del kept["allOf"]
-            return {"$ref": reference, **kept}
-    return kept
+            del tidy["allOf"]
+            return {"$ref": reference, **tidy}
+    return tidy

@@ -38,7 +38,7 @@ class Scene(Model):
         return self._sha256
 
 
-def read(path: str | os.PathLike[str]) -> Scene:
+def read_scene(path: str | os.PathLike[str]) -> Scene:
     """Read and validate a scene. Raises FileError, or RobotFileError with the line."""
     name = os.fspath(path)
     try:
@@ -47,28 +47,28 @@ def read(path: str | os.PathLike[str]) -> Scene:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(f"{name}: cannot read the scene: {reason}", file=name) from None
-    return parse(raw, name)
+    return parse_scene(raw, name)
 
 
-def parse(raw: bytes | str, name: str = "scene.yaml") -> Scene:
+def parse_scene(raw: bytes | str, name: str = "scene.yaml") -> Scene:
     """Validate the text of a scene; `name` is what messages call it."""
-    data = raw.encode() if isinstance(raw, str) else raw
+    encoded = raw.encode() if isinstance(raw, str) else raw
     try:
-        document = strict_yaml.loads(data, _KIND)
+        document = strict_yaml.load_yaml(encoded, _KIND)
     except strict_yaml.StrictYamlError as error:
         _refuse(name, [(error.line, error.problem)])
     try:
         scene = Scene.model_validate(document.data)
     except ValidationError as error:
-        told = []
+        problems = []
         for path, text in robot_key_errors.problems(error.errors(include_url=False)):
             if text.startswith("unknown key") and len(path) == 1:
                 text = "unknown key; a scene has clearance and keep_out"
-            told.append((path, text))
-        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in told])
-    scene._path, scene._sha256 = name, hashlib.sha256(data).hexdigest()
-    if found := list(entries.problems(scene.keep_out)):
-        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in found])
+            problems.append((path, text))
+        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in problems])
+    scene._path, scene._sha256 = name, hashlib.sha256(encoded).hexdigest()
+    if wrong := list(entries.keep_out_problems(scene.keep_out)):
+        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in wrong])
     return scene
 
 
@@ -76,15 +76,15 @@ def _place_text(path: strict_yaml.Path) -> str:
     """The place in words: ``keep_out 2: box.min: ``."""
     if not path:
         return ""
-    key, rest = path[0], path[1:]
-    if rest and isinstance(rest[0], int):
-        key, rest = f"{key} {rest[0] + 1}", rest[1:]
-    inner = ".".join(strict_yaml.one_line(str(part)) for part in rest if not isinstance(part, int))
+    key, inside = path[0], path[1:]
+    if inside and isinstance(inside[0], int):
+        key, inside = f"{key} {inside[0] + 1}", inside[1:]
+    inner = ".".join(strict_yaml.one_line(str(part)) for part in inside if not isinstance(part, int))
     return f"{strict_yaml.one_line(str(key))}: " + (f"{inner}: " if inner else "")
 
 
 def _refuse(name: str, problems: list[tuple[int, str]]) -> NoReturn:
     problems.sort(key=lambda problem: problem[0])
-    told = [f"{name}:{line}: {text}" if line else f"{name}: {text}" for line, text in problems]
-    more = f"\nand {len(told) - _TOLD} more problems" if len(told) > _TOLD else ""
-    raise RobotFileError("\n".join(told[:_TOLD]) + more, file=name, line=problems[0][0] or None, problems=told)
+    lines = [f"{name}:{line}: {text}" if line else f"{name}: {text}" for line, text in problems]
+    more = f"\nand {len(lines) - _TOLD} more problems" if len(lines) > _TOLD else ""
+    raise RobotFileError("\n".join(lines[:_TOLD]) + more, file=name, line=problems[0][0] or None, problems=lines)

@@ -6,9 +6,9 @@ and ``1e3`` is not text. Anchors and aliases are refused as a whole, because a f
 unfold into gigabytes; so are tags, merge keys and several documents. A value that all YAML readers
 agree on (``-3.5``, ``.5``, ``1.0e+3``, ``true``, ``"text"``) is accepted.
 
->>> loads("a: [1, 2.5]\\nb: {c: x}\\n").data
+>>> load_yaml("a: [1, 2.5]\\nb: {c: x}\\n").data
 {'a': (1, 2.5), 'b': {'c': 'x'}}
->>> loads("gear: 80:16")
+>>> load_yaml("gear: 80:16")
 Traceback (most recent call last):
     ...
 armkin.robot_file.strict_yaml.StrictYamlError: 1: 80:16 is 4816 to YAML; write teeth as {motor: 16, joint: 80}
@@ -88,7 +88,7 @@ class Document:
         return self.lines[path]
 
 
-def loads(text: bytes | str, kind: Kind = ROBOT_FILE) -> Document:
+def load_yaml(text: bytes | str, kind: Kind = ROBOT_FILE) -> Document:
     """Read one YAML document whose top level is a mapping.
 
     text: bytes in UTF-8 (a byte order mark is accepted) or text; kind: what messages call it
@@ -107,16 +107,16 @@ def _decode(raw: bytes | str, kind: Kind) -> str:
             text = raw.decode("utf-8")
         except UnicodeDecodeError as error:
             line = raw.count(b"\n", 0, error.start) + 1
-            what = f"byte 0x{raw[error.start]:02x} is not UTF-8"
-            raise StrictYamlError(line, f"{what}; save the file as UTF-8 text") from None
+            problem = f"byte 0x{raw[error.start]:02x} is not UTF-8"
+            raise StrictYamlError(line, f"{problem}; save the file as UTF-8 text") from None
     if len(text) > kind.size:
         raise StrictYamlError(0, f"larger than {kind.size // 1024} kB; no {kind.name} is that long")
     text = text.removeprefix("\ufeff")
     for character in set(text):
         if not _is_text(ord(character)):
             line = text.count("\n", 0, text.index(character)) + 1
-            what = f"U+{ord(character):04X} has no place in a {kind.name}, which is YAML text"
-            raise StrictYamlError(line, f"character {what}")
+            problem = f"U+{ord(character):04X} has no place in a {kind.name}, which is YAML text"
+            raise StrictYamlError(line, f"character {problem}")
     return text
 
 
@@ -149,12 +149,12 @@ def _parse(text: str, kind: Kind) -> Iterator[Any]:
         if problem.startswith("exceeded maximum nesting depth"):  # libyaml's own bound, 1,000, which it reads ahead to
             raise StrictYamlError(line, _too_deep(kind)) from None
         begin = error.context_mark.line + 1 if error.context_mark else line
-        where = f" ({error.context} that begins on line {begin})" if begin < line else ""
+        context = f" ({error.context} that begins on line {begin})" if begin < line else ""
         hint = "check the colon and space after keys, the indentation, brackets and quotes"
         if problem.startswith("mapping values are not allowed"):
             problem = "a key inside a value"
             hint = "text with ': ' in it needs quotes; the keys of one mapping are indented alike"
-        raise StrictYamlError(line, f"not YAML: {problem}{where}; {hint}") from None
+        raise StrictYamlError(line, f"not YAML: {problem}{context}; {hint}") from None
     except yaml.YAMLError as error:  # the reader's: a character that YAML has no place for
         raise StrictYamlError(0, f"not YAML: {' '.join(str(error).split())}") from None
 
@@ -191,7 +191,7 @@ class _Node:
             self.items.append(value)
 
 
-def _path(parent: _Node | None) -> Path:
+def _next_path(parent: _Node | None) -> Path:
     """The place of the next value."""
     return parent.value_path() if parent else ()
 
@@ -224,15 +224,15 @@ class _Builder:
         awaits_key = parent is not None and parent.mapping and parent.key is None
         if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
             _check_place(awaits_key, len(self._stack), line, self.kind)
-            self._stack.append(_Node(_path(parent), isinstance(event, yaml.MappingStartEvent)))
+            self._stack.append(_Node(_next_path(parent), isinstance(event, yaml.MappingStartEvent)))
             self.lines.setdefault(self._stack[-1].path, line)
         elif isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
             self._put(self._stack.pop().value(), line)
         elif isinstance(event, yaml.ScalarEvent) and parent is not None and awaits_key:
-            parent.key = _key(event, parent, self.lines, line)
+            parent.key = _read_key(event, parent, self.lines, line)
         elif isinstance(event, yaml.ScalarEvent):
-            value = _scalar(event, parent, line, self.kind)
-            self.lines.setdefault(_path(parent), line)
+            value = _read_scalar(event, parent, line, self.kind)
+            self.lines.setdefault(_next_path(parent), line)
             self._put(value, line)
 
     def _put(self, value: Any, line: int) -> None:
@@ -242,7 +242,7 @@ class _Builder:
         if self._stack:
             self._stack[-1].add(value)
         else:
-            self.root = _mapping(value, self.lines, self.kind)
+            self.root = _check_mapping(value, self.lines, self.kind)
 
 
 def _check_place(awaits_key: bool, depth: int, line: int, kind: Kind) -> None:
@@ -257,24 +257,24 @@ def _refuse_what_unfolds(event: Any, line: int) -> None:
     """Raise StrictYamlError for an anchor, an alias or a tag."""
     if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
         mark = "*" if isinstance(event, yaml.AliasEvent) else "&"
-        what = f"{mark}{one_line(event.anchor)}: anchors and aliases are refused, as they can unfold"
+        problem = f"{mark}{one_line(event.anchor)}: anchors and aliases are refused, as they can unfold"
         hint = f"write the value out, or quote text that begins with {mark}"
-        raise StrictYamlError(line, f"{what} without bound; {hint}")
+        raise StrictYamlError(line, f"{problem} without bound; {hint}")
     if getattr(event, "tag", None) is not None:
-        what = f"tag {one_line(event.tag)} is refused: values are plain numbers, text, lists and mappings"
-        raise StrictYamlError(line, f"{what}; remove the tag")
+        problem = f"tag {one_line(event.tag)} is refused: values are plain numbers, text, lists and mappings"
+        raise StrictYamlError(line, f"{problem}; remove the tag")
 
 
-def _mapping(value: Any, lines: dict[Path, int], kind: Kind) -> dict[str, Any]:
+def _check_mapping(value: Any, lines: dict[Path, int], kind: Kind) -> dict[str, Any]:
     """The document's value, which is a mapping."""
     if isinstance(value, dict):
         return value
-    found = "a list" if isinstance(value, tuple) else f"only the text {one_line(str(value))}"
-    what = f"{found}; a {kind.name} is a mapping: {kind.mapping}"
-    raise StrictYamlError(lines[()], f"{what} (a space follows each colon)")
+    kind_found = "a list" if isinstance(value, tuple) else f"only the text {one_line(str(value))}"
+    problem = f"{kind_found}; a {kind.name} is a mapping: {kind.mapping}"
+    raise StrictYamlError(lines[()], f"{problem} (a space follows each colon)")
 
 
-def _key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
+def _read_key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
     text = str(event.value)
     if event.implicit[0]:  # plain, without quotes
         if text == "<<":
@@ -292,7 +292,7 @@ def _key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
     return text
 
 
-def _scalar(event: Any, parent: _Node | None, line: int, kind: Kind) -> Any:
+def _read_scalar(event: Any, parent: _Node | None, line: int, kind: Kind) -> Any:
     text = str(event.value)
     if not event.implicit[0]:  # in quotes, or a block of text
         _check_text(text, line)
@@ -313,18 +313,18 @@ def _resolve(text: str, line: int) -> str | int | float | bool:
     """Value of a plain scalar, or the trap that it is."""
     first = text[0]
     if first.isdigit() or first in "+-.":
-        return _number(text, line)
+        return _read_number(text, line)
     word = text.lower()
     if word in ("true", "false"):
         return word == "true"
     if word in _WORDS_FOR_TRUE or word in _WORDS_FOR_FALSE:
         meant = "true" if word in _WORDS_FOR_TRUE else "false"
-        what = f"{text} is {meant} to some YAML readers and text to others"
-        raise StrictYamlError(line, f'{what}; write {meant}, or "{text}" for text')
+        problem = f"{text} is {meant} to some YAML readers and text to others"
+        raise StrictYamlError(line, f'{problem}; write {meant}, or "{text}" for text')
     return text
 
 
-def _number(text: str, line: int) -> str | int | float:
+def _read_number(text: str, line: int) -> str | int | float:
     if re.fullmatch(_INT, text):
         if len(text) > MAX_DIGITS:
             raise StrictYamlError(line, f"{one_line(text)} has more than {MAX_DIGITS} digits; is it a number?")
@@ -343,29 +343,29 @@ def _number(text: str, line: int) -> str | int | float:
 def _refuse_what_misleads(text: str, line: int) -> None:
     """Raise StrictYamlError for text that YAML, or some reader of it, takes for a number or a date."""
     if re.fullmatch(_SEXAGESIMAL, text):
-        raise StrictYamlError(line, _sexagesimal(text))
+        raise StrictYamlError(line, _sexagesimal_text(text))
     if zeros := re.fullmatch(_LEADING_ZERO, text):
-        rest = zeros[2].replace("_", "").lstrip("0")
-        plain = zeros[1] + (rest if rest[:1].isdigit() else f"0{rest}")
-        what = f"{one_line(text)} begins with 0, which YAML may read as octal"
-        raise StrictYamlError(line, f"{what}; write {one_line(plain)}, or quotes for text")
+        digits = zeros[2].replace("_", "").lstrip("0")
+        plain = zeros[1] + (digits if digits[:1].isdigit() else f"0{digits}")
+        problem = f"{one_line(text)} begins with 0, which YAML may read as octal"
+        raise StrictYamlError(line, f"{problem}; write {one_line(plain)}, or quotes for text")
     if re.fullmatch(_OTHER_BASE, text):
         raise StrictYamlError(line, f"{one_line(text)} is not decimal; write it in decimal, or in quotes")
     if "_" in text and re.fullmatch(_UNDERSCORE, text):
         plain = text.replace("_", "")
         raise StrictYamlError(line, f"{one_line(text)} has underscores; write {one_line(plain)}")
     if (near := re.fullmatch(_LIKE_FLOAT, text)) and (near[2] or near[3]):
-        sign, whole, part, exponent_sign, exponent = near.groups()
-        better = f"{sign.replace('+', '')}{whole or '0'}.{part or '0'}"
+        sign, integer, part, exponent_sign, exponent = near.groups()
+        better = f"{sign.replace('+', '')}{integer or '0'}.{part or '0'}"
         if exponent:
             better += f"e{exponent_sign or '+'}{exponent}"
-        what = f"{one_line(text)} is text to YAML, not a number"
-        raise StrictYamlError(line, f"{what}; write {one_line(better)}, or quotes for text")
+        problem = f"{one_line(text)} is text to YAML, not a number"
+        raise StrictYamlError(line, f"{problem}; write {one_line(better)}, or quotes for text")
     if re.fullmatch(_TIMESTAMP, text):
         raise StrictYamlError(line, f'{one_line(text)} is a date to YAML; write "{text}" for text')
 
 
-def _sexagesimal(text: str) -> str:
+def _sexagesimal_text(text: str) -> str:
     parts = text.lstrip("+-").split(":")
     if len(parts) == 2 and all(part.isdigit() and len(part) < 6 for part in parts):
         large, small = int(parts[0]), int(parts[1])
@@ -381,8 +381,8 @@ def _check_text(text: str, line: int) -> None:
         return
     for character in set(text) - {"\t", "\n"}:
         if not _is_text(ord(character)) or character == "\r":
-            what = f"control character U+{ord(character):04X} in a text"
-            raise StrictYamlError(line, f"{what}; remove it")
+            problem = f"control character U+{ord(character):04X} in a text"
+            raise StrictYamlError(line, f"{problem}; remove it")
 
 
 def one_line(text: str) -> str:

@@ -45,11 +45,11 @@ class _Reader:
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
         """An element begins."""
         self.depth += 1
-        self._check(tag)
+        self._check_element(tag)
         if self.depth == 1:
             self.robot = attributes.get("name", "")
         elif self.depth == 2 and tag in ("link", "joint"):
-            self._named(tag, attributes)
+            self._add_named(tag, attributes)
         elif self.depth == 3 and self.joint is not None:
             self.joint.parts.setdefault(tag, dict(attributes))
         elif self.open_tags[1:] == ["link", "collision", "geometry"]:
@@ -60,23 +60,23 @@ class _Reader:
             self.visuals[next(reversed(self.links))][-1][tag] = dict(attributes)
         self.open_tags.append(tag)
 
-    def _check(self, tag: str) -> None:
+    def _check_element(self, tag: str) -> None:
         if "xacro" in tag:
             raise is_xacro(self.name)
         if self.depth > MAX_DEPTH:
             raise RobotFileError(f"{self.name}: elements nested deeper than {MAX_DEPTH}; a URDF has about 5")
         if self.depth == 1 and tag != "robot":
-            what = _FORMATS.get(tag, f"its outermost element is <{tag[:40]}>")
-            raise RobotFileError(f"{self.name}: is not a URDF but {what}; a URDF begins with <robot name=...>")
+            format = _FORMATS.get(tag, f"its outermost element is <{tag[:40]}>")
+            raise RobotFileError(f"{self.name}: is not a URDF but {format}; a URDF begins with <robot name=...>")
 
-    def _named(self, tag: str, attributes: Mapping[str, str]) -> None:
+    def _add_named(self, tag: str, attributes: Mapping[str, str]) -> None:
         name = attributes.get("name")
         if not name:
             raise RobotFileError(f"{self.name}: a <{tag}> has no name")
-        known: Mapping[str, object] = self.links if tag == "link" else self.joints
-        if name in known:
+        items: Mapping[str, object] = self.links if tag == "link" else self.joints
+        if name in items:
             raise RobotFileError(f"{self.name}: two {tag}s are named {name}; the names of {tag}s are unique")
-        if len(known) >= MAX_LINKS:
+        if len(items) >= MAX_LINKS:
             raise RobotFileError(f"{self.name}: more than {MAX_LINKS} {tag}s")
         if tag == "link":
             self.links[name] = None
@@ -98,7 +98,7 @@ class _Reader:
         """The document has ended."""
 
 
-def document(raw: bytes, name: str) -> tuple[str, Tree]:
+def parse_document(raw: bytes, name: str) -> tuple[str, Tree]:
     """The robot's name, and its links and joints."""
     try:
         from defusedxml.common import DefusedXmlException
@@ -139,12 +139,12 @@ class Tree:
         self.parent: dict[str, Joint] = {}  # link -> the joint that it hangs on
         self.children: dict[str, list[Joint]] = {link: [] for link in links}
         for joint in joints:
-            self._hang(joint)
+            self._add_joint(joint)
         for link in links:
             self._check_way_down(link)
 
-    def _hang(self, joint: Joint) -> None:
-        parent, child = self._link(joint, "parent"), self._link(joint, "child")
+    def _add_joint(self, joint: Joint) -> None:
+        parent, child = self._link_of_joint(joint, "parent"), self._link_of_joint(joint, "child")
         if child in self.parent:
             first = self.parent[child].name
             raise RobotFileError(
@@ -154,13 +154,13 @@ class Tree:
         self.parent[child] = joint
         self.children[parent].append(joint)
 
-    def _link(self, joint: Joint, what: str) -> str:
+    def _link_of_joint(self, joint: Joint, end: str) -> str:
         """A joint's parent or child."""
-        link = joint.text(what, "link")
+        link = joint.text(end, "link")
         if link is None:
-            raise RobotFileError(f"{self.name}: joint {joint.name}: has no <{what} link=...>")
+            raise RobotFileError(f"{self.name}: joint {joint.name}: has no <{end} link=...>")
         if link not in self.children:
-            raise RobotFileError(f"{self.name}: joint {joint.name}: there is no {what} link {link}")
+            raise RobotFileError(f"{self.name}: joint {joint.name}: there is no {end} link {link}")
         return link
 
     def _check_way_down(self, link: str) -> None:
@@ -182,10 +182,10 @@ class Tree:
             return self._existing_link(base, "base")
         roots = [link for link in self.links if link not in self.parent and self.children[link]]
         if len(roots) != 1:
-            what = f"several links have no parent: {in_words(roots)}" if roots else "no link carries another"
+            problem = f"several links have no parent: {in_words(roots)}" if roots else "no link carries another"
             if not roots:
-                raise RobotFileError(f"{self.name}: {what}; there is no chain")
-            raise UsageError(f"{self.name}: {what}; the base must be named")
+                raise RobotFileError(f"{self.name}: {problem}; there is no chain")
+            raise UsageError(f"{self.name}: {problem}; the base must be named")
         return roots[0]
 
     def tip(self, base: str, tip: str | None) -> str:
@@ -197,7 +197,7 @@ class Tree:
             if link != base:
                 raise UsageError(f"{self.name}: tip {tip} does not hang on base {base}")
             return tip
-        leaves = [(self.moving(base, link), link) for link in self.leaves(base)]
+        leaves = [(self.count_moving(base, link), link) for link in self.leaves(base)]
         moving = [link for count, link in leaves if count]
         if not moving:
             raise RobotFileError(f"{self.name}: no joint moves between {base} and its ends; there is no arm")
@@ -211,16 +211,16 @@ class Tree:
 
     def leaves(self, base: str) -> list[str]:
         """Links below base that carry none."""
-        found, stack = [], [base]
+        leaves, stack = [], [base]
         while stack:
             link = stack.pop()
             below = [str(joint.text("child", "link")) for joint in self.children[link]]
             stack += below
             if not below:
-                found.append(link)
-        return sorted(found, key=self.links.index)
+                leaves.append(link)
+        return sorted(leaves, key=self.links.index)
 
-    def moving(self, base: str, link: str) -> int:
+    def count_moving(self, base: str, link: str) -> int:
         """How many moving joints lie between base and a link."""
         return sum(joint.kind != "fixed" for joint in self.chain(base, link))
 
@@ -241,14 +241,14 @@ class Tree:
             tip = str(joints[-1].text("parent", "link"))
         return joints[::-1]
 
-    def body(self, link: str) -> list[tuple[str, dict[str, str]]]:
+    def collision_shapes(self, link: str) -> list[tuple[str, dict[str, str]]]:
         """The collision shapes of a link and of all that is fixed to it."""
-        found, stack = [], [link]
+        shapes, stack = [], [link]
         while stack:
             link = stack.pop()
-            found += self.solids[link]
+            shapes += self.solids[link]
             stack += [str(joint.text("child", "link")) for joint in self.children[link] if joint.kind == "fixed"]
-        return found
+        return shapes
 
     def _existing_link(self, link: str, role: str) -> str:
         if link not in self.children:

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.errors import FileError, RobotFileError
-from armkin.robot_file.robot_file_text import pose, tidy
-from armkin.robot_file.urdf_document import Joint, Tree, document, is_xacro
+from armkin.robot_file.robot_file_text import pose_keys, tidy
+from armkin.robot_file.urdf_document import Joint, Tree, is_xacro, parse_document
 
 MAX_BYTES = 8 * 2**20
 SNAP = 1e-4  # [rad] an angle this close to a right angle counts as one, with `snap`
@@ -52,15 +52,15 @@ class UrdfRobot:
     tip: str
 
 
-def read(
+def read_urdf(
     path: str | os.PathLike[str], *, base: str | None = None, tip: str | None = None, snap: bool = False
 ) -> UrdfRobot:
-    """Read a URDF file; see `parse`. Raises FileError if it cannot be read."""
+    """Read a URDF file; see `parse_urdf`. Raises FileError if it cannot be read."""
     name = os.fspath(path)
-    return parse(load(name), name, base=base, tip=tip, snap=snap)
+    return parse_urdf(read_bytes(name), name, base=base, tip=tip, snap=snap)
 
 
-def load(path: str) -> bytes:
+def read_bytes(path: str) -> bytes:
     """A file's bytes, MAX_BYTES and one more at most; `-`: what stands in standard input. Raises FileError."""
     try:
         with nullcontext(sys.stdin.buffer) if path == "-" else Path(path).open("rb") as file:
@@ -70,7 +70,7 @@ def load(path: str) -> bytes:
         raise FileError(f"{path}: cannot read the URDF: {reason}") from None
 
 
-def parse(
+def parse_urdf(
     raw: bytes, name: str = "robot.urdf", *, base: str | None = None, tip: str | None = None, snap: bool = False
 ) -> UrdfRobot:
     """The chain from link `base` to link `tip` as a robot file with convention screws.
@@ -81,26 +81,26 @@ def parse(
     """
     if len(raw) > MAX_BYTES:
         raise RobotFileError(f"{name}: larger than {MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes")
-    robot, tree = document(raw, name)
+    robot, tree = parse_document(raw, name)
     first = tree.base(base)
     chain = tree.chain(first, tree.tip(first, tip))
-    found = _robot(name, robot, chain, first, tip or (chain[-1].parts["child"]["link"]), snap)
-    _bodies(found.data, tree, first, [joint for joint in chain if joint.kind != "fixed"])
-    return found
+    robot_read = _chain_as_robot(name, robot, chain, first, tip or (chain[-1].parts["child"]["link"]), snap)
+    _note_bodies(robot_read.data, tree, first, [joint for joint in chain if joint.kind != "fixed"])
+    return robot_read
 
 
-def _bodies(data: dict[str, Any], tree: Tree, base: str, joints: list[Joint]) -> None:
+def _note_bodies(keys: dict[str, Any], tree: Tree, base: str, joints: list[Joint]) -> None:
     """Note the radius of every body whose collision shapes are all round: boxes and meshes tell none."""
-    moving = data.pop("joints")
-    if radius := _radius(tree.body(base)):
-        data["base"] = {"body": {"radius": radius}}
+    moving = keys.pop("joints")
+    if radius := _greatest_radius(tree.collision_shapes(base)):
+        keys["base"] = {"body": {"radius": radius}}
     for joint, entry in zip(joints, moving, strict=True):
-        if radius := _radius(tree.body(str(joint.text("child", "link")))):
+        if radius := _greatest_radius(tree.collision_shapes(str(joint.text("child", "link")))):
             entry["body"] = {"radius": radius}
-    data["joints"] = moving
+    keys["joints"] = moving
 
 
-def _radius(solids: list[tuple[str, dict[str, str]]]) -> float | None:
+def _greatest_radius(solids: list[tuple[str, dict[str, str]]]) -> float | None:
     """The greatest radius of shapes [mm]; None where one has no radius, or one beyond a kilometre."""
     radii = [of.get("radius", "").strip() if tag in _ROUND else "" for tag, of in solids]
     if not radii or not all(_NUMBER.fullmatch(radius) for radius in radii):
@@ -109,39 +109,39 @@ def _radius(solids: list[tuple[str, dict[str, str]]]) -> float | None:
     return greatest if 0 < greatest <= 1e6 else None
 
 
-def _robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap: bool) -> UrdfRobot:
+def _chain_as_robot(path: str, robot: str, chain: list[Joint], base: str, tip: str, snap: bool) -> UrdfRobot:
     """The chain as a robot file."""
     if "${" in "".join(str(joint.parts) for joint in chain):
         raise is_xacro(path)
     T = np.eye(4)
     joints: list[dict[str, Any]] = []
     notes: list[str] = []
-    names = _names([joint.name for joint in chain if joint.kind != "fixed"], notes)
+    names = _unique_names([joint.name for joint in chain if joint.kind != "fixed"], notes)
     for joint in chain:
-        where = f"{path}: joint {joint.name}"
-        T = T @ origin(joint, where, snap)
+        place = f"{path}: joint {joint.name}"
+        T = T @ joint_origin(joint, place, snap)
         if joint.kind == "fixed":
             continue
-        _check_moving(joint, where)
-        direction = T[:3, :3] @ axis(joint, where, snap)
-        joints.append(_joint(joint, names[joint.name], T[:3, 3], direction, where, notes))
+        _check_moving(joint, place)
+        direction = T[:3, :3] @ joint_axis(joint, place, snap)
+        joints.append(_joint_keys(joint, names[joint.name], T[:3, 3], direction, place, notes))
         if np.abs(T[:3, 3]).max() > FARTHEST:
-            raise RobotFileError(f"{where}: stands more than 10 km from {base}; a URDF is in metres")
+            raise RobotFileError(f"{place}: stands more than 10 km from {base}; a URDF is in metres")
     reach = float(np.abs(T[:3, 3]).max())
     _check_chain(path, base, tip, len(joints), reach)
     if reach > LARGE:
         notes.append(f"{tip} is {reach:.4g} m from {base}: a URDF is in metres, are these millimetres?")
     T[:3, 3] *= METRE
     title = re.sub(r"[^\x20-\x7e]+", " ", robot).strip()[:80] or "arm"
-    data = {
+    keys = {
         "name": title,
         "source": f"{os.path.basename(path)}: URDF of {title}, from link {base} to link {tip}"
         + (", right angles snapped" if snap else ""),
         "convention": "screws",
-        "zero_pose": pose(T.tolist()),
+        "zero_pose": pose_keys(T.tolist()),
         "joints": joints,
     }
-    return UrdfRobot(data, tuple(notes), base, tip)
+    return UrdfRobot(keys, tuple(notes), base, tip)
 
 
 def _check_chain(path: str, base: str, tip: str, joints: int, reach: float) -> None:
@@ -167,7 +167,9 @@ def _check_moving(joint: Joint, place: str) -> None:
         )
 
 
-def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, place: str, notes: list[str]) -> dict[str, Any]:
+def _joint_keys(
+    joint: Joint, name: str, point: Matrix, direction: Matrix, place: str, notes: list[str]
+) -> dict[str, Any]:
     """A joint of the robot file: screw, limits, home and speed."""
     slides = joint.kind == "prismatic"
     unit, size = ("mm", METRE) if slides else ("deg", 180.0 / math.pi)
@@ -177,13 +179,13 @@ def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, place: str
         entry |= {"type": "prismatic", "screw": {"w": [0, 0, 0], "v": vector}}
     else:
         entry["screw"] = {"w": vector, "q": [tidy(x * METRE, 12) for x in point.tolist()]}
-    lower, upper = (_value(joint, key, place) for key in ("lower", "upper"))
+    lower, upper = (_limit_value(joint, key, place) for key in ("lower", "upper"))
     if joint.kind != "continuous" and "limit" in joint.parts:
         low, high = (tidy((value or 0.0) * size, 9) for value in (lower, upper))
-        entry |= _limits(name, low, high, unit, place, notes)
+        entry |= _limit_keys(name, low, high, unit, place, notes)
     elif joint.kind != "continuous":
         notes.append(f"joint {name} has no <limit>: read as no limits")
-    speed = _value(joint, "velocity", place) or 0.0
+    speed = _limit_value(joint, "velocity", place) or 0.0
     if speed < 0:
         raise RobotFileError(f"{place}: velocity {speed:g} is negative")
     if 1e-6 <= speed * size <= 1e6:
@@ -191,7 +193,7 @@ def _joint(joint: Joint, name: str, point: Matrix, direction: Matrix, place: str
     return entry
 
 
-def _limits(name: str, low: float, high: float, unit: str, place: str, notes: list[str]) -> dict[str, Any]:
+def _limit_keys(name: str, low: float, high: float, unit: str, place: str, notes: list[str]) -> dict[str, Any]:
     """Limits [deg | mm] and home of a joint; none where the URDF means none."""
     if low > high:
         raise RobotFileError(f"{place}: lower limit {low:g} {unit} is above upper limit {high:g} {unit}")
@@ -212,7 +214,7 @@ def _limits(name: str, low: float, high: float, unit: str, place: str, notes: li
     return entry
 
 
-def _names(joints: list[str], notes: list[str]) -> dict[str, str]:
+def _unique_names(joints: list[str], notes: list[str]) -> dict[str, str]:
     """Joint names as a robot file takes them: no spaces, slashes or colons, 32 characters, all different."""
     taken: dict[str, str] = {}
     for name in joints:
@@ -227,15 +229,15 @@ def _names(joints: list[str], notes: list[str]) -> dict[str, str]:
     return taken
 
 
-def origin(joint: Joint, place: str, snap: bool = False) -> Matrix:
+def joint_origin(joint: Joint, place: str, snap: bool = False) -> Matrix:
     """Where the joint stands in its parent link [m]."""
     return origin_pose(joint.parts.get("origin", {}), place, snap)
 
 
 def origin_pose(attributes: Mapping[str, str], place: str, snap: bool = False) -> Matrix:
     """The pose that an <origin> says [m]."""
-    xyz = triple(attributes.get("xyz"), (0.0, 0.0, 0.0), f"{place}: origin xyz")
-    rpy = triple(attributes.get("rpy"), (0.0, 0.0, 0.0), f"{place}: origin rpy")
+    xyz = parse_triple(attributes.get("xyz"), (0.0, 0.0, 0.0), f"{place}: origin xyz")
+    rpy = parse_triple(attributes.get("rpy"), (0.0, 0.0, 0.0), f"{place}: origin rpy")
     if max(map(abs, xyz)) > FARTHEST:
         raise RobotFileError(f"{place}: origin xyz is more than 10 km; a URDF is in metres")
     (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle, snap) for angle in rpy)
@@ -256,9 +258,9 @@ def _cos_sin(angle: float, snap: bool) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-def axis(joint: Joint, place: str, snap: bool = False) -> Matrix:
+def joint_axis(joint: Joint, place: str, snap: bool = False) -> Matrix:
     """The joint's direction in its own frame, of length 1; by default x, as the format says."""
-    way = np.array(triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{place}: axis xyz"))
+    way = np.array(parse_triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{place}: axis xyz"))
     length = float(np.linalg.norm(way))
     if not 1e-12 < length < 1e12:
         raise RobotFileError(f"{place}: axis {' '.join(f'{x:g}' for x in way)} has no direction")
@@ -269,22 +271,22 @@ def axis(joint: Joint, place: str, snap: bool = False) -> Matrix:
     return np.asarray(way)
 
 
-def _value(joint: Joint, key: str, place: str) -> float | None:
+def _limit_value(joint: Joint, key: str, place: str) -> float | None:
     text = joint.text("limit", key)
-    return None if text is None else _floats(text, 1, f"{place}: limit {key}")[0]
+    return None if text is None else _parse_floats(text, 1, f"{place}: limit {key}")[0]
 
 
-def triple(text: str | None, default: tuple[float, ...], place: str) -> tuple[float, ...]:
+def parse_triple(text: str | None, default: tuple[float, ...], place: str) -> tuple[float, ...]:
     """Three numbers of an attribute."""
-    return default if text is None else _floats(text, 3, place)
+    return default if text is None else _parse_floats(text, 3, place)
 
 
-def _floats(text: str, count: int, place: str) -> tuple[float, ...]:
+def _parse_floats(text: str, count: int, place: str) -> tuple[float, ...]:
     """So many finite numbers, separated by blanks."""
     words = text.split()
     if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
-        many = "a number" if count == 1 else f"{count} numbers"
-        raise RobotFileError(f"{place}: '{text[:60]}' is not {many}")
+        expected = "a number" if count == 1 else f"{count} numbers"
+        raise RobotFileError(f"{place}: '{text[:60]}' is not {expected}")
     values = tuple(float(word) for word in words)
     if not all(math.isfinite(value) for value in values):
         raise RobotFileError(f"{place}: '{text[:60]}' is not finite")

@@ -17,7 +17,7 @@ from armkin.model.target_numbers import targets_out
 from armkin.motion.tool_path.path_numbers import check_numbers
 from armkin.path_file import PathFile
 from armkin.path_file.path_keys import KINDS
-from armkin.robot_file.robot_file_text import flow
+from armkin.robot_file.robot_file_text import flow_text
 from armkin.teach import request_checks
 
 if TYPE_CHECKING:
@@ -102,23 +102,23 @@ class Program:
 
     def file(self) -> PathFile:
         """The program as a path file's model. Raises PathFileError if it is none."""
-        return path_file.validated(self.document())
+        return path_file.validate_path(self.document())
 
     def text(self) -> str:
         """The program as the text of a path file; names are comments."""
         lines = [f"robot: {self.arm.name}"]
         keys = [key for key in PathFile.model_fields if key in self.head]
-        lines += [f"{key}: {flow(self.head[key])}" for key in keys]
+        lines += [f"{key}: {flow_text(self.head[key])}" for key in keys]
         lines.append("moves:")
         for move, name in zip(self.moves, self.names, strict=True):
-            entries = [f"{key}: {flow(value)}" for key, value in move.items()]
+            entries = [f"{key}: {flow_text(value)}" for key, value in move.items()]
             shown = entries[0] if len(entries) == 1 else "{" + ", ".join(entries) + "}"
             lines.append(f"  - {shown}" + (f"  # {name}" if name else ""))
         return "\n".join(lines) + "\n"
 
     def load(self, text: str, name: str) -> None:
         """Take the program of a path file's text. Raises PathFileError with the line, and changes nothing."""
-        file = path_file.parse(text, name)
+        file = path_file.parse_path_file(text, name)
         path_file.check_robot(file, self.arm.name, self.arm.path)
         check_numbers(self.arm, file)
         document = file.model_dump(exclude_unset=True, exclude_none=True)

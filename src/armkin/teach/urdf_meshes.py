@@ -12,7 +12,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model.rotation import inverse
 from armkin.robot_file import urdf_reader
-from armkin.robot_file.urdf_document import Joint, Tree, document
+from armkin.robot_file.urdf_document import Joint, Tree, parse_document
 from armkin.teach.mesh_files import read_triangles
 
 if TYPE_CHECKING:
@@ -57,12 +57,12 @@ def _on_grid(body: Array, unit: float) -> Array:
 
 def _body_triangles(arm: Arm, path: str) -> list[Array]:
     """The triangles (N, 3, 3) of each body, in its frame [mm]."""
-    raw = urdf_reader.load(path)
+    raw = urdf_reader.read_bytes(path)
     if len(raw) > urdf_reader.MAX_BYTES:
         raise UsageError(
             f"{path}: larger than {urdf_reader.MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes"
         )
-    _, tree = document(raw, path)
+    _, tree = parse_document(raw, path)
     first = tree.base(None)
     after = _joint_frames(arm)
     chain = _matching_joints(arm, tree, first, after)
@@ -82,7 +82,7 @@ def _body_triangles(arm: Arm, path: str) -> list[Array]:
         for joint in tree.children[link]:
             child = str(joint.text("child", "link"))
             stack.append(
-                (child, T @ urdf_reader.origin(joint, path), chain.index(joint) + 1 if joint in chain else body)
+                (child, T @ urdf_reader.joint_origin(joint, path), chain.index(joint) + 1 if joint in chain else body)
             )
     return [np.concatenate(parts) for parts in triangles_of]
 
@@ -102,9 +102,9 @@ def _matching_joints(arm: Arm, tree: Tree, first: str, after: list[Array]) -> li
     for leaf in tree.leaves(first):
         T, axes = np.eye(4), []
         for joint in tree.chain(first, leaf):
-            T = T @ urdf_reader.origin(joint, tree.name)
+            T = T @ urdf_reader.joint_origin(joint, tree.name)
             if joint.kind != "fixed":
-                axes.append((joint, T[:3, :3] @ urdf_reader.axis(joint, tree.name), T[:3, 3] * urdf_reader.METRE))
+                axes.append((joint, T[:3, :3] @ urdf_reader.joint_axis(joint, tree.name), T[:3, 3] * urdf_reader.METRE))
         if len(axes) < arm.n:
             worst = worst or f"it has {len(axes)} moving joints on the way to {leaf}, the arm {arm.n}"
             continue
@@ -128,7 +128,7 @@ def _mesh_triangles(path: str, link: str, visual: dict[str, dict[str, str]]) -> 
     """A mesh's triangles in its link's frame [m]."""
     context = f"{path}: visual of {link}"
     name = visual["mesh"].get("filename", "")
-    scale = urdf_reader.triple(visual["mesh"].get("scale"), (1.0, 1.0, 1.0), f"{context}: mesh scale")
+    scale = urdf_reader.parse_triple(visual["mesh"].get("scale"), (1.0, 1.0, 1.0), f"{context}: mesh scale")
     T = urdf_reader.origin_pose(visual.get("origin", {}), context)
     return np.asarray(read_triangles(_mesh_path(path, name, context)) * scale @ T[:3, :3].T + T[:3, 3])
 

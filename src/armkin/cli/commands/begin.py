@@ -40,10 +40,10 @@ def begin(
     imported table does not say of motors is assumed, and named.
     """
     from armkin.board import commissioning
-    from armkin.robot_file.catalogue import locate, shipped
+    from armkin.robot_file.catalogue import locate, shipped_file
 
     path = locate(robot)
-    if out is None and shipped(robot) is not None and path == str(shipped(robot)):
+    if out is None and shipped_file(robot) is not None and path == str(shipped_file(robot)):
         raise UsageError(f"{robot} is a shipped robot, which stays as it is: add --out MINE.yaml")
     if out is not None and Path(out).exists():
         raise FileError(f"{out} is there already; give another name", file=out)
@@ -100,11 +100,11 @@ class _Session:
     def _corrected_board(self, findings: Findings) -> tuple[Board, Arm]:
         """The board of the file as it is corrected so far."""
         from armkin.keep_out.load_with_scene import arm_in_scene
-        from armkin.robot_file import parse
-        from armkin.robot_file.scene_file import read
+        from armkin.robot_file import parse_robot_file
+        from armkin.robot_file.scene_file import read_scene
 
-        file = parse(self.corrected(findings), self.path)
-        arm = arm_in_scene(file, None if self.scene is None else read(self.scene))
+        file = parse_robot_file(self.corrected(findings), self.path)
+        arm = arm_in_scene(file, None if self.scene is None else read_scene(self.scene))
         if not self.assumptions_told:
             keep_outs.mark_ignored(arm, ignore=False)
         arm = board_link.arm_for_port(arm, self.port, quiet=self.assumptions_told)
@@ -113,35 +113,35 @@ class _Session:
 
     def corrected(self, findings: Findings) -> str:
         """The file's text with what was found."""
-        from armkin.robot_file import parse
+        from armkin.robot_file import parse_robot_file
         from armkin.robot_file.replace_values import with_values
-        from armkin.robot_file.robot_file_text import flow
+        from armkin.robot_file.robot_file_text import flow_text
 
-        file = parse(self.text, self.path)
+        file = parse_robot_file(self.text, self.path)
         motors = file.motor_list()
         edits: dict[tuple[str | int, ...], str] = {}
         names = [joint.name for joint in file.joints]
         for k in range(len(motors)):
             keys = ("motors", k) if file.motors else ("joints", names.index(motors[k].name), "drive")
             if k in findings.inverted:
-                edits[*keys, "invert"] = flow(not motors[k].invert)
+                edits[*keys, "invert"] = flow_text(not motors[k].invert)
             if k in findings.zeros:
-                edits[*keys, "zero"] = flow(findings.zeros[k])
+                edits[*keys, "zero"] = flow_text(findings.zeros[k])
         for j, pair in findings.limits.items():
-            edits["joints", j, "limits"] = flow(list(pair))
+            edits["joints", j, "limits"] = flow_text(list(pair))
         return with_values(self.text, edits)
 
     def write(self, findings: Findings, out: str | None, person: Keys) -> None:
         """The corrected file, shown as a diff and asked for first."""
         from armkin.files import write_whole
-        from armkin.robot_file import parse
+        from armkin.robot_file import parse_robot_file
 
         made = self.corrected(findings)
         target = out or self.path
         if made == self.text:
             output.note(f"nothing to correct in {self.path}")
             return
-        parse(made, target)  # nothing is written that no command would take
+        parse_robot_file(made, target)  # nothing is written that no command would take
         difference = difflib.unified_diff(
             self.text.splitlines(keepends=True), made.splitlines(keepends=True), self.path, target, n=1
         )

@@ -105,9 +105,9 @@ def _fit_calibration(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Ca
 
 
 def _file_text(calibration: Calibration, arm: Arm) -> str:
-    from armkin.robot_file.robot_file_text import text
+    from armkin.robot_file.robot_file_text import format_robot_file
 
-    return text(
+    return format_robot_file(
         calibration.data,
         [
             f"{arm.name}, calibrated from {len(calibration.before)} measured poses by armkin calibrate.",

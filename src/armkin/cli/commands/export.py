@@ -102,14 +102,14 @@ def _write_urdf(arm: Arm, out: str | None) -> None:
 
 def _write_table(arm: Arm, convention: str, out: str | None) -> None:
     from armkin.export import conventions
-    from armkin.robot_file.robot_file_text import text
+    from armkin.robot_file.robot_file_text import format_robot_file
 
     document = (
         conventions.screws(arm) if convention == "screws" else conventions.dh(arm, modified=convention == "modified")
     )
     lines = list(conventions.differences(arm, document))  # reads it: a number may be beyond what a robot file takes
     with output.destination(out) as write:
-        write(text(document))
+        write(format_robot_file(document))
     for line in lines:
         output.note(line)
 
@@ -139,7 +139,7 @@ def _write_html(arm: Arm, task: str | None, path: str | None, meshes: str | None
         from armkin import path_file
         from armkin.motion.path import path as planned
 
-        file = path_file.read(path)
+        file = path_file.read_path_file(path)
         path_file.check_robot(file, arm.name, arm.path)
         plan = planned(arm, file)
     with _without_lock("JavaScript"):

@@ -40,23 +40,23 @@ def import_(
     from armkin.export import conventions
     from armkin.model.build_arm import build
     from armkin.robot_file import catalogue, urdf_reader
-    from armkin.robot_file.robot_file_text import text
+    from armkin.robot_file.robot_file_text import format_robot_file
 
-    if file.endswith((".yaml", ".yml")) or (catalogue.shipped(file) and not os.path.exists(file)):
+    if file.endswith((".yaml", ".yml")) or (catalogue.shipped_file(file) and not os.path.exists(file)):
         raise UsageError(f"{file} is a robot, and import reads URDFs: armkin info {file} says what it is")
     files.protect_input(file)
     try:
-        raw = urdf_reader.load(file)  # once: a pipe can be read no second time
-        imported = urdf_reader.parse(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
+        raw = urdf_reader.read_bytes(file)  # once: a pipe can be read no second time
+        imported = urdf_reader.parse_urdf(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
     except UsageError as error:
         option = next((o for o in ("base", "tip") if f"the {o} must be named" in str(error)), None)
         if option is None:
             raise
         raise UsageError(f"{error}\ngive it with --{option} LINK") from None
-    arm = build(robot_file.parse(text(imported.data), f"{file} as a robot file"))
+    arm = build(robot_file.parse_robot_file(format_robot_file(imported.data), f"{file} as a robot file"))
     document: dict[str, Any] = conventions.dh(arm) if dh else imported.data
     with output.destination(out) as write:
-        write(text(document, imported.notes))
+        write(format_robot_file(document, imported.notes))
     for note in imported.notes:
         output.note(note)
     output.note(f"{arm.n} joints from {imported.base} to {imported.tip}")
@@ -71,10 +71,12 @@ def _snap_gain(raw: bytes, imported: UrdfRobot, arm: Arm) -> str | None:
     from armkin import robot_file
     from armkin.model.build_arm import build
     from armkin.robot_file import urdf_reader
-    from armkin.robot_file.robot_file_text import text
+    from armkin.robot_file.robot_file_text import format_robot_file
 
     snapped = build(
-        robot_file.parse(text(urdf_reader.parse(raw, base=imported.base, tip=imported.tip, snap=True).data))
+        robot_file.parse_robot_file(
+            format_robot_file(urdf_reader.parse_urdf(raw, base=imported.base, tip=imported.tip, snap=True).data)
+        )
     )
     try:
         before, after = armkin.method(arm)[0], armkin.method(snapped)[0]

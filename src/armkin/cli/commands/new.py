@@ -67,7 +67,7 @@ def new(
     q2 + 90 or d3 for the variable. Keys that the table does not give stand in the file as
     comments, to be filled in.
     """
-    from armkin.robot_file.new_file import text
+    from armkin.robot_file.new_file import new_file_text
 
     path = _output_path(name, out)
     asks = not dh and batch is None and sys.stdin is not None and sys.stdin.isatty()
@@ -77,8 +77,8 @@ def new(
     rows = [_dh_row(entries, i) for i, entries in enumerate(table, 1)]
     title = os.path.basename(name)
     if asks and floor is None:
-        floor = _ask_floor(lambda z: _check_file(text(title, convention, rows, source, z), path))
-    made = text(title, convention, rows, source, floor)
+        floor = _ask_floor(lambda z: _check_file(new_file_text(title, convention, rows, source, z), path))
+    made = new_file_text(title, convention, rows, source, floor)
     _check_file(made, path)  # what it refuses, limits for one, is told in its words, and nothing is written
     with output.destination(path) as write:
         write(made)
@@ -90,9 +90,9 @@ def new(
 def _check_file(text: str, path: str) -> None:
     """Raise RobotFileError for a file that is not valid, or whose floor is hit in every posture."""
     from armkin.keep_out.load_with_scene import arm_in_scene
-    from armkin.robot_file import parse
+    from armkin.robot_file import parse_robot_file
 
-    arm_in_scene(parse(text, path))
+    arm_in_scene(parse_robot_file(text, path))
 
 
 def _table_of_options(

@@ -253,12 +253,12 @@ def _moves_of(arm: Arm, file: str | None, via: list[str] | None, task: str | Non
 
         labels = task_for(arm, task).labels
         first, *later_corners = [_corner_values(text, labels) for text in via]
-        return path_file.validated({"moves": [{"point": first}, *({"line": corner} for corner in later_corners)]})
+        return path_file.validate_path({"moves": [{"point": first}, *({"line": corner} for corner in later_corners)]})
     assert file is not None
     if file == "-":
-        return path_file.parse(arguments.standard_input(path_file.LARGEST), "standard input")
+        return path_file.parse_path_file(arguments.standard_input(path_file.LARGEST), "standard input")
     files.protect_input(file)
-    return path_file.read(file)
+    return path_file.read_path_file(file)
 
 
 def _corner_values(text: str, labels: tuple[str, ...]) -> list[float]:

@@ -24,7 +24,7 @@ def robots(json: Json = False, out: TextOut = None) -> None:
     """
     from armkin.robot_file import catalogue
 
-    entries = [_robot_entry(name) for name in catalogue.names()]
+    entries = [_robot_entry(name) for name in catalogue.robot_names()]
     with output.destination(out) as write:
         write(render.to_json({"robots": entries}) + "\n" if json else _text(entries))
 

@@ -95,7 +95,7 @@ def zero(
 def _write_robot_file(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[int, int] | None, out: str) -> None:
     """The robot file with these zeros, all else as it stands."""
     from armkin.motors import motor_names
-    from armkin.robot_file import parse
+    from armkin.robot_file import parse_robot_file
     from armkin.robot_file.catalogue import locate
     from armkin.robot_file.replace_values import with_values
 
@@ -106,7 +106,7 @@ def _write_robot_file(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[i
     if grips is not None:
         edits["gripper", "zero"] = grips[1]
     text = with_values(Path(locate(robot)).read_text(encoding="utf-8"), edits)
-    parse(text, out)  # nothing is written that no command would take
+    parse_robot_file(text, out)  # nothing is written that no command would take
     with output.destination(out) as write:
         write(text)
 

@@ -1,4 +1,4 @@
-"""What stands around an arm: one file a shape, each with the function `read` that takes a keep-out's entry.
+"""What stands around an arm: one file a shape, each with the function that reads a keep-out's entry.
 
 floor.py, box.py, capsule.py; segment_distances.py: how far segments are from each other
 
@@ -36,7 +36,11 @@ class Shape(Protocol):
         """Its function in C and what that is given."""
 
 
-_OF: dict[str, Callable[[Entry], Shape]] = {"floor": floor.read, "box": box.read, "capsule": capsule.read}
+_OF: dict[str, Callable[[Entry], Shape]] = {
+    "floor": floor.read_floor,
+    "box": box.read_box,
+    "capsule": capsule.read_capsule,
+}
 
 
 def shape_of(entry: Entry) -> Shape:

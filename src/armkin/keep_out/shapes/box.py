@@ -67,7 +67,7 @@ class Box:
         return "box", [*self.centre.tolist(), *self.axes.T.ravel().tolist(), *self.half.tolist()]
 
 
-def read(entry: Entry) -> Box:
+def read_box(entry: Entry) -> Box:
     """The box of an entry."""
     box = entry.box
     assert box is not None

@@ -46,7 +46,7 @@ class Capsule:
         return "capsule", [*self.begin.tolist(), *self.end.tolist(), self.radius]
 
 
-def read(entry: Entry) -> Capsule:
+def read_capsule(entry: Entry) -> Capsule:
     """The capsule of an entry."""
     assert entry.capsule is not None
     return Capsule(np.array(entry.capsule.begin), np.array(entry.capsule.end), entry.capsule.radius)

@@ -39,7 +39,7 @@ class Floor:
         return "floor", [self.height]
 
 
-def read(entry: Entry) -> Floor:
+def read_floor(entry: Entry) -> Floor:
     """The floor of an entry."""
     assert entry.floor is not None
     return Floor(entry.floor)

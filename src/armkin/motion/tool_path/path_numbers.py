@@ -32,9 +32,9 @@ def as_path_file(arm: Arm, path: Any, task: str | None = None) -> PathFile:
     if isinstance(path, path_file.PathFile):
         return path
     if isinstance(path, str | os.PathLike):
-        return path_file.read(os.fspath(path))
+        return path_file.read_path_file(os.fspath(path))
     if isinstance(path, Mapping):
-        return path_file.validated(dict(path))
+        return path_file.validate_path(dict(path))
     definition = task_for(arm, task)
     rows = np.asarray(path, dtype=float)
     if definition.orientation == "full" and rows.ndim == 3:
@@ -44,7 +44,7 @@ def as_path_file(arm: Arm, path: Any, task: str | None = None) -> PathFile:
     if rows.ndim != 2 or len(rows) < 2 or not np.isfinite(rows).all():
         raise UsageError(f"a path of targets has shape (w, {len(definition.labels)}), w at least 2, all finite")
     listed = [{"point": rows[0].tolist()}, *({"line": row} for row in rows[1:].tolist())]
-    return path_file.validated({"moves": listed, "task": definition.name})
+    return path_file.validate_path({"moves": listed, "task": definition.name})
 
 
 def moves_tool(file: PathFile) -> bool:
