@@ -113,19 +113,19 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
         raise UsageError(message, combinations=count, most=MOST_SWEEPS)
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
-    found = [_Found() for _ in targets]
+    collected = [_Found() for _ in targets]
     more: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
     for held in _held_combinations(request):
         one, goals = without_held(arm, request.task, held, targets)
         s = request.ik(one, goals, request.task, near=near[_kept_joints(arm, held)], **more)
-        wanted = set(s.names)
+        wanted_names = set(s.names)
         if request.branch is not None:
-            wanted = {s.names[i] for i in find(s.names, request.branch)}
+            wanted_names = {s.names[i] for i in find(s.names, request.branch)}
         for i, answer in enumerate(_answers(request, held, s, near)):
-            found[i].add(int(s.status[i]), answer, wanted)
-            if not request.every and len(found[i].branches) > _THIN:
-                found[i].thin_out(request)
-    return [one.answer(request) for one in found]
+            collected[i].add(int(s.status[i]), answer, wanted_names)
+            if not request.every and len(collected[i].branches) > _THIN:
+                collected[i].thin_out(request)
+    return [one.answer(request) for one in collected]
 
 
 def combinations(request: Request) -> int:
@@ -162,12 +162,12 @@ def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Req
         nearer = (_nearer(request.arm, branch, near, held) for branch in answer.branches)
         branches = sorted(nearer, key=partial(_rank, request))
         names = tuple(dict.fromkeys(branch.name for branch in branches))
-        wanted = set(names)
+        wanted_names = set(names)
         if request.branch is not None:
             with suppress(UsageError):  # none of that name reaches this target
-                wanted = {names[i] for i in find(names, request.branch)}
-            wanted = wanted if answer.best is not None else set()
-        best = _best(request, [(branch, branch.name in wanted) for branch in branches])
+                wanted_names = {names[i] for i in find(names, request.branch)}
+            wanted_names = wanted_names if answer.best is not None else set()
+        best = _best(request, [(branch, branch.name in wanted_names) for branch in branches])
         yield request, answer._replace(branches=branches, best=best)
         if best is not None:
             request = replace(request, near=branches[best].joints)
@@ -187,12 +187,12 @@ def closest(request: Request, targets: Array) -> list[Closest]:
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     held = _held_values(arm, request.held)
-    one = arm_without(arm, tuple(held.items()))
+    free_arm = arm_without(arm, tuple(held.items()))
     if request.position_first:
-        found = nearest_positions(one, targets, near[_kept_joints(arm, held)])
+        nearest_each = nearest_positions(free_arm, targets, near[_kept_joints(arm, held)])
     else:
-        found = nearest_poses(one, targets, request.task, near=near[_kept_joints(arm, held)])
-    return [replace(nearest, q=unlock(arm, held, nearest.q)) for nearest in found] if held else found
+        nearest_each = nearest_poses(free_arm, targets, request.task, near=near[_kept_joints(arm, held)])
+    return [replace(nearest, q=unlock(arm, held, nearest.q)) for nearest in nearest_each] if held else nearest_each
 
 
 def turns(request: Request, branch: Branch) -> list[list[float]]:
@@ -228,15 +228,15 @@ def blocked(request: Request, answer: Answer) -> NoBranchError:
         robot=request.arm.name,
         status=answer.status,
         branches_within_limits=answer.within_limits,
-        hits=[hit for each in words.values() for hit in each],
+        hits=[hit for branch_hits in words.values() for hit in branch_hits],
     )
 
 
 def _best(request: Request, branches: Sequence[tuple[Branch, bool]]) -> int | None:
     """Of branches, each with whether it is wanted, the first one within limits and free; where hits are ignored and
     none is, with hits."""
-    free = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.may_be_taken)
-    hit = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.within_limits and request.ignore)
+    free = (i for i, (branch, named) in enumerate(branches) if named and branch.may_be_taken)
+    hit = (i for i, (branch, named) in enumerate(branches) if named and branch.within_limits and request.ignore)
     return next(free, next(hit, None))
 
 
@@ -267,11 +267,11 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
     columns = units.joints_out(arm, q), s.branch, within, mm, units.angles_out(rad), motions
     # From here on plain Python: numpy is slow at single numbers, and a batch has many.
     joints, names, legal, miss, turn, motion = (column.tolist() for column in columns)
-    kept = [name for name in arm.joint_names if name not in held]
+    unheld = [name for name in arm.joint_names if name not in held]
     families = intervals_out(s)
     near_by = iter(hits(arm, q[s.valid])) if arm.keep_out else itertools.repeat((None, ()))
-    told = zip(s.valid.tolist(), s.status.tolist(), s.complete.tolist(), strict=True)
-    for i, (valid, status, sure) in enumerate(told):
+    flags = zip(s.valid.tolist(), s.status.tolist(), s.complete.tolist(), strict=True)
+    for i, (valid, status, sure) in enumerate(flags):
         branches = [
             Branch(
                 q[i, b],
@@ -288,7 +288,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
             for b in range(len(valid))
             if valid[b]
         ]
-        free = [name for name, is_free in zip(kept, s.free[i].tolist(), strict=True) if is_free]
+        free = [name for name, is_free in zip(unheld, s.free[i].tolist(), strict=True) if is_free]
         legal_count = sum(branch.within_limits for branch in branches)
         name = Status(status).name.lower()
         yield Answer(name, s.method, s.why, sure, free, branches, None, None, len(branches), legal_count, s.names)
@@ -306,7 +306,7 @@ class _Found:
     legal: int = 0
     branches: list[tuple[Branch, bool]] = field(default_factory=list)  # and whether it is of the name asked for
 
-    def add(self, status: int, answer: Answer, wanted: set[str]) -> None:
+    def add(self, status: int, answer: Answer, wanted_names: set[str]) -> None:
         """Take the answer for one combination of values in."""
         rank = _RANKS.index(status)
         if self.best is None or rank < self.best[0]:
@@ -317,7 +317,7 @@ class _Found:
         self.free.update(answer.free)
         self.total += answer.total
         self.legal += answer.within_limits
-        self.branches += [(branch, branch.name in wanted) for branch in answer.branches]
+        self.branches += [(branch, branch.name in wanted_names) for branch in answer.branches]
 
     def thin_out(self, request: Request) -> None:
         """Keep the nearest branch of every name, within limits and beyond, and drop the others."""
@@ -331,21 +331,21 @@ class _Found:
         """One answer of all: the best status, the branches sorted."""
         assert self.best is not None
         first = self.best[1]
-        both = sorted(self.branches, key=lambda item: _rank(request, item[0]))
-        best = _best(request, both)
+        ranked = sorted(self.branches, key=lambda item: _rank(request, item[0]))
+        best = _best(request, ranked)
         refused = None
         if request.branch is not None and best is None:
-            refused = _refused(request, [branch for branch, named in both if named])
+            refused = _refused(request, [branch for branch, named in ranked if named])
         status = first.status
         if request.position_first and best is not None:
-            row = both[best][0]
+            row = ranked[best][0]
             missed = math.hypot(row.residual_mm / request.arm.reach, math.radians(row.residual_deg))
             status = (Status.EXACT if missed <= tol.SOLUTION else Status.POSITION).name.lower()
         return first._replace(
             status=status,
             complete=first.complete and not request.swept,
             free=sorted(self.free),
-            branches=[branch for branch, _ in both],
+            branches=[branch for branch, _ in ranked],
             best=best,
             refused=refused,
             total=self.total,
@@ -364,11 +364,11 @@ def _refused(request: Request, named: Sequence[Branch]) -> str:
     """What keeps the branches of the name asked for from being taken: they are outside limits, or hit something."""
     if not named:
         return f"no branch called '{request.branch}' reaches this target"
-    said: dict[str, str] = {}  # of several poses with one name, as of --sweep, the nearest
+    reasons: dict[str, str] = {}  # of several poses with one name, as of --sweep, the nearest
     for branch in named:
         if branch.within_limits and branch.hits:
-            said.setdefault(branch.name, f"'{branch.name}' {hits_text(list(branch.hits))}")
+            reasons.setdefault(branch.name, f"'{branch.name}' {hits_text(list(branch.hits))}")
             continue
         joints = ", ".join(request.arm.joint_names[i] for i in branch.outside)
-        said.setdefault(branch.name, f"'{branch.name}' is outside limits" + (f": {joints}" if joints else ""))
-    return "; ".join(said.values())
+        reasons.setdefault(branch.name, f"'{branch.name}' is outside limits" + (f": {joints}" if joints else ""))
+    return "; ".join(reasons.values())

@@ -90,8 +90,8 @@ def ik(
         and examine
         and free is None
         and (values.ndim == 1 or values.shape == (4, 4))  # a batch prepares nothing for one
-        and (one := one_target.prepared(arm, task)) is not None
-        and (alone := one.solve(values, near)) is not None
+        and (short_way := one_target.prepared(arm, task)) is not None
+        and (alone := short_way.solve(values, near)) is not None
     ):
         return alone
     if (turned := actual(arm)) is not arm:
@@ -107,7 +107,7 @@ def ik(
 
 def answered(  # noqa: C901 - what is looked at after the closed form, in its order
     arm: Arm,
-    definition: Task,
+    task: Task,
     geometry: Geometry,
     values: Array,
     near: ArrayLike | None,
@@ -118,36 +118,36 @@ def answered(  # noqa: C901 - what is looked at after the closed form, in its or
 ) -> Solutions:
     """`ik` by a solver, of an arm whose joints move as they are commanded; single: whether the targets were given in
     float32."""
-    given, lead = shaped(definition, values)
+    targets, lead = shaped(task, values)
     close = read_near(arm, near, lead)
-    many = close.ndim == 1 and len(given) != 1
-    each = np.broadcast_to(close, (len(given), arm.n)) if many else close.reshape(-1, arm.n)
-    one = close if close.ndim == 1 else None
+    is_shared = close.ndim == 1 and len(targets) != 1
+    nears = np.broadcast_to(close, (len(targets), arm.n)) if is_shared else close.reshape(-1, arm.n)
+    common = close if close.ndim == 1 else None
     if geometry.pairs:
-        out, count, target, shown, left = chunks.solve(arm, definition, geometry, given, each, one, examine, workers)
+        batch, count, target, shown, left = chunks.solve(arm, task, geometry, targets, nears, common, examine, workers)
         if len(left):
-            out = _by_slower_class(Goals(arm, definition, target, each), geometry.doubts, out, left, examine, workers)
+            batch = _by_slower_class(Goals(arm, task, target, nears), geometry.doubts, batch, left, examine, workers)
     else:
-        target, _, shown = read_targets(definition, values)
+        target, _, shown = read_targets(task, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
-        out, count = _row_by_row(Goals(arm, definition, target, each), geometry, examine, workers)
-    shown, most = target_rounding.of_targets(arm, definition, target, (given, shown), single, rounding, lead)
-    goals = Goals(arm, definition, target, each)
+        batch, count = _row_by_row(Goals(arm, task, target, nears), geometry, examine, workers)
+    shown, most = target_rounding.of_targets(arm, task, target, (targets, shown), single, rounding, lead)
+    goals = Goals(arm, task, target, nears)
     if examine:
-        edge = np.flatnonzero((out.status == Status.BOUNDARY) | (out.status == Status.SINGULAR))
-        if len(illegal := edge[~out.within[edge].any(axis=1)]):
-            out = legal_postures.with_legal_postures(goals, out, illegal)
+        edge = np.flatnonzero((batch.status == Status.BOUNDARY) | (batch.status == Status.SINGULAR))
+        if len(illegal := edge[~batch.within[edge].any(axis=1)]):
+            batch = legal_postures.with_legal_postures(goals, batch, illegal)
         if most.max(initial=0.0) > near_itself.ROUNDED:
-            out = near_itself.stand(goals, out, most)
+            batch = near_itself.stand(goals, batch, most)
         if arm.keep_out:
-            out = legal_postures.with_free_postures(goals, out)
+            batch = legal_postures.with_free_postures(goals, batch)
     if arm.prismatic.any():
-        out.complete[distance(arm, definition, target) > tol.FAR] = False
+        batch.complete[distance(arm, task, target) > tol.FAR] = False
     if not geometry.ordered:
-        out.branch[...] = follow(arm, definition, out.q, target)
-    names = branch_names(arm, definition, geometry, count)
-    names += tuple(f"branch {i + 1}" for i in range(count, out.q.shape[1]))
-    return as_solutions(goals, close, lead, out, shown, (names, geometry.name, geometry.why))
+        batch.branch[...] = follow(arm, task, batch.q, target)
+    names = branch_names(arm, task, geometry, count)
+    names += tuple(f"branch {i + 1}" for i in range(count, batch.q.shape[1]))
+    return as_solutions(goals, close, lead, batch, shown, (names, geometry.name, geometry.why))
 
 
 def columns(
@@ -176,26 +176,26 @@ def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
     return close * arm.ratio if close is not None and close.shape[-1:] == (arm.n,) else close
 
 
-def _commanded(arm: Arm, found: Solutions) -> Solutions:
+def _commanded(arm: Arm, solved: Solutions) -> Solutions:
     """Solutions in actual joint values as those in commanded ones."""
-    q, near, interval, task = found.q / arm.ratio, found.near / arm.ratio, found.interval, found.task.name
+    q, near, interval, task = solved.q / arm.ratio, solved.near / arm.ratio, solved.interval, solved.task.name
     if interval is not None and (free := redundancy(arm, task)) is not None:
         interval = np.sort(interval / arm.ratio[free.joint], axis=-1)
-    return replace(found, arm=arm, task=task_for(arm, task), near=near, q=q, interval=interval)
+    return replace(solved, arm=arm, task=task_for(arm, task), near=near, q=q, interval=interval)
 
 
 def _by_slower_class(
-    goals: Goals, geometry: Geometry | None, out: Batch, left: Int, examine: bool, workers: int
+    goals: Goals, geometry: Geometry | None, batch: Batch, left: Int, examine: bool, workers: int
 ) -> Batch:
     """The same with what a closed form leaves in doubt solved the other way that it names."""
     assert geometry is not None
-    some = arm, task, target, near = goals.of(left)
+    part = arm, task, target, near = goals.of(left)
     if not geometry.pairs:
-        return replaced(out, left, _row_by_row(some, geometry, examine, workers)[0])
-    rest, _, target, _, more = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
+        return replaced(batch, left, _row_by_row(part, geometry, examine, workers)[0])
+    solved, _, target, _, more = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
     if len(more):
-        rest = _by_slower_class(some._replace(target=target), geometry.doubts, rest, more, examine, workers)
-    return replaced(out, left, rest)
+        solved = _by_slower_class(part._replace(target=target), geometry.doubts, solved, more, examine, workers)
+    return replaced(batch, left, solved)
 
 
 def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -> tuple[Batch, int]:
@@ -206,36 +206,36 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     parts = shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
     q, doubt, complete, lost, guesses = stacked(parts)
     B = q.shape[1]
-    out = empty(len(target), B, arm.n)
-    out.q[...], inside = nearest_row(arm, q, near[:, None, :])
-    out.valid[...] = ~np.isnan(q).any(axis=2)
-    out.within[...] = inside & out.valid
-    out.branch[...] = np.where(out.valid, np.arange(B), -1)
-    out.complete[...] = complete
-    count = out.valid.sum(axis=1)
-    out.status[count == 0] = Status.UNREACHABLE
+    batch = empty(len(target), B, arm.n)
+    batch.q[...], inside = nearest_row(arm, q, near[:, None, :])
+    batch.valid[...] = ~np.isnan(q).any(axis=2)
+    batch.within[...] = inside & batch.valid
+    batch.branch[...] = np.where(batch.valid, np.arange(B), -1)
+    batch.complete[...] = complete
+    count = batch.valid.sum(axis=1)
+    batch.status[count == 0] = Status.UNREACHABLE
     for rows in arrays.slices(len(count), arrays.CHUNK):
-        pack(rows_of(out, rows), count[rows])
+        pack(rows_of(batch, rows), count[rows])
     if examine:
-        doubt[near_itself.take(goals, out, near_itself.reached(arm, task, target, position(arm, near)))] = True
+        doubt[near_itself.take(goals, batch, near_itself.reached(arm, task, target, position(arm, near)))] = True
     doubted = np.flatnonzero(doubt)
     if examine and len(doubted):
-        found = q[doubted] if guesses is None else np.concatenate([q[doubted], guesses[doubted]], axis=1)
-        seeds = Seeds.of(found, np.arange(found.shape[1]) % max(B, 1))
+        candidates = q[doubted] if guesses is None else np.concatenate([q[doubted], guesses[doubted]], axis=1)
+        seeds = Seeds.of(candidates, np.arange(candidates.shape[1]) % max(B, 1))
 
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
             """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.
 
             They say nothing of an end of the workspace, beside which no target is reached, and of self-motions.
             """
-            found = solve(around(arm, task, target).reshape(-1, *target.shape[1:])).q
-            found = found.reshape(len(target), -1, arm.n)
-            return found, np.arange(found.shape[1]) % max(B, 1), lost
+            candidates = solve(around(arm, task, target).reshape(-1, *target.shape[1:])).q
+            candidates = candidates.reshape(len(target), -1, arm.n)
+            return candidates, np.arange(candidates.shape[1]) % max(B, 1), lost
 
         unsettled = np.zeros(len(target), bool) if lost is None else lost
-        out = examined(goals, out, doubted, seeds, others, unsettled)
-        order = projection(arm.prismatic, out.q[doubted]).argsort(axis=1)  # one order, whatever was found first
-        for array in (out.q, out.valid, out.within, out.branch):
-            some = array[doubted]
-            array[doubted] = np.take_along_axis(some, order.reshape(order.shape + (1,) * (some.ndim - 2)), axis=1)
-    return out, B
+        batch = examined(goals, batch, doubted, seeds, others, unsettled)
+        order = projection(arm.prismatic, batch.q[doubted]).argsort(axis=1)  # one order, whatever was found first
+        for array in (batch.q, batch.valid, batch.within, batch.branch):
+            table = array[doubted]
+            array[doubted] = np.take_along_axis(table, order.reshape(order.shape + (1,) * (table.ndim - 2)), axis=1)
+    return batch, B

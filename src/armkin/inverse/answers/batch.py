@@ -95,33 +95,33 @@ Text = tuple[tuple[str, ...], str, str]  # of an answer: `Solutions.names`, meth
 
 
 def as_solutions(
-    goals: Goals, near: Array, lead: tuple[int, ...], out: Batch, rounding: Array, text: Text
+    goals: Goals, near: Array, lead: tuple[int, ...], batch: Batch, rounding: Array, text: Text
 ) -> Solutions:
     """The answer of a batch of shape lead; near: (n,) or (*lead, n), as it was given."""
     arm, task, target, _ = goals
     close = np.broadcast_to(near.copy(), (*lead, arm.n))
     q, valid, within, branch, status, free, complete, target, rounding = (
-        x.reshape((*lead, *x.shape[1:])) for x in (*out, target, rounding)
+        x.reshape((*lead, *x.shape[1:])) for x in (*batch, target, rounding)
     )
     return Solutions(arm, task, target, close, q, valid, within, branch, status, free, *text, complete, rounding)
 
 
-def write(arm: Arm, out: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> Batch:
+def write(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> Batch:
     """Write branches (K, W, n) of some targets, with labels (K, W) as `named`, at their nearest legal copies, nan
     behind; the same batch, or where they need more columns a wider one."""
-    if q.shape[1] > out.q.shape[1]:
-        out = stacked([out, empty(0, q.shape[1], arm.n)])
+    if q.shape[1] > batch.q.shape[1]:
+        batch = stacked([batch, empty(0, q.shape[1], arm.n)])
     width, label = q.shape[1], np.where(valid, label, -1)
     ordered = np.sort(label, axis=1)
     if ((label < 0) & valid).any() or ((np.diff(ordered) == 0) & (ordered[:, 1:] >= 0)).any():
         label = named(label, valid)
     copies, inside = nearest_row(arm, np.nan_to_num(q), near[:, None, :])
-    out.q[rows], out.valid[rows], out.within[rows], out.branch[rows] = np.nan, False, False, -1
-    out.q[rows, :width] = np.where(valid[:, :, None], copies, np.nan)
-    out.valid[rows, :width] = valid
-    out.within[rows, :width] = inside & valid
-    out.branch[rows, :width] = label
-    return out
+    batch.q[rows], batch.valid[rows], batch.within[rows], batch.branch[rows] = np.nan, False, False, -1
+    batch.q[rows, :width] = np.where(valid[:, :, None], copies, np.nan)
+    batch.valid[rows, :width] = valid
+    batch.within[rows, :width] = inside & valid
+    batch.branch[rows, :width] = label
+    return batch
 
 
 def named(label: Int, valid: Bool) -> Int:
@@ -147,16 +147,16 @@ def pack(part: Batch, count: Int) -> None:
     arrays = (part.q, np.nan), (part.within, False), (part.branch, -1)
     for array, missing in arrays:
         width = array.shape[2:]
-        found = np.empty((front.size + 1, *width), array.dtype)
-        array.take(rows, axis=0, out=found[:-1].reshape(len(rows), B, *width), mode="clip")
-        found[-1] = missing
-        array[rows] = found.take(source, axis=0).reshape(len(rows), B, *width)
+        padded = np.empty((front.size + 1, *width), array.dtype)
+        array.take(rows, axis=0, out=padded[:-1].reshape(len(rows), B, *width), mode="clip")
+        padded[-1] = missing
+        array[rows] = padded.take(source, axis=0).reshape(len(rows), B, *width)
     if most < B:  # those of all others as slices
         part.valid[rows] = np.arange(B) < most
-        there = np.flatnonzero(part.valid)
+        present = np.flatnonzero(part.valid)
         for array, missing in arrays:
             width = array.shape[2:]
-            array[:, :most] = array.reshape(-1, *width).take(there, axis=0).reshape(len(count), most, *width)
+            array[:, :most] = array.reshape(-1, *width).take(present, axis=0).reshape(len(count), most, *width)
             array[:, most:] = missing
         part.valid[...] = np.arange(B) < most
     part.valid[rows] = front

@@ -106,18 +106,18 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     nearest.sort(axis=1)
     home = np.broadcast_to(np.clip(arm.home, arm.lower, arm.upper), (N, 1, n))
     starts = np.concatenate([np.clip(near, arm.lower, arm.upper)[:, None], home, pool[nearest]], axis=1)
-    for steps, kept in rounds:
+    for steps, going in rounds:
         every = starts.shape[1]
-        each = np.repeat(target, every, axis=0)
-        q = _descend(arm, task, starts.reshape(-1, n).copy(), each, steps)
-        order = np.argsort(_cost(arm, task, q, each).reshape(N, every), axis=1, kind="stable")[:, :kept]
+        goals = np.repeat(target, every, axis=0)
+        q = _descend(arm, task, starts.reshape(-1, n).copy(), goals, steps)
+        order = np.argsort(_cost(arm, task, q, goals).reshape(N, every), axis=1, kind="stable")[:, :going]
         starts = np.take_along_axis(q.reshape(N, every, n), order[:, :, None], axis=1)
-    each = np.repeat(target, kept, axis=0)
-    q, converged = _finish(arm, task, starts.reshape(-1, n), each)
-    cost = _cost(arm, task, q, each).reshape(N, kept)
-    moved = np.abs((q.reshape(N, kept, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
+    goals = np.repeat(target, going, axis=0)
+    q, converged = _finish(arm, task, starts.reshape(-1, n), goals)
+    cost = _cost(arm, task, q, goals).reshape(N, going)
+    moved = np.abs((q.reshape(N, going, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
     equal = cost <= cost.min(axis=1, keepdims=True) * (1 + tol.EQUAL_COST) + tol.NO_COST
-    best = np.arange(N) * kept + np.where(equal, moved, np.inf).argmin(axis=1)
+    best = np.arange(N) * going + np.where(equal, moved, np.inf).argmin(axis=1)
     T = fk(arm, q[best])
     missing, p = residual(task, T, q[best], target), task.position
     return [
@@ -189,19 +189,19 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]
     q, converged, cost = q.copy(), np.zeros(len(q), bool), _cost(arm, task, q, target)
     active = np.arange(len(q))
     for _ in range(40):
-        at, goal = q[active], target[active]
-        downhill = _downhill(arm, task, at, goal)
-        free = ~_stopped(arm, at, downhill)
-        around = (at[:, None, :] + shifts).reshape(-1, n)
-        slopes = _downhill(arm, task, around, np.repeat(goal, 2 * n, axis=0)).reshape(len(at), 2, n, n)
+        points, goal = q[active], target[active]
+        downhill = _downhill(arm, task, points, goal)
+        free = ~_stopped(arm, points, downhill)
+        around = (points[:, None, :] + shifts).reshape(-1, n)
+        slopes = _downhill(arm, task, around, np.repeat(goal, 2 * n, axis=0)).reshape(len(points), 2, n, n)
         H = -(slopes[:, 0] - slopes[:, 1]) / (2 * tol.GRADIENT_WAY)
         H = 0.5 * (H + np.swapaxes(H, 1, 2))
-        both = free[:, :, None] & free[:, None, :]
-        values, vectors = np.linalg.eigh(np.where(both, H, np.eye(n)))
+        free_pairs = free[:, :, None] & free[:, None, :]
+        values, vectors = np.linalg.eigh(np.where(free_pairs, H, np.eye(n)))
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
-        there = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL)
-        converged[active] = there
-        active, left = active[~there], np.flatnonzero(~there)
+        arrived = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL)
+        converged[active] = arrived
+        active, left = active[~arrived], np.flatnonzero(~arrived)
         if not len(active):
             break
         # a step downhill along every eigenvector, whatever its curvature; flat ones gently
@@ -209,16 +209,16 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]
         along = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0)[left])
         step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), tol.LEVEL_VALUE))
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
-        rest = np.arange(len(active))
+        waiting = np.arange(len(active))
         for shrink in (1.0, 0.25, 0.05, tol.SHORTENED):
-            rows = active[rest]
-            trial = np.clip(q[rows] + shrink * step[rest] * unit, arm.lower, arm.upper)
-            now = _cost(arm, task, trial, target[rows])
+            rows = active[waiting]
+            trial = np.clip(q[rows] + shrink * step[waiting] * unit, arm.lower, arm.upper)
+            new_cost = _cost(arm, task, trial, target[rows])
             # equal but for rounding is still a step towards a vanishing gradient
-            better = now <= cost[rows] * (1.0 + tol.EQUAL_BUT_ROUNDING)
-            q[rows[better]], cost[rows[better]] = trial[better], now[better]
-            rest = rest[~better]
-            if not len(rest):
+            better = new_cost <= cost[rows] * (1.0 + tol.EQUAL_BUT_ROUNDING)
+            q[rows[better]], cost[rows[better]] = trial[better], new_cost[better]
+            waiting = waiting[~better]
+            if not len(waiting):
                 break
     return q, converged
 
@@ -238,17 +238,17 @@ def _descend(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> Array
         step = np.linalg.solve(H, np.where(held, 0.0, downhill)[:, :, None])[:, :, 0]
         step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
         trial = np.clip(q[active] + step * unit, arm.lower, arm.upper)
-        now = _cost(arm, task, trial, target[active])
-        better = now < cost[active]
-        gained = cost[active] - now
+        new_cost = _cost(arm, task, trial, target[active])
+        better = new_cost < cost[active]
+        gained = cost[active] - new_cost
         size = np.abs(trial - q[active]).max(axis=1)
         q[active[better]] = trial[better]
-        cost[active[better]] = now[better]
+        cost[active[better]] = new_cost[better]
         damping[active] = np.where(better, np.maximum(damping[active] * 0.2, tol.LEAST_DAMPING), damping[active] * 6.0)
         little = gained <= tol.GAINS_NOTHING * np.maximum(cost[active], tol.LEAST_COST)
         idle = better & little & (size < tol.LAST_STEP)
-        done = idle | (damping[active] > 1e8)
-        active = active[~done]
+        ended = idle | (damping[active] > 1e8)
+        active = active[~ended]
         if not len(active):
             break
     return q

@@ -37,30 +37,30 @@ def of_targets(
     target: Array,
     shown: tuple[Array, Array],
     single: bool,
-    given: ArrayLike | None,
+    stated: ArrayLike | None,
     lead: tuple[int, ...],
 ) -> tuple[Array, Array]:
-    """The rounding of targets (N, ...), a batch of shape lead: known (N,), and the residual that solves them (N,), both
+    """The rounding of targets (N, ...), a batch of shape lead: (N,), and the residual that solves them (N,), both
     [reaches, rad].
 
     shown: targets as they were given, and how far their rotations were off (N,); single: they were given in float32;
-    given: () or (...) what the caller says it is.
+    stated: () or (...) what the caller says it is.
     Raises UsageError for a rounding that is negative, not finite or of another shape.
     """
-    if given is not None:
-        said = arrays.real(given, "rounding")
-        if said.shape not in ((), lead) or not np.isfinite(said).all() or (said < 0.0).any():
+    if stated is not None:
+        values = arrays.real(stated, "rounding")
+        if values.shape not in ((), lead) or not np.isfinite(values).all() or (values < 0.0).any():
             shapes = "() or " + str(lead) if lead else "()"
-            raise UsageError(f"rounding: expected finite numbers from 0, of shape {shapes}; got shape {said.shape}")
-        known = np.broadcast_to(said, lead).reshape(-1).astype(float)
-        return known, tol.SOLUTION + known
+            raise UsageError(f"rounding: expected finite numbers from 0, of shape {shapes}; got shape {values.shape}")
+        rounding = np.broadcast_to(values, lead).reshape(-1).astype(float)
+        return rounding, tol.SOLUTION + rounding
     numbers, defect = shown
-    known = defect
+    rounding = defect
     if single:
         point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
         largest = np.abs(point).max(axis=1, initial=0.0) / arm.reach
-        known = np.maximum(defect, tol.FLOAT32 * np.maximum(largest, 1.0 if task.orientation != "none" else 0.0))
-    most = DEFECTS * known
+        rounding = np.maximum(defect, tol.FLOAT32 * np.maximum(largest, 1.0 if task.orientation != "none" else 0.0))
+    most = DEFECTS * rounding
     rows = np.flatnonzero(defect > ROUNDED)
     if len(rows):
         most[rows] = np.maximum(most[rows], HALVES * last_place(numbers[rows, :3, :3]))
@@ -71,7 +71,7 @@ def of_targets(
         rows = rows[(np.abs(R - np.rint(R)) <= ROUNDED).all(axis=(1, 2))]
         if len(rows):
             most[rows] = np.maximum(most[rows], last_place_of_position(numbers[rows, :3, 3]) / arm.reach)
-    return known, tol.SOLUTION + most
+    return rounding, tol.SOLUTION + most
 
 
 def last_place_of_position(p: Array) -> Array:
@@ -85,9 +85,9 @@ def last_place_of_position(p: Array) -> Array:
     typed = _whole(p * 10.0 ** (FEWEST - 1)) & _whole(p * 10.0 ** (PRINTED - 2 - size))
     left = np.flatnonzero(~typed.all(axis=1))
     for digits in range(PRINTED, MOST):
-        here = _whole(p[left] * 10.0 ** (digits - 1 - size[left])).all(axis=1)
-        half[left[here]] = 0.5 * 10.0 ** (size[left[here]].max(axis=1) + 1 - digits)
-        left = left[~here]
+        fits = _whole(p[left] * 10.0 ** (digits - 1 - size[left])).all(axis=1)
+        half[left[fits]] = 0.5 * 10.0 ** (size[left[fits]].max(axis=1) + 1 - digits)
+        left = left[~fits]
     single = left[(p[left] == p[left].astype(np.float32)).all(axis=1)]
     half[single] = tol.FLOAT32 * np.abs(p[single]).max(axis=1)
     return np.asarray(3.0**0.5 * half)
@@ -103,11 +103,11 @@ def last_place(R: Array) -> Array:
     half = np.where((entries == entries.astype(np.float32)).all(axis=1), tol.FLOAT32, 0.0)
     left = np.flatnonzero(half == 0.0)
     for digits in range(COARSEST, MOST):
-        some = entries[left]
-        size = np.floor(np.log10(np.maximum(np.abs(some), tol.FEW_DIGITS)))
-        here = (_whole(some * 10.0 ** (digits - 1 - size)) | (np.abs(some) < tol.FEW_DIGITS)).all(axis=1)
-        half[left[here]] = 0.5 * 10.0**-digits
-        left = left[~here]
+        numbers = entries[left]
+        size = np.floor(np.log10(np.maximum(np.abs(numbers), tol.FEW_DIGITS)))
+        fits = (_whole(numbers * 10.0 ** (digits - 1 - size)) | (np.abs(numbers) < tol.FEW_DIGITS)).all(axis=1)
+        half[left[fits]] = 0.5 * 10.0**-digits
+        left = left[~fits]
         if not len(left):
             break
     return half
@@ -125,11 +125,11 @@ def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLi
         sizes = printed(units, values[:0], reach, np.repeat(np.arange(MOST)[:, None], len(units), axis=1))
         blocks = [_needed(values[start : start + BLOCK]).max(axis=1) for start in range(0, len(values), BLOCK)]
         return np.asarray(sizes[np.concatenate([np.zeros(0, np.intp), *blocks])])
-    off = _HALF.take(np.asarray(decimals, int).reshape(-1, len(units)), mode="clip")
+    halves = _HALF.take(np.asarray(decimals, int).reshape(-1, len(units)), mode="clip")
     angles = np.array([unit == "deg" for unit in units])
     scale = np.array([1.0 / reach if unit == "mm" else 1.0 for unit in units])
-    turned = np.radians(off[:, angles].sum(axis=1))
-    return np.asarray(np.hypot(np.linalg.norm((off * scale)[:, ~angles], axis=1), turned))
+    turned = np.radians(halves[:, angles].sum(axis=1))
+    return np.asarray(np.hypot(np.linalg.norm((halves * scale)[:, ~angles], axis=1), turned))
 
 
 # half a unit of the last of so many decimals, 0 below FEWEST; of more than 300 it is nothing, too
@@ -138,16 +138,16 @@ _HALF = np.where(np.arange(300) < FEWEST, 0.0, 0.5 * 10.0 ** -np.arange(300.0))
 
 def _needed(values: Array) -> Int:
     """How many decimals numbers (N, m) need: 0 below FEWEST, and for numbers that need MOST, which are not rounded."""
-    found = np.zeros(values.size, np.intp)
+    needed = np.zeros(values.size, np.intp)
     number = values.ravel()
     left = np.flatnonzero(~_whole(number * 10.0 ** (FEWEST - 1)))
     for decimals in range(FEWEST, MOST):
         if not len(left):
             break
-        here = _whole(number[left] * 10.0**decimals)
-        found[left[here]] = decimals
-        left = left[~here]
-    return found.reshape(values.shape)
+        fits = _whole(number[left] * 10.0**decimals)
+        needed[left[fits]] = decimals
+        left = left[~fits]
+    return needed.reshape(values.shape)
 
 
 def _whole(scaled: Array) -> Bool:

@@ -83,15 +83,15 @@ def _elbow_swapped(arm: Arm, q: Array, valid: Bool, shape: tuple[int, ...]) -> B
     heights, level = _elbow_heights(arm, q)
     heights = np.where(valid, heights, np.nan).reshape(shape)
     level = np.where(valid, level, np.inf).reshape(shape)
-    out = np.zeros(shape[1:], bool)
+    swapped = np.zeros(shape[1:], bool)
     for b0, b2 in itertools.product(range(shape[1]), range(shape[3])):
         up, down = heights[:, b0, 0, b2], heights[:, b0, 1, b2]
         tilt = level[:, b0, :, b2].max(axis=1) + np.where(np.isnan(up - down), np.inf, 0.0)
-        out[b0, :, b2] = down[np.argmin(tilt)] > up[np.argmin(tilt)]
-    return out
+        swapped[b0, :, b2] = down[np.argmin(tilt)] > up[np.argmin(tilt)]
+    return swapped
 
 
-def find(names: tuple[str, ...], wanted: str) -> list[int]:
+def find(names: tuple[str, ...], phrase: str) -> list[int]:
     """Indices of the branches that a name means; its words may come in any order, and not all of them.
 
     Raises UsageError, which lists the names, if there are none.
@@ -99,27 +99,27 @@ def find(names: tuple[str, ...], wanted: str) -> list[int]:
     >>> find(("left, elbow up", "left, elbow down", "right, elbow up"), "upper elbow, left angle")
     [0]
     """
-    text = " ".join(wanted.lower().replace(",", " ").replace("/", " ").replace("-", " ").split())
+    text = " ".join(phrase.lower().replace(",", " ").replace("/", " ").replace("-", " ").split())
     if text in (name.replace(",", "") for name in names):
         return [i for i, name in enumerate(names) if name.replace(",", "") == text]
     parts, unknown = _parts(text)
     hits = [i for i, name in enumerate(names) if parts and all(p in name.split(", ") for p in parts)]
     if unknown or not hits:
-        raise UsageError(f"no branch is called '{wanted}'; this arm's are: {'; '.join(names)}")
+        raise UsageError(f"no branch is called '{phrase}'; this arm's are: {'; '.join(names)}")
     return hits
 
 
 def _parts(text: str) -> tuple[list[str], list[str]]:
     """The words of branch names that a text holds, or synonyms of them, and what it holds besides."""
-    for said, meant in _SYNONYMS.items():
-        text = f" {text} ".replace(f" {said} ", f" {meant} ").strip()
+    for synonym, meant in _SYNONYMS.items():
+        text = f" {text} ".replace(f" {synonym} ", f" {meant} ").strip()
     parts = []
     for word in ("no flip", "flip", "elbow up", "elbow down", "left", "right"):
         if f" {word} " in f" {text} ":
             parts.append(word)
             text = f" {text} ".replace(f" {word} ", " ").strip()
-    rest = [w for w in text.split() if w in ("up", "down")]
-    return parts + [f"elbow {w}" for w in rest], [w for w in text.split() if w not in rest]
+    heights = [w for w in text.split() if w in ("up", "down")]
+    return parts + [f"elbow {w}" for w in heights], [w for w in text.split() if w not in heights]
 
 
 def _sample_postures(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]:
@@ -130,9 +130,9 @@ def _sample_postures(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, A
     postures = np.concatenate([arm.home[None], near_home, anywhere])
     goal = targets_of(task, fk(arm, postures), postures)
     if geometry.rows is not None:
-        found = geometry.rows(goal)
-        q = found.q[:, : geometry.branches]
-        return postures, q, ~np.isnan(q).any(axis=2) & ~found.doubt[:, None]
+        branches = geometry.rows(goal)
+        q = branches.q[:, : geometry.branches]
+        return postures, q, ~np.isnan(q).any(axis=2) & ~branches.doubt[:, None]
     assert geometry.pairs is not None
     entries = pose.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]

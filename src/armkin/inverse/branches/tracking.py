@@ -32,20 +32,20 @@ def follow(arm: Arm, task: Task, q: Array, target: Array) -> Int:
     """
     N, B, _ = q.shape
     valid = ~np.isnan(q[:, :, 0])
-    here = np.broadcast_to(np.arange(B), (N, B)).copy()
+    numbers = np.broadcast_to(np.arange(B), (N, B)).copy()
     rows = 1 + np.flatnonzero(_is_path(arm, task, target)) if N > 1 and B > 1 else np.zeros(0, np.intp)
     for start in range(0, len(rows), CHUNK):
         part = rows[start : start + CHUNK]
         for k, before in zip(part.tolist(), _links(arm, q[part], q[part - 1]), strict=True):
             linked = before >= 0
-            here[k] = np.where(linked, here[k - 1][before], -1)
+            numbers[k] = np.where(linked, numbers[k - 1][before], -1)
             if not linked.all():
                 taken = np.zeros(B, bool)
-                taken[here[k][linked]] = True
-                rest = np.flatnonzero(~linked)
+                taken[numbers[k][linked]] = True
+                unlinked = np.flatnonzero(~linked)
                 # real branches first, then the empty places
-                here[k][rest[np.argsort(~valid[k, rest], kind="stable")]] = np.flatnonzero(~taken)
-    return np.where(valid, here, -1)
+                numbers[k][unlinked[np.argsort(~valid[k, unlinked], kind="stable")]] = np.flatnonzero(~taken)
+    return np.where(valid, numbers, -1)
 
 
 def _is_path(arm: Arm, task: Task, target: Array) -> Bool:
@@ -60,12 +60,12 @@ def _is_path(arm: Arm, task: Task, target: Array) -> Bool:
     return np.asarray(np.abs(moved).max(axis=1) < CLOSE)
 
 
-def _links(arm: Arm, now: Array, then: Array) -> Int:
+def _links(arm: Arm, after: Array, before: Array) -> Int:
     """For every branch of targets (M, B, n) its partner at the target before, or -1: (M, B)."""
-    apart = newton.distances(arm, now, then)
+    apart = newton.distances(arm, after, before)
     apart[np.isnan(apart)] = np.inf
     partner, back = apart.argmin(axis=2), apart.argmin(axis=1)
     nearest, second = np.moveaxis(np.partition(apart, 1, axis=2)[:, :, :2], 2, 0)
     clear = (nearest < CLOSE) & (second > CLEAR * nearest)
-    mutual = np.take_along_axis(back, partner, axis=1) == np.arange(now.shape[1])
+    mutual = np.take_along_axis(back, partner, axis=1) == np.arange(after.shape[1])
     return np.where(clear & mutual, partner, -1)

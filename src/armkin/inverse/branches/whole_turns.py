@@ -41,7 +41,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
             return value, True
         return value, (value >= low) & (value <= high)
     at_zero = isinstance(near, float) and near == 0.0
-    given = value
+    original = value
     if at_zero:
         value = _principal(value)
     else:
@@ -68,7 +68,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
         value, above = np.where(fits, moved, value), above & ~fits
     outside = below | above
     if not at_zero and outside.any():
-        value = np.where(outside, _principal(given), value)
+        value = np.where(outside, _principal(original), value)
     return value, ~outside
 
 
@@ -83,14 +83,14 @@ def _half_turned(value: Array, near: Array | float, low: float, high: float) -> 
     """Principal values; of half a turn the copy that is legal and nearer."""
     if value.max(initial=0.0) <= np.pi - SLACK:
         return value
-    some = np.flatnonzero(value > np.pi - SLACK)
-    one, close = value.take(some), np.broadcast_to(near, value.shape).flat[some]
-    other = one - TURN
-    legal = (one >= low) & (one <= high)
-    better = (other >= low) & (other <= high)
-    better &= ~legal | (np.abs(other - close) < np.abs(one - close) - SLACK)
+    indices = np.flatnonzero(value > np.pi - SLACK)
+    above, close = value.take(indices), np.broadcast_to(near, value.shape).flat[indices]
+    below = above - TURN
+    legal = (above >= low) & (above <= high)
+    better = (below >= low) & (below <= high)
+    better &= ~legal | (np.abs(below - close) < np.abs(above - close) - SLACK)
     value = value.copy()
-    value.put(some, np.where(better, other, one))
+    value.put(indices, np.where(better, below, above))
     return value
 
 
@@ -109,9 +109,9 @@ def nearest_number(  # noqa: C901 - of every joint and branch of a pose alone: a
     if lower >= -math.pi and upper <= math.pi:
         legal = low <= principal <= high
         if (low <= -math.pi or high >= math.pi) and principal > math.pi - SLACK:
-            other = principal - TURN
-            if low <= other <= high and (not legal or abs(other - near) < abs(principal - near) - SLACK):
-                return other, True
+            below = principal - TURN
+            if low <= below <= high and (not legal or abs(below - near) < abs(principal - near) - SLACK):
+                return below, True
         return principal, legal
     if near == 0.0:
         value, first = principal, -math.pi
@@ -135,16 +135,16 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
     if (turned := actual(arm)) is not arm:
         rows, legal = nearest_row(turned, q * arm.ratio, near * arm.ratio)
         return rows / arm.ratio, legal
-    out = q.copy(order="K")  # joint after joint, where q is
+    copies = q.copy(order="K")  # joint after joint, where q is
     inside = np.ones_like(q[..., 0], bool)
     if not q.size:
-        return out, inside
+        return copies, inside
     for i in range(arm.n):
         slides, limits = bool(arm.prismatic[i]), (float(arm.lower[i]), float(arm.upper[i]))
         value = q[..., i] if slides else wrapped(q[..., i])
-        out[..., i], ok = nearest_copy(value, near[..., i], *limits, slides)
-        inside &= ok
-    return out, inside
+        copies[..., i], fits = nearest_copy(value, near[..., i], *limits, slides)
+        inside &= fits
+    return copies, inside
 
 
 def nearest_of_joint(arm: Arm, i: int, value: Array, near: Array) -> tuple[Array, Truth]:
@@ -183,8 +183,8 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     for i in range(arm.n):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
         if arm.prismatic[i] or not (np.isfinite(lower) and np.isfinite(upper)):
-            value, ok = nearest_of_joint(arm, i, row[i : i + 1], close[i])
-            choices.append([float(value[0])] if np.all(ok) else [])
+            value, fits = nearest_of_joint(arm, i, row[i : i + 1], close[i])
+            choices.append([float(value[0])] if np.all(fits) else [])
         else:
             first = int(np.ceil((lower - SLACK - row[i]) / TURN))
             last = int(np.floor((upper + SLACK - row[i]) / TURN))

@@ -56,9 +56,9 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     """Six revolute joints and a full pose, three neighbouring axes parallel or meeting in a point."""
     if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
         return None
-    own = Chain(arm.link, arm.prismatic)
+    chain = Chain(arm.link, arm.prismatic)
     for backward, first in product((False, True), (1, 3)):
-        loop = _Loop.of(reverse(own) if backward else own, first, tolerance, arm.reach)
+        loop = _Loop.of(reverse(chain) if backward else chain, first, tolerance, arm.reach)
         if loop is not None and not loop.ends.close:
             geometry = _class_of(loop, range(5, -1, -1) if backward else range(6))
             if backward:  # from the tool to the base
@@ -71,12 +71,12 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
 def _class_of(loop: _Loop, names: Sequence[int]) -> Geometry:
     """The class of a loop, of a chain whose joints have these names (0..5)."""
     axes = sorted(names[i] + 1 for i in range(loop.first, loop.first + 3))
-    what, name = "meet in a point", "three axes that meet"
+    relation, name = "meet in a point", "three axes that meet"
     if loop.three_link:
-        what, name = "are parallel", "three parallel axes"
+        relation, name = "are parallel", "three parallel axes"
     c = names[loop.joints[2]] + 1
     how = f"a quartic gives joint {c}" if loop.ends.regular else f"special axes give joint {c} by itself"
-    why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {what}; {how}"
+    why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {relation}; {how}"
     # where one of these is free, its values at which the rest reaches may be few, and other motions cross there
     ends = tuple(names[j] for j in loop.joints)
     return Geometry(name, why, True, loop.solve, ordered=not loop.ends.regular, ends=ends)
@@ -91,8 +91,8 @@ class _Ends:
         self.rows = np.array([La[:3, :3] @ [0.0, 0.0, 1.0], La[:3, 3]])  # factors of f in (2)
         self.A = self.rows[:, :2]
         U, S, _ = np.linalg.svd(self.A)
-        off = float(S[1] / max(S[0], tol.NO_SIZE))
-        self.regular, self.close = off > tolerance, tolerance < off <= tol.NEAR
+        ratio = float(S[1] / max(S[0], tol.NO_SIZE))
+        self.regular, self.close = ratio > tolerance, tolerance < ratio <= tol.NEAR
         self.alone, self.main = U[:, 1], U[:, 0]  # combinations of (2): without f, and the other one
 
     def solve(
@@ -101,20 +101,20 @@ class _Ends:
         """The three joints on branch axes (b0, b1, 1, N), and doubt; height: what is known in (2) for directions."""
         ta, tb = self.La[9:12], Lb[9:12]
         factors = [[arrays.mul(-1.0, v) for v in (Lb[2], Lb[5], Lb[8])], pose.turn_back(Lb, tb)]  # of g
-        known: list[Entry] = [0.0, height]
+        right: list[Entry] = [0.0, height]
         if self.points:
             length = arrays.sub(arrays.add(arrays.dot(e, e), arrays.dot(ta, ta)), arrays.dot(d, d))
-            known = [
+            right = [
                 arrays.add(tb[2], arrays.dot(self.La[6:9], ta)),
                 arrays.mul(0.5, arrays.sub(length, arrays.dot(tb, tb))),
             ]
         # (2) solved for its part in f across joint a, as coefficients of (1, cos qc, sin qc)
         sides: list[list[Entry]] = []
-        for row, (gx, gy, gz), value in zip(self.rows.tolist(), factors, known, strict=True):
-            rest = arrays.sub(arrays.sub(value, arrays.mul(row[2], e[2])), arrays.mul(gz, d[2]))
+        for row, (gx, gy, gz), value in zip(self.rows.tolist(), factors, right, strict=True):
+            constant = arrays.sub(arrays.sub(value, arrays.mul(row[2], e[2])), arrays.mul(gz, d[2]))
             cosine = arrays.add(arrays.mul(gx, d[0]), arrays.mul(gy, d[1]))
             sine = arrays.sub(arrays.mul(gy, d[0]), arrays.mul(gx, d[1]))
-            sides.append([rest, arrays.mul(-1.0, cosine), arrays.mul(-1.0, sine)])
+            sides.append([constant, arrays.mul(-1.0, cosine), arrays.mul(-1.0, sine)])
         first, last, doubt = (self._quartic if self.regular else self._rank_one)(sides, e, prefer)
         u = pose.turn(Lb, spin(*last, d))
         v = spin(first.c, arrays.mul(-1.0, first.s), e)
@@ -139,9 +139,9 @@ class _Ends:
         return first, last, doubt | doubt_a
 
     def _rank_one(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
-        rest, cosine, sine = _combination(self.alone, sides)
-        known = arrays.mul(-1.0, rest)
-        last, doubt = linear(cosine, sine, known, 0, 1.0, prefer[2], one_root(cosine, sine, known))
+        constant, cosine, sine = _combination(self.alone, sides)
+        right = arrays.mul(-1.0, constant)
+        last, doubt = linear(cosine, sine, right, 0, 1.0, prefer[2], one_root(cosine, sine, right))
         last = normalised(last)
         fx, fy = (self.main @ self.A).tolist()
         a = arrays.add(arrays.mul(fx, e[0]), arrays.mul(fy, e[1]))
@@ -172,10 +172,10 @@ class _Loop:
     @classmethod
     def of(cls, chain: Chain, first: int, tolerance: float, reach: float) -> _Loop | None:
         """The loop, if the three axes from the first one on are parallel or meet; None if they do neither."""
-        one, other = chain.link[first + 1], chain.link[first + 2]
-        if is_parallel(one, tolerance) and is_parallel(other, tolerance):
+        L1, L2 = chain.link[first + 1], chain.link[first + 2]
+        if is_parallel(L1, tolerance) and is_parallel(L2, tolerance):
             return cls(chain, first, reach, None, tolerance)
-        met = meeting_point(one, other, tolerance * reach)
+        met = meeting_point(L1, L2, tolerance * reach)
         if met is None or first != 1:  # at an end they are a spherical wrist or shoulder
             return None
         return cls(chain, first, reach, (met[0] / reach, met[1] / reach), tolerance)
@@ -186,35 +186,35 @@ class _Loop:
         back = pose.inverse(pose.times(pose.times(self.from_base, goal), self.from_tool))
         before, between = (self.before, back) if self.first == 1 else (back, self.between)
         height: Entry
-        known: Sequence[Entry | None]
-        out, height = pose.constant(self.out), 0.0
+        three_angles: Sequence[Entry | None]
+        after, height = pose.constant(self.out), 0.0
         if self.points is None:
             assert self.three_link is not None
             sense = self.three_link.sense4
-            d, e = out[6:9], [arrays.mul(sense, before[k]) for k in (2, 5, 8)]
-            height = arrays.mul(-1.0, self.three_link.height4 + arrays.dot(d, out[9:12]))
+            d, e = after[6:9], [arrays.mul(sense, before[k]) for k in (2, 5, 8)]
+            height = arrays.mul(-1.0, self.three_link.height4 + arrays.dot(d, after[9:12]))
             height = arrays.sub(height, arrays.mul(sense, before[11]))
         else:
-            here, there = (point.tolist() for point in self.points)
-            d, e = pose.apply(out, here), pose.apply(pose.inverse(before), there)
+            seen_before, seen_after = (point.tolist() for point in self.points)
+            d, e = pose.apply(after, seen_before), pose.apply(pose.inverse(before), seen_after)
         ends, doubt = self.ends.solve(between, d, e, height, [prefer[j] for j in self.joints])
         P = pose.times(pose.rotate(before, *ends[0]), self.ends.La)
         P = pose.times(pose.rotate(P, *ends[1]), between)
-        P = pose.times(pose.rotate(P, *ends[2]), out)  # joint `first` seen from the frame after the last of the three
+        P = pose.times(pose.rotate(P, *ends[2]), after)  # joint `first` seen from the frame after the last of the three
         x, z = [P[0], P[3], P[6]], [P[2], P[5], P[8]]
-        rest = prefer[self.first : self.first + 3]
+        prefer3 = prefer[self.first : self.first + 3]
         if self.three_link is None:
-            three, known, doubt3, _ = self.wrist.solve(x, z, rest)
+            three, three_angles, doubt3, _ = self.wrist.solve(x, z, prefer3)
         else:
             p = [arrays.mul(-1.0, v) for v in pose.turn_back(P, P[9:12])]
-            three, known, doubt3 = self.three_link.solve(p, x, rest, axis=2)
+            three, three_angles, doubt3 = self.three_link.solve(p, x, prefer3, axis=2)
         pairs: list[Pair] = [Pair(1.0, 0.0)] * 6
         angles: list[Entry | None] = [None] * 6
         for joint, pair in zip(self.joints, ends, strict=True):
             pairs[joint] = pair
         pairs[self.first : self.first + 3] = three
-        if known:
-            angles[self.first : self.first + 3] = known
+        if three_angles:
+            angles[self.first : self.first + 3] = three_angles
         return Candidates(pairs, doubt | doubt3, None, angles)
 
 

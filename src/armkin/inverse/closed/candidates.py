@@ -53,23 +53,23 @@ class Recorded:
         assert self.geometry.pairs is not None
         return self._of(self.geometry.pairs(goal, prefer), goal)
 
-    def _of(self, found: Candidates, goal: list[Entry]) -> list[Entry]:
-        miss = found.miss
+    def _of(self, candidates: Candidates, goal: list[Entry]) -> list[Entry]:
+        miss = candidates.miss
         if miss is None:
-            miss, *rest = _misses(self.arm, self.task, self.link, found.pairs, goal)
-            for one in rest:
-                miss = miss + one
-        values = found.values()
+            miss, *turns = _misses(self.arm, self.task, self.link, candidates.pairs, goal)
+            for turn in turns:
+                miss = miss + turn
+        values = candidates.values()
         if len(self.task.sums):
             miss = arrays.maximum(miss, _sum_miss(self.task, values, goal))
-        return [*values, miss, found.doubt.edge, found.doubt.free]
+        return [*values, miss, candidates.doubt.edge, candidates.doubt.free]
 
     def measured(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
         """The same, and behind the squared residual its two parts: of lengths [reaches] and of small angles [rad]."""
         assert self.geometry.pairs is not None
-        found = self.geometry.pairs(goal, prefer)
-        *values, miss, edge, free = self._of(found, goal)
-        length, *turns = _misses(self.arm, self.task, self.link, found.pairs, goal, every=True)
+        candidates = self.geometry.pairs(goal, prefer)
+        *values, miss, edge, free = self._of(candidates, goal)
+        length, *turns = _misses(self.arm, self.task, self.link, candidates.pairs, goal, every=True)
         angle: Entry = 0.0
         for turn in turns:  # three axes are a turn's square off twice over
             angle = arrays.add(angle, arrays.mul(1.0 / max(len(turns) - 1, 1), turn))
@@ -84,8 +84,8 @@ class Recorded:
         slides = self.arm.prismatic.tolist()
 
         def formula(entries: list[Entry]) -> list[Entry]:
-            rest = iter(entries[inputs:])
-            pairs = [Pair(next(rest), None if slide else next(rest)) for slide in slides]
+            motions = iter(entries[inputs:])
+            pairs = [Pair(next(motions), None if slide else next(motions)) for slide in slides]
             return self.candidates(entries[:inputs], pairs)
 
         return StraightLineCode(formula, inputs + 2 * len(slides) - sum(slides))
@@ -96,21 +96,21 @@ class Recorded:
         flat = entries(self.task, target)
         for v, slides in zip(np.ascontiguousarray(values.T), self.arm.prismatic, strict=True):
             flat += [v] if slides else [np.cos(v), np.sin(v)]
-        found = list(self._preferring.run(flat, self._preferring.workspace(len(target))))
-        return as_rows(found[: self.arm.n + 1], len(target))
+        columns = list(self._preferring.run(flat, self._preferring.workspace(len(target))))
+        return as_rows(columns[: self.arm.n + 1], len(target))
 
     def in_numbers(self, target: Array) -> list[Array]:
         """`candidates` to the last digit the same, whatever a target is asked together with."""
         if len(target) > FEW:
             return self.code.exactly(entries(self.task, target))
         full = self.task.orientation == "full"
-        return self.code.one_by_one([pose.read_one(one) if full else one.tolist() for one in target])
+        return self.code.one_by_one([pose.read_one(row) if full else row.tolist() for row in target])
 
     def rows(self, target: Array) -> tuple[Array, Array, Bool]:
         """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
         N = len(target)
-        found = list(self.code.run(entries(self.task, target), self.code.workspace(N)))
-        *_, miss, edge, _ = rows = np.moveaxis(as_rows(found, N), 2, 0)
+        columns = list(self.code.run(entries(self.task, target), self.code.workspace(N)))
+        *_, miss, edge, _ = rows = np.moveaxis(as_rows(columns, N), 2, 0)
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
     def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
@@ -124,23 +124,23 @@ class Recorded:
         if not (lost.any() or (q[:, 1:] != q[:, :1]).any()):  # nothing that a formula leaves free: no curve, no meeting
             return q[:, 0, :0], np.zeros(0, np.int64), np.zeros_like(lost)
         exact = np.where((miss <= tol.ACCEPTED**2)[..., None], q, np.nan)
-        kept, held = four_bars.one_a_circuit(self.arm, exact, near)
-        known: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)
-        linkage = np.asarray(known.any(axis=1))
+        chosen, held = four_bars.one_a_circuit(self.arm, exact, near)
+        of_linkage: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)
+        linkage = np.asarray(of_linkage.any(axis=1))
         # what else does not depend on the free joint is known already
-        kept = np.where(linkage[:, None, None], kept & known[:, None], miss < tol.HOPELESS**2)
-        more = [_each_once(np.where((kept & lost[:, None, None])[..., None], q, np.nan))]
-        on = np.where((miss < tol.SEED**2)[..., None], q, np.nan)
-        meeting = crossings.beside(self.arm, self.task, on, target)
-        off = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
-        same = np.where(np.isnan(off), 0.0, off).max(axis=3) < tol.TURNED
-        meeting[np.any(same & known[:, None], axis=2)] = np.nan  # on a self-motion of which all circuits are known
+        chosen = np.where(linkage[:, None, None], chosen & of_linkage[:, None], miss < tol.HOPELESS**2)
+        more = [_each_once(np.where((chosen & lost[:, None, None])[..., None], q, np.nan))]
+        solving = np.where((miss < tol.SEED**2)[..., None], q, np.nan)
+        meeting = crossings.beside(self.arm, self.task, solving, target)
+        apart = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
+        same = np.where(np.isnan(apart), 0.0, apart).max(axis=3) < tol.TURNED
+        meeting[np.any(same & of_linkage[:, None], axis=2)] = np.nan  # on a self-motion of which all circuits are known
         more.append(meeting)
-        rest = np.flatnonzero(lost & ~linkage)
-        if len(rest):
-            others = np.full((len(q), (FREED + SHAKEN) * q.shape[2], self.arm.n), np.nan)
-            others[rest] = self._random(target[rest], near[rest])
-            more.append(others)
+        rows = np.flatnonzero(lost & ~linkage)
+        if len(rows):
+            random = np.full((len(q), (FREED + SHAKEN) * q.shape[2], self.arm.n), np.nan)
+            random[rows] = self._random(target[rows], near[rows])
+            more.append(random)
         branch = np.concatenate([np.arange(part.shape[1]) % q.shape[2] for part in more])
         return np.concatenate(more, axis=1), branch, lost if self.geometry.ends else np.zeros_like(lost)
 
@@ -211,10 +211,10 @@ def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
 def as_rows(values: Sequence[ArrayLike], count: int) -> Array:
     """Entries on branch axes (b0, b1, b2, N) as rows (N, B, entries)."""
     shape = np.broadcast_shapes((1, 1, 1, count), *(np.shape(v) for v in values))
-    out = np.empty((*shape, len(values)))
+    rows = np.empty((*shape, len(values)))
     for k, value in enumerate(values):
-        out[..., k] = value
-    return out.reshape(math.prod(shape[:-1]), count, len(values)).swapaxes(0, 1).copy()
+        rows[..., k] = value
+    return rows.reshape(math.prod(shape[:-1]), count, len(values)).swapaxes(0, 1).copy()
 
 
 @lru_cache(maxsize=256)
@@ -248,12 +248,12 @@ def _misses(
         p = pose.apply(link[i], p)
         columns = [pose.turn(link[i], v) for v in columns]
     full = task.orientation == "full"
-    where = goal[9:12] if full else goal[: task.position]
-    wanted = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
+    point = goal[9:12] if full else goal[: task.position]
+    goals = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
     if full and every:
-        columns, wanted = [*columns, arrays.cross(columns[1], columns[0])], [*wanted, goal[3:6]]
-    length = arrays.mul(1.0 / arm.reach**2, distance2(p, where))
-    return [length, *(distance2(v, w) for v, w in zip(columns, wanted, strict=False))]
+        columns, goals = [*columns, arrays.cross(columns[1], columns[0])], [*goals, goal[3:6]]
+    length = arrays.mul(1.0 / arm.reach**2, distance2(p, point))
+    return [length, *(distance2(v, w) for v, w in zip(columns, goals, strict=False))]
 
 
 def _sum_miss(task: Task, values: list[Entry], goal: list[Entry]) -> Entry:

@@ -30,53 +30,53 @@ def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """
     N, steps, B, n = q.shape
     flat = q.reshape(-1, n)
-    some = np.flatnonzero(~np.isnan(flat).any(axis=1))
-    _, J = newton.scaled(arm, task, flat[some], np.repeat(target, steps * B, axis=0)[some])
+    rows = np.flatnonzero(~np.isnan(flat).any(axis=1))
+    _, J = newton.scaled(arm, task, flat[rows], np.repeat(target, steps * B, axis=0)[rows])
     rank = min(task.constraints, n)
     U, S, V = np.linalg.svd(J)
     size = np.full(len(flat), np.inf)
-    size[some] = S[:, rank - 2]
+    size[rows] = S[:, rank - 2]
     second, place, unit = size.reshape(N, steps, B), q.copy(), radian_or_reach(arm)
-    found = _least_steps(second)
+    meets = _least_steps(second)
     if J.shape[1] == n == rank:
         bordered = np.full((len(flat), 2 * n + 1), np.nan)
         product = np.linalg.det(U) * np.linalg.det(V) * S[:, :-1].prod(axis=1)
-        bordered[some] = np.concatenate([product[:, None], U[:, :, -1], V[:, -1]], axis=1)
+        bordered[rows] = np.concatenate([product[:, None], U[:, :, -1], V[:, -1]], axis=1)
         way, share = _sign_changes(arm, q, bordered.reshape(N, steps, B, -1))
         changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
-        found |= changes
+        meets |= changes
         second[changes] *= tol.RATHER  # there, not at a step beside it
     for b in range(1, B):  # double roots are there twice
         twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < tol.SAME
-        found[:, :, b] &= ~twin.any(axis=2)
-    at = _distinct_places(arm, place.reshape(N, -1, n), np.where(found, second, np.inf).reshape(N, -1)).reshape(-1, n)
-    out = np.full((len(at), 8, n), np.nan)
-    some = np.flatnonzero(~np.isnan(at).any(axis=1))
-    _, V, _ = newton.null_space(arm, task, at[some], np.repeat(target, MOST, axis=0)[some])
-    one, other = V[:, rank - 1], V[:, rank - 2]
-    ways = np.stack([one, other, (one + other) / 2**0.5, (one - other) / 2**0.5], axis=1)
-    start = (at[some, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)).reshape(-1, n)
-    goal = np.repeat(target, MOST, axis=0)[np.repeat(some, 8)]
-    there, size = newton.correct(arm, task, start, goal, steps=10)
+        meets[:, :, b] &= ~twin.any(axis=2)
+    spot = _distinct_places(arm, place.reshape(N, -1, n), np.where(meets, second, np.inf).reshape(N, -1)).reshape(-1, n)
+    postures = np.full((len(spot), 8, n), np.nan)
+    rows = np.flatnonzero(~np.isnan(spot).any(axis=1))
+    _, V, _ = newton.null_space(arm, task, spot[rows], np.repeat(target, MOST, axis=0)[rows])
+    along, across = V[:, rank - 1], V[:, rank - 2]
+    ways = np.stack([along, across, (along + across) / 2**0.5, (along - across) / 2**0.5], axis=1)
+    start = (spot[rows, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)).reshape(-1, n)
+    goal = np.repeat(target, MOST, axis=0)[np.repeat(rows, 8)]
+    landed, size = newton.correct(arm, task, start, goal, steps=10)
     # what falls back stands for no self-motion: it is on both, nearly
-    back = np.abs(newton.difference(arm, there, np.repeat(at[some], 8, axis=0))).max(axis=1) < 0.5 * AWAY
-    out[some] = np.where((back | (size > tol.SEED))[:, None], np.nan, there).reshape(-1, 8, n)
-    return out.reshape(N, -1, n)
+    back = np.abs(newton.difference(arm, landed, np.repeat(spot[rows], 8, axis=0))).max(axis=1) < 0.5 * AWAY
+    postures[rows] = np.where((back | (size > tol.SEED))[:, None], np.nan, landed).reshape(-1, 8, n)
+    return postures.reshape(N, -1, n)
 
 
 def _distinct_places(arm: Arm, place: Array, second: Array) -> Array:
     """Of places (N, P, n) the `MOST` with the smallest second singular values (N, P), each crossing once; else nan."""
-    out = np.full((len(place), MOST, arm.n), np.nan)
+    distinct = np.full((len(place), MOST, arm.n), np.nan)
     for k in np.flatnonzero(np.isfinite(second).any(axis=1)):
-        found = np.flatnonzero(np.isfinite(second[k]))
+        crossing = np.flatnonzero(np.isfinite(second[k]))
         count = 0
-        for at in place[k, found[np.argsort(second[k, found], kind="stable")]]:
-            if not (np.abs(newton.difference(arm, out[k, :count], at)).max(axis=1) < ONE).any():
-                out[k, count], count = at, count + 1
+        for centre in place[k, crossing[np.argsort(second[k, crossing], kind="stable")]]:
+            if not (np.abs(newton.difference(arm, distinct[k, :count], centre)).max(axis=1) < ONE).any():
+                distinct[k, count], count = centre, count + 1
                 if count == MOST:
                     break
-    return out
+    return distinct
 
 
 def _least_steps(second: Array) -> Bool:

@@ -63,8 +63,8 @@ class Elbow:
         else:
             a = arrays.combine(n[0], [x], n[1], [y])[0]
             b = arrays.combine(n[0], [y], -n[1], [x])[0]
-            rest = arrays.sub(along + arrays.dot(n, o), arrays.mul(n[2], z))
-            first, doubt1 = linear(a, b, rest, 0, self.scale, prefer[0])
+            right = arrays.sub(along + arrays.dot(n, o), arrays.mul(n[2], z))
+            first, doubt1 = linear(a, b, right, 0, self.scale, prefer[0])
         rx, ry, _ = self._seen(first, [x, y, z])
         rx, ry = arrays.sub(rx, past[0]), arrays.sub(ry, past[1])
         second, third, doubt23 = self.two_link.solve(rx, ry, prefer[1], prefer[2], fore)
@@ -114,13 +114,13 @@ class TwoLink:
         lx, ly, (mx, my) = self.lx, self.ly, (self.mx, self.my) if fore is None else fore[:2]
         upper2, fore2, across2 = lx * lx + ly * ly, mx * mx + my * my, rx * rx + ry * ry
         # |r|^2 = |l + Rz(q3) m|^2, halved: the product of both lengths and the cosine of the angle between them
-        ahead, beside, known = lx * mx + ly * my, ly * mx - lx * my, 0.5 * (across2 - (upper2 + fore2))
-        third, doubt3 = linear(ahead, beside, known, axis, self.scale**2, prefer3)
+        ahead, beside, right = lx * mx + ly * my, ly * mx - lx * my, 0.5 * (across2 - (upper2 + fore2))
+        third, doubt3 = linear(ahead, beside, right, axis, self.scale**2, prefer3)
         third = third if self.sense > 0 else Pair(third.c, -third.s)
         ux, uy, _ = self.reach(third, fore)
         # |l + Rz(q3) m| is the same for both elbows: once for both the pair below is normalised
-        aside = np.maximum(upper2 * fore2 - known * known, 0.0)
-        reached2 = ((upper2 + known) ** 2 + aside) / upper2 if upper2 > 0.0 else None
+        aside = np.maximum(upper2 * fore2 - right * right, 0.0)
+        reached2 = ((upper2 + right) ** 2 + aside) / upper2 if upper2 > 0.0 else None
         length2 = None if reached2 is None else np.sqrt(reached2 * across2)
         second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2, length2)
         return second, third, doubt2 | doubt3

@@ -36,13 +36,13 @@ def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
 
     joints: (M, n) those that move. Returns (M,) and (M,), -1 where there is one circuit.
     """
-    known, joint = np.zeros(len(q), bool), np.full(len(q), -1)
+    is_linkage, joint = np.zeros(len(q), bool), np.full(len(q), -1)
     rows = np.flatnonzero((joints.sum(axis=1) == 4) & ~(joints & arm.prismatic).any(axis=1))
     if not len(rows):
-        return known, joint
-    which = np.nonzero(joints[rows])[1].reshape(-1, 4)
-    at = _linkages(arm, q[rows], which)
-    lowest, highest = _diagonals(at.bars, at.spherical)
+        return is_linkage, joint
+    four = np.nonzero(joints[rows])[1].reshape(-1, 4)
+    linkage = _linkages(arm, q[rows], four)
+    lowest, highest = _diagonals(linkage.bars, linkage.spherical)
     # the diagonal beside a joint is that of the other two bars, too
     least, most = np.roll(lowest, -2, axis=1), np.roll(highest, -2, axis=1)
     # equal bars, or nearly: there are several postures in one line, and the curve may fall into others that cross
@@ -51,18 +51,18 @@ def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
     # where all bars come so near to one line that the posture in it solves the target, two circuits are one
     least, most = least - tol.SOLUTION, most + tol.SOLUTION
     reaches = ((lowest > least) & (lowest < most)) | ((highest > least) & (highest < most))
-    length = np.where(at.spherical[:, None], np.sin(at.bars), at.bars)
-    known[rows] = (at.planar | at.spherical) & (length > tol.NEAR).all(axis=1) & ~several
+    length = np.where(linkage.spherical[:, None], np.sin(linkage.bars), linkage.bars)
+    is_linkage[rows] = (linkage.planar | linkage.spherical) & (length > tol.NEAR).all(axis=1) & ~several
     two = np.flatnonzero(~reaches.all(axis=1))
-    joint[rows[two]] = which[two, reaches[two].argmin(axis=1)]
-    return known, joint
+    joint[rows[two]] = four[two, reaches[two].argmin(axis=1)]
+    return is_linkage, joint
 
 
 def sides(arm: Arm, q: Array, joints: Bool, joint: Int) -> Bool:
     """On which of two circuits postures (M, n) of four bars are: whether the sine at a joint (M,) is positive: (M,)."""
-    which = np.nonzero(joints)[1].reshape(-1, 4)
-    sine = _linkages(arm, q, which).sine
-    return np.asarray((np.where(which == joint[:, None], sine, 0.0)).sum(axis=1) > 0.0)
+    four = np.nonzero(joints)[1].reshape(-1, 4)
+    sine = _linkages(arm, q, four).sine
+    return np.asarray((np.where(four == joint[:, None], sine, 0.0)).sum(axis=1) > 0.0)
 
 
 def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
@@ -73,26 +73,26 @@ def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
     self-motion of four bars, nan in the joints that these move, and where there is none.
     """
     N, _, B, n = q.shape
-    there = ~np.isnan(q[..., 0])
-    first = np.take_along_axis(q, there.argmax(axis=1)[:, None, :, None], axis=1)
+    present = ~np.isnan(q[..., 0])
+    first = np.take_along_axis(q, present.argmax(axis=1)[:, None, :, None], axis=1)
     joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > tol.SAME).any(axis=1))
     k, b = np.nonzero(joints.sum(axis=2) == 4)
-    known, joint = dead_points(arm, first[k, 0, b], joints[k, b])
-    k, b, joint = k[known], b[known], joint[known]
+    is_linkage, joint = dead_points(arm, first[k, 0, b], joints[k, b])
+    k, b, joint = k[is_linkage], b[is_linkage], joint[is_linkage]
     held = np.full((N, B, n), np.nan)
     held[k, b] = np.where(joints[k, b], np.nan, first[k, 0, b])
-    kept, own = there.copy(), there[k, :, b]  # (m, S)
-    side = np.zeros(own.shape, bool)
-    i, s = np.nonzero(own & (joint >= 0)[:, None])
+    chosen, solved = present.copy(), present[k, :, b]  # (m, S)
+    side = np.zeros(solved.shape, bool)
+    i, s = np.nonzero(solved & (joint >= 0)[:, None])
     side[i, s] = sides(arm, q[k[i], s, b[i]], joints[k[i], b[i]], joint[i])
     motion = np.abs(newton.difference(arm, q[k, :, b], near[k, None])).sum(axis=2)
-    motion = np.where(own, motion, np.inf)
+    motion = np.where(solved, motion, np.inf)
     nearest = [np.where(side == way, motion, np.inf) for way in (False, True)]
-    kept[k, :, b] = False
+    chosen[k, :, b] = False
     for part in nearest:
-        some = np.isfinite(part).any(axis=1)
-        kept[k[some], part[some].argmin(axis=1), b[some]] = True
-    return kept, held
+        rows = np.isfinite(part).any(axis=1)
+        chosen[k[rows], part[rows].argmin(axis=1), b[rows]] = True
+    return chosen, held
 
 
 def _diagonals(bars: Array, spherical: Bool) -> tuple[Array, Array]:
@@ -103,9 +103,9 @@ def _diagonals(bars: Array, spherical: Bool) -> tuple[Array, Array]:
     return np.abs(before - bars), np.where(spherical[:, None], arc, total)
 
 
-def _linkages(arm: Arm, q: Array, which: Int) -> _Linkages:
-    """Axes which (M, 4) of postures (M, n)."""
-    J = np.take_along_axis(jacobian(arm, q), which[:, None], axis=2).swapaxes(1, 2)  # (M, 4, 6)
+def _linkages(arm: Arm, q: Array, four: Int) -> _Linkages:
+    """Four axes (M, 4) of postures (M, n)."""
+    J = np.take_along_axis(jacobian(arm, q), four[:, None], axis=2).swapaxes(1, 2)  # (M, 4, 6)
     axis, point = J[:, :, 3:], cross_rows(J[:, :, 3:], J[:, :, :3]) / arm.reach  # feet of perpendiculars from the tip
     after, ahead = np.roll(axis, -1, axis=1), np.roll(point, -1, axis=1) - point
     normal = cross_rows(axis, after)
@@ -118,9 +118,9 @@ def _linkages(arm: Arm, q: Array, which: Int) -> _Linkages:
     turn = cross_rows(ahead[:, 0], axis[:, 1])
     along = (turn * normal[:, 0]).sum(axis=1, keepdims=True) / far
     centre = point[:, :1] + (along * axis[:, 0])[:, None]
-    off = np.linalg.norm(cross_rows(centre - point, axis), axis=2)
-    spherical = ~planar & (area > tol.PARALLEL).all(axis=1) & (off < tol.NO_AREA).all(axis=1)
+    miss = np.linalg.norm(cross_rows(centre - point, axis), axis=2)
+    spherical = ~planar & (area > tol.PARALLEL).all(axis=1) & (miss < tol.NO_AREA).all(axis=1)
     arcs = np.arctan2(area, (axis * after).sum(axis=2))
     triple = (np.roll(axis, 1, axis=1) * normal).sum(axis=2)
-    some = spherical[:, None]
-    return _Linkages(planar, spherical, np.where(some, arcs, bars), np.where(some, triple, sine))
+    meeting = spherical[:, None]
+    return _Linkages(planar, spherical, np.where(meeting, arcs, bars), np.where(meeting, triple, sine))

@@ -35,8 +35,8 @@ class NewtonSteps:
     The sums are linear: the last joints follow from the first ones, whose equations are those of the point alone.
     """
 
-    def __init__(self, arm: Arm, task: Task, off: float) -> None:
-        """off: how far the arm is from the class whose roots are the seeds, lengths in units of the reach."""
+    def __init__(self, arm: Arm, task: Task, distance: float) -> None:
+        """distance: how far the arm is from the class whose roots are the seeds, lengths in units of the reach."""
         self.arm, self.size = arm, task.position  # equations and unknowns: 2 or 3
         link, offset = _links_without_turns(arm)
         self.base: pose.Pose | None = None
@@ -45,44 +45,44 @@ class NewtonSteps:
         self.link = [pose.constant(L) for L in link]
         self.offset = [Pair(math.cos(v), math.sin(v)) for v in offset]
         self.unit = [float(v) for v in radian_or_reach(arm)]
-        own, rest = task.sums[:, : self.size], task.sums[:, self.size :]
-        follow = -np.linalg.solve(rest, own) if len(task.sums) else np.zeros((0, self.size))
+        first_sums, last_sums = task.sums[:, : self.size], task.sums[:, self.size :]
+        follow = -np.linalg.solve(last_sums, first_sums) if len(task.sums) else np.zeros((0, self.size))
         self.follow: list[list[float]] = follow.tolist()  # how the last joints turn with the first ones
-        error = min(SLOPE * off, 0.5)  # its square after a step, and so on
+        error = min(SLOPE * distance, 0.5)  # its square after a step, and so on
         least = max(math.ceil(math.log2(math.log(tol.LAST_ERROR) / math.log(error))), 1)
         self.steps = min(least + 1, MOST)  # one more, and two thirds of those near a singularity need no other way
         self.counted = task.name == "xyz" and not arm.prismatic.any()
         # squared residual of a seed that leads nowhere, and need not; the error grows with a slide's extension
-        self.absent = None if self.counted or arm.prismatic.any() else ABSENT * off
+        self.absent = None if self.counted or arm.prismatic.any() else ABSENT * distance
 
     def corrected(self, seeds: Candidates, goal: list[Entry]) -> Candidates:
         """Seeds moved onto the arm, and which of them are in doubt.
 
         Where the roots are counted, all four must be there, each apart from the others; else those that may be real.
         """
-        where = goal[: self.size] if self.base is None else pose.apply(self.base, goal[:3])
+        point = goal[: self.size] if self.base is None else pose.apply(self.base, goal[:3])
         pairs, first = self._turned(seeds.pairs, 1.0), None
         for _ in range(self.steps):
-            missing, columns = self._linear(pairs, where)
+            missing, columns = self._linear(pairs, point)
             adjugate, det = _adjugate(columns)
             inverse = det / (det * det + tol.NO_DETERMINANT)
             pairs = self._moved(pairs, [arrays.mul(inverse, arrays.dot(row, missing)) for row in adjugate])
             first = missing if first is None else first
         assert first is not None
-        miss = arrays.dot(missing := self._linear(pairs, where)[0], missing)
-        there = miss < precision().nearby
+        miss = arrays.dot(missing := self._linear(pairs, point)[0], missing)
+        solving = miss < precision().nearby
         left: Truth = miss >= precision().nearby
         pairs = self._turned(pairs, -1.0)
         if self.absent is not None:
             left = left & (arrays.dot(first, first) < self.absent)
-        return Candidates(pairs, seeds.doubt | (_merged(pairs, self.unit) & there) | left, miss)
+        return Candidates(pairs, seeds.doubt | (_merged(pairs, self.unit) & solving) | left, miss)
 
     def _turned(self, pairs: list[Pair], sense: float) -> list[Pair]:
         """Joints as the links without their turns have them, or with sense -1 back."""
-        each = zip(pairs, self.offset, strict=True)
-        return [pair if pair.s is None else together(pair, off, sense) for pair, off in each]
+        joints = zip(pairs, self.offset, strict=True)
+        return [pair if pair.s is None else together(pair, offset, sense) for pair, offset in joints]
 
-    def _linear(self, pairs: list[Pair], where: list[Entry]) -> tuple[list[Entry], list[list[Entry]]]:
+    def _linear(self, pairs: list[Pair], point: list[Entry]) -> tuple[list[Entry], list[list[Entry]]]:
         """What the point still misses, and its change with each of the first joints [reaches a radian or reach].
 
         All is carried from the tool back to the base; in joint i's own frame its slope is ``z x p``.
@@ -106,7 +106,7 @@ class NewtonSteps:
             for k, row in enumerate(self.follow):
                 column = arrays.combine(1.0, column, row[j], slopes[self.size + k])
             columns.append([arrays.mul(scale, v) for v in column[: self.size]])
-        return [arrays.mul(scale, arrays.sub(w, v)) for w, v in zip(where, p, strict=False)], columns
+        return [arrays.mul(scale, arrays.sub(w, v)) for w, v in zip(point, p, strict=False)], columns
 
     def _moved(self, pairs: list[Pair], step: list[Entry]) -> list[Pair]:
         """Joints after a step of the first ones [rad, reaches]; the others turn by as much, so that their sums stay.
@@ -119,18 +119,18 @@ class NewtonSteps:
             square = half * half
             scale = 1.0 / (1.0 + square)
             turns.append(Pair((1.0 - square) * scale, (half + half) * scale))
-        out = []
+        moved = []
         for i, (c, s) in enumerate(pairs):
             if s is None:
-                out.append(Pair(arrays.add(c, arrays.mul(self.unit[i], step[i])), None))
+                moved.append(Pair(arrays.add(c, arrays.mul(self.unit[i], step[i])), None))
                 continue
             turned = Pair(c, s)
             for k, turn in enumerate(turns):
                 sense = float(k == i) if i < self.size else self.follow[i - self.size][k]
                 if sense:
                     turned = together(turned, turn, sense)
-            out.append(turned)
-        return out
+            moved.append(turned)
+        return moved
 
 
 def _links_without_turns(arm: Arm) -> tuple[Array, list[float]]:
@@ -158,17 +158,17 @@ def _links_without_turns(arm: Arm) -> tuple[Array, list[float]]:
     return link, turns
 
 
-def steps(arm: Arm, task: Task, off: float, seeds: ClosedForm) -> tuple[ClosedForm, bool] | None:
-    """A closed form of an arm that misses a class by `off`, and whether it counts all roots; None where it has none.
+def steps(arm: Arm, task: Task, distance: float, seeds: ClosedForm) -> tuple[ClosedForm, bool] | None:
+    """A closed form of an arm that misses a class by so much, and whether it counts all roots; None where it has none.
 
     seeds: the closed form of the class.
     """
     if task.orientation != "none" or len(task.sums) != arm.n - task.position:
         return None
-    rest = task.sums[:, task.position :]
-    if len(rest) and (abs(np.linalg.det(rest)) < 0.5 or not set(np.unique(np.linalg.solve(rest, task.sums))) <= SENSES):
+    last = task.sums[:, task.position :]
+    if len(last) and (abs(np.linalg.det(last)) < 0.5 or not set(np.unique(np.linalg.solve(last, task.sums))) <= SENSES):
         return None  # sums without the last joints, or of parts of turns
-    newton = NewtonSteps(arm, task, off)
+    newton = NewtonSteps(arm, task, distance)
     return (lambda goal, prefer: newton.corrected(seeds(goal, prefer), goal)), newton.counted
 
 
@@ -180,11 +180,11 @@ def _merged(pairs: list[Pair], unit: list[float]) -> Truth:
         for (c, s), size in zip(pairs, unit, strict=True):
             for v, scale in ((c, 1.0 / size), (s, 1.0)):
                 if v is not None:
-                    other = v
+                    flipped = v
                     for axis in axes:
-                        other = _on_other_branch(other, axis)
-                    if other is not v:
-                        d = arrays.mul(scale, v - other)
+                        flipped = _on_other_branch(flipped, axis)
+                    if flipped is not v:
+                        d = arrays.mul(scale, v - flipped)
                         away = arrays.add(away, d * d)
         if not isinstance(away, float):
             merged = merged | (away < tol.APART_ROOTS**2)

@@ -35,42 +35,42 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     lift = next((i for i in range(arm.n) if arm.prismatic[i] and abs(w[i, 2]) > 0.5), None)
     if (task.name == "xyz_yaw") != (lift is not None) or _leaves_plane(w, arm.prismatic, lift) > tolerance:
         return None
-    chain, kept = _in_plane(arm, lift)
-    solve_plane = _two_joints(chain) if task.name == "xy" else _three_joints(chain, task, kept)
+    chain, joints = _in_plane(arm, lift)
+    solve_plane = _two_joints(chain) if task.name == "xy" else _three_joints(chain, task, joints)
     if solve_plane is None:
         return None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     name, more = ("planar", "") if lift is None else ("SCARA", " or along z")
     why = f"{kinds}: all joints move in the base's x-y plane{more}"
-    solve = _with_lift(arm, solve_plane, kept, lift, w)
+    solve = _with_lift(arm, solve_plane, joints, lift, w)
     return Geometry(name, why, True, solve, labels=() if chain.prismatic.any() else ("", "elbow", ""))
 
 
 def _in_plane(arm: Arm, lift: int | None) -> tuple[Chain, list[int]]:
     """The chain without the lift, and which joints it has."""
-    kept = [i for i in range(arm.n) if i != lift]
+    joints = [i for i in range(arm.n) if i != lift]
     if lift is None:
-        return Chain(arm.link, arm.prismatic), kept
+        return Chain(arm.link, arm.prismatic), joints
     link = np.array([*arm.link[:lift], arm.link[lift] @ arm.link[lift + 1], *arm.link[lift + 2 :]])
-    return Chain(link, np.delete(arm.prismatic, lift)), kept
+    return Chain(link, np.delete(arm.prismatic, lift)), joints
 
 
 def _with_lift(
-    arm: Arm, solve_plane: Solve, kept: list[int], lift: int | None, w: Array
+    arm: Arm, solve_plane: Solve, joints: list[int], lift: int | None, w: Array
 ) -> Callable[[list[Entry], Prefer], Candidates]:
-    """The closed form of all joints by that of the others, kept; w: (n, 3) the joints' axes."""
+    """The closed form of all joints by that of the others, joints; w: (n, 3) the joints' axes."""
     fixed = [pose.constant(L) for L in arm.link]
 
     def solve(goal: list[Entry], prefer: Prefer) -> Candidates:
-        pairs, doubt = solve_plane(goal, [prefer[i] for i in kept])
+        pairs, doubt = solve_plane(goal, [prefer[i] for i in joints])
         if lift is None:
             return Candidates(pairs, doubt)
         # the lift's value is what is missing in height when it is zero
         P = fixed[0]
-        rest = iter(pairs)
+        motions = iter(pairs)
         for i in range(arm.n):
             if i != lift:
-                pair = next(rest)
+                pair = next(motions)
                 P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
             P = pose.times(P, fixed[i + 1])
         pairs.insert(lift, Pair((goal[2] - P[11]) * float(np.sign(w[lift, 2])), None))
@@ -123,9 +123,9 @@ def _two_turning(chain: Chain) -> Solve:
     return solve
 
 
-def _three_joints(chain: Chain, task: Task, kept: list[int]) -> Solve:
+def _three_joints(chain: Chain, task: Task, joints: list[int]) -> Solve:
     """Three planar joints with the tool's direction given."""
-    weights = task.sums[0][kept]
+    weights = task.sums[0][joints]
     if not chain.prismatic[2]:
         return _known_last(chain, task, weights)
     if not chain.prismatic[0]:

@@ -35,10 +35,10 @@ def product(u: list[Entry], v: list[Entry]) -> list[Entry]:
 
 def total(*terms: list[Entry]) -> list[Entry]:
     """The sum of some."""
-    out = terms[0]
+    sums = terms[0]
     for term in terms[1:]:
-        out = [arrays.add(a, b) for a, b in zip(out, term, strict=True)]
-    return out
+        sums = [arrays.add(a, b) for a, b in zip(sums, term, strict=True)]
+    return sums
 
 
 def turn(six: list[Entry], size: Entry, prefer: Pair | None) -> tuple[Pair, Doubt]:

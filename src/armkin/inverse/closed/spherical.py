@@ -97,9 +97,9 @@ class SphericalWrist:
             x, z = (pose.turn_back(self.links[3], self.elbow.turned_back(pairs, v)) for v in columns)
         else:
             miss, x, z = self._pushed(pairs, centre, columns)
-        turned, known, doubt456, wrong = self.wrist.solve(x, z, prefer[3:])
+        turned, wrist_angles, doubt456, wrong = self.wrist.solve(x, z, prefer[3:])
         miss = arrays.mul(1.0 / self.reach**2, miss) + wrong
-        angles = known and [None, None, None, *known]
+        angles = wrist_angles and [None, None, None, *wrist_angles]
         return Candidates([*pairs, *turned], doubt | doubt456, miss, angles)
 
     def _pushed(
@@ -110,6 +110,6 @@ class SphericalWrist:
         for i, pair in enumerate(pairs):
             P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
             P = pose.times(P, self.links[i + 1])
-        there = arrays.combine(1.0, P[9:12], self.height4, P[6:9])
+        reached = arrays.combine(1.0, P[9:12], self.height4, P[6:9])
         x, z = (pose.turn_back(P, v) for v in columns)
-        return distance2(there, centre), x, z
+        return distance2(reached, centre), x, z

@@ -157,8 +157,8 @@ def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
     """``a^2 + b^2 - c^2`` for `linear`, zero where rounding alone parts the two roots."""
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
     disc = h2 - c * c
-    out: Entry = arrays.where(arrays.absolute(disc) < precision().one_root * h2, 0.0, disc)
-    return out
+    discriminant: Entry = arrays.where(arrays.absolute(disc) < precision().one_root * h2, 0.0, disc)
+    return discriminant
 
 
 def normalised(pair: Pair) -> Pair:
@@ -252,9 +252,9 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
     u, v = 0.5 * ec * inverse, 0.5 * es * inverse
     w = (e0 + 0.5 * (ecc + ess)) * inverse
-    rest = abs(a)
+    conic_size = abs(a)
     for value in (b, u, v, w):
-        rest = arrays.add(rest, abs(value))
+        conic_size = arrays.add(conic_size, abs(value))
     x, triple = _line_pair(a, b, u, v, w)
     M = [[x + a, b, u], [b, x - a, v], [u, v, w - x]]
     # M + [p] = l m^T, of rank one, with p p^T = -adj(M) (p is where the lines l and m meet)
@@ -272,17 +272,17 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     rows = [[M[0][0], b - pz, u + py], [b + pz, M[1][1], v - px], [u - py, v + px, M[2][2]]]
     flipped = [list(row) for row in zip(*rows, strict=True)]
     lines = [_longest([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
-    lx, ly, lz = (arrays.where(signs(0) > 0.0, *both) for both in zip(*lines, strict=True))
+    lx, ly, lz = (arrays.where(signs(0) > 0.0, *entries) for entries in zip(*lines, strict=True))
     # a line at infinity has no direction
     lx = lx + tol.UNDERFLOW
     h2 = lx * lx + ly * ly
     disc = h2 - lz * lz
     pair, _ = linear(lx, ly, -lz, 1, tol.UNDERFLOW_SQUARED, None, disc)
     real = disc > -(tol.TOUCHING**2) * h2
-    at, slope = _on_conic(pair, real, a, b, u, v, w)
+    root, slope = _on_conic(pair, real, a, b, u, v, w)
     merging = (real & (arrays.absolute(slope) < tol.MERGING)) | ((disc < 0.0) & (-disc < tol.TOUCHING**2 * h2))
-    free = rest * size < tol.NO_SIZE * scale
-    return _prefer(at, free, prefer), Doubt(merging | triple | free, free)
+    free = conic_size * size < tol.NO_SIZE * scale
+    return _prefer(root, free, prefer), Doubt(merging | triple | free, free)
 
 
 def _on_conic(pair: Pair, real: Truth, a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Pair, Entry]:

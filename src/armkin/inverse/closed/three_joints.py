@@ -104,10 +104,10 @@ class Position:
         self.main = U[:, 0] * weight  # the one that gives q2
         return "a quartic gives joint 3" if self.regular else "special axes give joint 3 by itself"
 
-    def _is_regular(self, off: float) -> bool:
-        """Whether the general equations serve, off being how far the arm is from a special case."""
-        self.close = self.tolerance < off <= self.near
-        return off > self.tolerance
+    def _is_regular(self, ratio: float) -> bool:
+        """Whether the general equations serve, ratio being how far the arm is from a special case."""
+        self.close = self.tolerance < ratio <= self.near
+        return ratio > self.tolerance
 
     def solve(self, p: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         """Joint motions that bring the tip to p: three pairs on branch axes (b0, b1, 1, N), and doubt."""
@@ -115,21 +115,21 @@ class Position:
         square = x * x + y * y + z * z
         # a slide may be far longer than the links
         size = arrays.sqrt(self.scale**2 + square) if any(self.prismatic) else self.scale
-        known = [x, y] if self.prismatic[0] else [z, 0.5 * square]
-        known = [arrays.sub(value, float(rest)) for value, rest in zip(known, self.rest, strict=True)]
+        sides = [x, y] if self.prismatic[0] else [z, 0.5 * square]
+        sides = [arrays.sub(value, float(constant)) for value, constant in zip(sides, self.rest, strict=True)]
         if self.prismatic[1]:
-            third, second, doubt = self._slide(known, size, prefer)
+            third, second, doubt = self._slide(sides, size, prefer)
         elif self.regular:
-            third, second, doubt = self._quartic(known, size, prefer)
+            third, second, doubt = self._quartic(sides, size, prefer)
         else:
-            third, second, doubt = self._rank_one(known, size, prefer)
+            third, second, doubt = self._rank_one(sides, size, prefer)
         g = self._tip(third)
         g = spin(*second, g) if second.s is not None else [g[0], g[1], g[2] + second.c]
-        there = pose.apply(self.L1, g)
+        tip = pose.apply(self.L1, g)
         if self.prismatic[0]:
-            first = Pair(z - there[2], None)
+            first = Pair(z - tip[2], None)
         else:
-            first, doubt1 = rotation_between(there[0], there[1], x, y, size, prefer[0])
+            first, doubt1 = rotation_between(tip[0], tip[1], x, y, size, prefer[0])
             doubt = doubt | doubt1
         return [first, second, third], doubt
 
@@ -137,8 +137,8 @@ class Position:
         """The tip in the frame of joint 2."""
         return [_at_joint(row.tolist(), third) for row in self.Y]
 
-    def _affine(self, weights: Array, known: list[Entry]) -> list[Entry]:
-        """``weights . (known - forms - rows_z y_z)`` as coefficients of (1, b1, b2, b1^2, b1 b2, b2^2)."""
+    def _affine(self, weights: Array, sides: list[Entry]) -> list[Entry]:
+        """``weights . (sides - forms - rows_z y_z)`` as coefficients of (1, b1, b2, b1^2, b1 b2, b2^2)."""
         fixed = np.zeros(6)
         for w, row, form in zip(weights, self.rows, self.forms, strict=True):
             fixed[:3] -= w * row[2] * self.Y[2]
@@ -147,11 +147,11 @@ class Position:
             # |y|^2 is affine in (cos, sin) although its form is quadratic: cos^2 + sin^2 = 1
             fixed[[0, 3, 5]] += fixed[5] * np.array([1.0, -1.0, -1.0])
         six = cast("list[Entry]", fixed.tolist())
-        six[0] = arrays.add(six[0], arrays.dot(weights.tolist(), known))
+        six[0] = arrays.add(six[0], arrays.dot(weights.tolist(), sides))
         return six
 
-    def _quartic(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
-        g = [self._affine(row, known) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
+    def _quartic(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
+        g = [self._affine(row, sides) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
         across = (-quadratics.of_form(self.across)).tolist()
         if not self.prismatic[2]:
             third, doubt = quadratics.turn(
@@ -186,8 +186,8 @@ class Position:
         second, doubt2 = rotation_between(y[0], y[1], gx, gy, size, prefer[1])
         return third, second, doubt | doubt2
 
-    def _rank_one(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
-        alone = self._affine(self.alone, known)
+    def _rank_one(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
+        alone = self._affine(self.alone, sides)
         if self.prismatic[2]:
             d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, tol.NO_SIZE * size, prefer[2])
             third = Pair(d, None)
@@ -198,7 +198,7 @@ class Position:
             third, doubt = linear(a, b, c, 0, size, prefer[2], one_root(a, b, c))
             third = normalised(third)
         y = self._tip(third)
-        main = self._affine(self.main, known)
+        main = self._affine(self.main, sides)
         right = _at_joint(main, third)
         ax, ay = (self.main @ self.A).tolist()
         a = arrays.add(arrays.mul(ax, y[0]), arrays.mul(ay, y[1]))
@@ -207,12 +207,12 @@ class Position:
         # without a real third joint, the nearest one may well bring the tip onto axis 2: nothing is free there
         return third, normalised(second), doubt | doubt2.where(_solves(alone, third, size))
 
-    def _slide(self, known: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
+    def _slide(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         """Joint 2 prismatic: g = y + d2 z."""
         # known_k - rows_k . y, coefficients of (1, b1, b2)
         across: list[list[Entry]] = (-self.rows @ self.Y).tolist()
         for k in range(2):
-            across[k][0] = arrays.add(across[k][0], known[k])
+            across[k][0] = arrays.add(across[k][0], sides[k])
         z0, z1 = self.rows[:, 2].tolist()
         if self.prismatic[0]:
             # two equations linear in d2: eliminate it, then take it from the larger one
@@ -229,11 +229,11 @@ class Position:
         if not self.regular:
             # the height does not feel d2: it gives joint 3, then the distance gives d2
             third, doubt = self._one_unknown(across[0], size, prefer)
-            rest = arrays.sub(_at_joint(across[1], third), _at_joint(half, third))
+            remainder = arrays.sub(_at_joint(across[1], third), _at_joint(half, third))
             if third.s is None:
-                rest = arrays.sub(rest, arrays.mul(curved, third.c * third.c))
+                remainder = arrays.sub(remainder, arrays.mul(curved, third.c * third.c))
             # d^2 / 2 + (y_z + rows_z) d - rest = 0
-            d, doubt2 = quadratic(0.5, arrays.add(self._tip(third)[2], z1), -rest, 1, size, tol.TINY, None)
+            d, doubt2 = quadratic(0.5, arrays.add(self._tip(third)[2], z1), -remainder, 1, size, tol.TINY, None)
             return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
         d2 = [arrays.mul(1.0 / z0, v) for v in across[0]]
@@ -251,12 +251,12 @@ class Position:
 
     def _one_unknown(self, coefficients: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Doubt]:
         """Joint 3 from an equation affine in its b = (1, cos, sin) or (1, d)."""
-        known, slope, other = coefficients
+        constant, slope, sine = coefficients
         if self.prismatic[2]:
             if abs(slope) < tol.NO_SIZE:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
-            return Pair(arrays.mul(-1.0 / slope, known), None), Doubt(np.zeros(1, bool))
-        third, doubt = linear(slope, other, arrays.mul(-1.0, known), 0, size, prefer[2])
+            return Pair(arrays.mul(-1.0 / slope, constant), None), Doubt(np.zeros(1, bool))
+        third, doubt = linear(slope, sine, arrays.mul(-1.0, constant), 0, size, prefer[2])
         return normalised(third), doubt
 
 

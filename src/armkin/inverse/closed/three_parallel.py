@@ -96,8 +96,8 @@ class ThreeParallel:
         g = arrays.combine(1.0, D[9:12], self.height6, D[6:9])
         a = arrays.add(arrays.mul(n[0], g[0]), arrays.mul(n[1], g[1]))
         b = arrays.sub(arrays.mul(n[0], g[1]), arrays.mul(n[1], g[0]))
-        rest = arrays.sub(self.along + arrays.dot(n, o), arrays.mul(n[2], g[2]))
-        first, doubt1 = linear(a, b, rest, 0, self.scale, prefer[0])
+        right = arrays.sub(self.along + arrays.dot(n, o), arrays.mul(n[2], g[2]))
+        first, doubt1 = linear(a, b, right, 0, self.scale, prefer[0])
         c1, s1 = first
         # n seen from joint 6
         turned = [

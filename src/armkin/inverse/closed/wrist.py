@@ -74,8 +74,8 @@ class Wrist:
         c4, s4 = fourth
         # what is left is Rz(q6): its first column, which lies in the plane across joint 6
         back = pose.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
-        c6, s6, off = pose.turn_back(self.B, back)
-        wrong = distance2(spin(c4, s4, u), z) + off * off
+        c6, s6, out_of_plane = pose.turn_back(self.B, back)
+        wrong = distance2(spin(c4, s4, u), z) + out_of_plane * out_of_plane
         return fourth, Pair(c6, s6), doubt4, wrong
 
     def _mirrored(

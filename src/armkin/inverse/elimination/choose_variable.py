@@ -71,15 +71,15 @@ class Elimination:
 
 def kinds(closed: Loop, goal: Array) -> Int:
     """The `Kind` of poses (N, 4, 4) of the loop's chain, (N,): all but parallel counts as parallel."""
-    out = np.zeros(len(goal), np.int64)
+    kind = np.zeros(len(goal), np.int64)
     if closed.prismatic[[0, 5]].any():
-        return out
+        return kind
     x, y = goal[:, 0, 2], goal[:, 1, 2]  # of axis 6; axis 1 is z
     sine = np.hypot(x, y)
     apart = np.abs(goal[:, 0, 3] * y - goal[:, 1, 3] * x) / np.maximum(sine, tol.TINY)
-    out[apart < tol.BESIDE_SPECIAL] = Kind.MEETING
-    out[sine < tol.BESIDE_SPECIAL] = Kind.PARALLEL
-    return out
+    kind[apart < tol.BESIDE_SPECIAL] = Kind.MEETING
+    kind[sine < tol.BESIDE_SPECIAL] = Kind.PARALLEL
+    return kind
 
 
 def prepare(link: Array, prismatic: Bool) -> Elimination:
@@ -124,12 +124,12 @@ def poses(closed: Loop, q: Array) -> tuple[Array, Array]:
 def _sequence(closed: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
     """The pencils of all passes, from ratings in their order."""
     first = rated[0].pencil
-    others = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
+    alternatives = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
     # Equal roots of one joint are rarely equal in another: hide another joint early.
     hidden_joint = first.hidden_joint
-    others.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
+    alternatives.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
     again = build(first.role, closed.links, closed.prismatic, PSI[1])
-    plans = [first, *others[:1], again, *others[1:]]
+    plans = [first, *alternatives[:1], again, *alternatives[1:]]
     while len(plans) < len(tol.SHAKES):
         plans.append(plans[-2])
     return tuple(plans[: len(tol.SHAKES)])
@@ -169,9 +169,9 @@ def _postures(closed: Loop, kind: Kind) -> Array:
     else:
         along = goal[:, :2, 2] / np.linalg.norm(goal[:, :2, 2], axis=1, keepdims=True)
         goal[:, :2, 3] = along * np.linalg.norm(goal[:, :2, 3], axis=1, keepdims=True)
-    done = refine(closed.chain, closed.prismatic, q[1], goal, 20, damped=True)
-    good = (done.residual < tol.ELIMINATED) & (done.weakness < STEEP)
-    return done.q[good][:SAMPLES]
+    polished = refine(closed.chain, closed.prismatic, q[1], goal, 20, damped=True)
+    good = (polished.residual < tol.ELIMINATED) & (polished.weakness < STEEP)
+    return polished.q[good][:SAMPLES]
 
 
 class _Rating(NamedTuple):
@@ -205,12 +205,12 @@ def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
 def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
     """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
     pencil = build(role, closed.links, closed.prismatic, PSI[0])
-    found = roots.seeds(pencil, inverse(goal), TILT[0], part=pencil.role.wide)
-    apart = np.abs(found.q - q[found.pose])
+    seeds = roots.seeds(pencil, inverse(goal), TILT[0], part=pencil.role.wide)
+    apart = np.abs(seeds.q - q[seeds.pose])
     turned = np.abs(np.mod(apart + np.pi, 2 * np.pi) - np.pi)
     distance = np.where(closed.prismatic, apart, turned).max(axis=1, initial=0.0)
     nearest = np.ones(q.shape[0])
-    np.minimum.at(nearest, found.pose, distance)
+    np.minimum.at(nearest, seeds.pose, distance)
     if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
         return _Rating(20.0 + pencil.size, 0.0, 1.0, pencil)
     error = float(np.quantile(np.log10(nearest + tol.ERROR_FLOOR), 0.9))

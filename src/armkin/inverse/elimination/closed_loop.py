@@ -57,10 +57,10 @@ def close(link: Array, prismatic: Bool) -> Loop:
     start = np.cumsum([0, *(f.shape[1] for f in free)])
     moves, lengths = np.zeros((15, start[-1])), np.zeros(15)
     for i in range(5):  # link[i + 1] becomes  t - d_i + R d_{i+1}
-        rows, here, there = slice(3 * i, 3 * i + 3), slice(*start[i : i + 2]), slice(*start[i + 1 : i + 3])
+        rows, before, behind = slice(3 * i, 3 * i + 3), slice(*start[i : i + 2]), slice(*start[i + 1 : i + 3])
         lengths[rows] = link[i + 1, :3, 3]
-        moves[rows, here] = -free[i]
-        moves[rows, there] = link[i + 1, :3, :3] @ free[i + 1]
+        moves[rows, before] = -free[i]
+        moves[rows, behind] = link[i + 1, :3, :3] @ free[i + 1]
     d = np.linalg.lstsq(moves, -lengths, rcond=tol.RANK)[0]
     moved = np.array(link, dtype=float)
     for i in range(6):
@@ -107,13 +107,13 @@ def roles(prismatic: Bool, slot: int, hidden: tuple[int, ...], wide: bool = Fals
 
     Of wide ones one for each hidden joint: the two others play the same part.
     """
-    found = []
+    ways = []
     for backward in (False, True):
         order = tuple((slot - i) % 6 if backward else (_X - slot + i) % 6 for i in range(6))
         if not prismatic[order[5]]:
             dialytic = {h: [j for j in range(3) if j != h][: 1 if wide else 2] for h in hidden}
-            found += [Role(order, backward, slot, h, j, wide) for h in hidden for j in dialytic[h]]
-    return found
+            ways += [Role(order, backward, slot, h, j, wide) for h in hidden for j in dialytic[h]]
+    return ways
 
 
 def links_by_part(role: Role, links: Array) -> Array:

@@ -80,8 +80,8 @@ def eliminate(ends: Ends, Y: Array) -> tuple[Array, Array]:
     Q = _monomials(ends.slot, ends.factors, Y)
     if ends.rank < 9:
         basis, size, vectors = np.linalg.svd(Q)
-        kept = np.maximum(size[:, : ends.rank, None], tol.TINY)
-        inverse_factor = np.swapaxes(vectors[:, : ends.rank] / kept, 1, 2)
+        sizes = np.maximum(size[:, : ends.rank, None], tol.TINY)
+        inverse_factor = np.swapaxes(vectors[:, : ends.rank] / sizes, 1, 2)
         transposed = np.swapaxes(basis, 1, 2)
         return transposed[:, ends.rank :], (inverse_factor @ transposed[:, : ends.rank])[:, _READ:]
     basis, triangle = np.linalg.qr(Q, mode="complete")

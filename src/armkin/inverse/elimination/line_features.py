@@ -37,18 +37,18 @@ def features(p: Array, direction: Array) -> Array:
     >>> features(np.array([1.0, 2, 3]), np.array([0.0, 0, 1]))[6:8]      # p.p and p.l
     array([14.,  3.])
     """
-    out = np.empty((*p.shape[:-1], SIZE))
+    numbers = np.empty((*p.shape[:-1], SIZE))
     square = np.sum(p * p, axis=-1)
     along = np.sum(p * direction, axis=-1)
-    out[..., _P] = p
-    out[..., _L] = direction
-    out[..., _PP] = square
-    out[..., _PL] = along
+    numbers[..., _P] = p
+    numbers[..., _L] = direction
+    numbers[..., _PP] = square
+    numbers[..., _PL] = along
     for i, j, k in ((8, 1, 2), (9, 2, 0), (10, 0, 1)):  # p x l: np.cross takes ten times as long for one line
-        out[..., i] = p[..., j] * direction[..., k] - p[..., k] * direction[..., j]
-    out[..., _W] = square[..., None] * direction - 2 * along[..., None] * p
-    out[..., _ONE] = 1.0
-    return out
+        numbers[..., i] = p[..., j] * direction[..., k] - p[..., k] * direction[..., j]
+    numbers[..., _W] = square[..., None] * direction - 2 * along[..., None] * p
+    numbers[..., _ONE] = 1.0
+    return numbers
 
 
 def rep(motion: Array) -> Array:
@@ -61,23 +61,23 @@ def rep(motion: Array) -> Array:
         w'   = R w - 2 t x R m + (t.t R - 2 t t^T R) l - 2 t (p.l)
     """
     R, t = motion[..., :3, :3], motion[..., :3, 3]
-    out = np.zeros((*motion.shape[:-2], SIZE, SIZE))
+    matrix = np.zeros((*motion.shape[:-2], SIZE, SIZE))
     t_R = np.matmul(t[..., None, :], R)[..., 0, :]
     t_t = np.sum(t * t, axis=-1)
     cross_R = np.empty_like(R)  # [t]x R, row by row
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         cross_R[..., i, :] = t[..., j, None] * R[..., k, :] - t[..., k, None] * R[..., j, :]
-    out[..., _P, _P] = out[..., _L, _L] = out[..., _M, _M] = out[..., _W, _W] = R
-    out[..., _P, _ONE] = t
-    out[..., _PP, _P] = 2 * t_R
-    out[..., _PP, _ONE] = t_t
-    out[..., _PP, _PP] = out[..., _PL, _PL] = out[..., _ONE, _ONE] = 1.0
-    out[..., _PL, _L] = t_R
-    out[..., _M, _L] = cross_R
-    out[..., _W, _M] = -2 * cross_R
-    out[..., _W, _L] = t_t[..., None, None] * R - 2 * t[..., :, None] * t_R[..., None, :]
-    out[..., _W, _PL] = -2 * t
-    return out
+    matrix[..., _P, _P] = matrix[..., _L, _L] = matrix[..., _M, _M] = matrix[..., _W, _W] = R
+    matrix[..., _P, _ONE] = t
+    matrix[..., _PP, _P] = 2 * t_R
+    matrix[..., _PP, _ONE] = t_t
+    matrix[..., _PP, _PP] = matrix[..., _PL, _PL] = matrix[..., _ONE, _ONE] = 1.0
+    matrix[..., _PL, _L] = t_R
+    matrix[..., _M, _L] = cross_R
+    matrix[..., _W, _M] = -2 * cross_R
+    matrix[..., _W, _L] = t_t[..., None, None] * R - 2 * t[..., :, None] * t_R[..., None, :]
+    matrix[..., _W, _PL] = -2 * t
+    return matrix
 
 
 @cache
@@ -87,8 +87,8 @@ def joint_rep(prismatic: bool, inverse: bool = False) -> Array:
     Found by sampling: a revolute joint at 0, 120 and 240 degrees, a prismatic one at -1, 0 and 1.
     """
     if prismatic:
-        back, rest, ahead = (rep(joint_motion(True, q)) for q in (-1.0, 0.0, 1.0))
-        U: Array = np.stack([rest, (ahead - back) / 2, (ahead + back) / 2 - rest])
+        back, still, ahead = (rep(joint_motion(True, q)) for q in (-1.0, 0.0, 1.0))
+        U: Array = np.stack([still, (ahead - back) / 2, (ahead + back) / 2 - still])
         odd = 1  # the coefficient that changes its sign with q
     else:
         angles = 2 * np.pi / 3 * np.arange(3)

@@ -117,6 +117,6 @@ def best(answers: Answers, count: int, most: int) -> Array:
 def _table(answers: Answers, count: int, most: int) -> Array:
     """At most so many answers of each pose, poses ascending, in their order: (N, B, 6), NaN past the last one."""
     column = numbers_within(np.bincount(answers.pose, minlength=count))
-    q, some = np.full((count, min(int(column.max(initial=-1)) + 1, most), 6), np.nan), column < most
-    q[answers.pose[some], column[some]] = answers.q[some]
+    q, within = np.full((count, min(int(column.max(initial=-1)) + 1, most), 6), np.nan), column < most
+    q[answers.pose[within], column[within]] = answers.q[within]
     return q

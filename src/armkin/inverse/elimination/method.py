@@ -128,13 +128,13 @@ def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:
 def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers, Answers, Bool, Bool, Bool]:
     """Answers of all passes, each over the poses that the last one left open, and what is close to answers; then (N,)
     poses with touching pairs, settled ones, and those that went to a pass which moves them."""
-    found, guesses = [none()], [none()]
+    parts, guesses = [none()], [none()]
     touching, shaken = np.zeros((2, goal.shape[0]), dtype=np.bool_)
     settled = np.ones(goal.shape[0], dtype=np.bool_)
     kind = kinds(elimination.loop, goal)
-    for one in Kind:
-        open_poses = np.flatnonzero(kind == one)
-        for number, pencil in enumerate(elimination.of_kind(one) if open_poses.size else ()):
+    for chosen_kind in Kind:
+        open_poses = np.flatnonzero(kind == chosen_kind)
+        for number, pencil in enumerate(elimination.of_kind(chosen_kind) if open_poses.size else ()):
             shaken[open_poses] |= tol.SHAKES[number] > 0
             if tol.SHAKES[number] > 0 and not moved:
                 break
@@ -142,7 +142,7 @@ def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers
             for begin in range(0, open_poses.size, CHUNK):
                 part = open_poses[begin : begin + CHUNK]
                 answers, unsettled, touch, near = attempt(elimination.loop, pencil, goal[part], number)
-                found.append(answers._replace(pose=part[answers.pose]))
+                parts.append(answers._replace(pose=part[answers.pose]))
                 if number > 0:
                     guesses.append(near._replace(pose=part[near.pose]))
                 still[begin : begin + CHUNK] = unsettled
@@ -151,23 +151,23 @@ def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers
             if open_poses.size == 0:
                 break
         settled[open_poses] = False
-    return stacked(found), stacked(guesses), touching, settled, shaken
+    return stacked(parts), stacked(guesses), touching, settled, shaken
 
 
 def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
     """Both answers of a chain with three prismatic joints; and whether roots touch, and whether they are all, (N,)."""
-    found, touching, all_ = [none()], np.zeros(goal.shape[0], dtype=np.bool_), np.ones(goal.shape[0], dtype=np.bool_)
+    parts, touching, full = [none()], np.zeros(goal.shape[0], dtype=np.bool_), np.ones(goal.shape[0], dtype=np.bool_)
     if np.sum(closed.prismatic) > 3:
-        return found[0], touching, all_
+        return parts[0], touching, full
     for begin in range(0, goal.shape[0], CHUNK):
         part = goal[begin : begin + CHUNK]
-        q, all_[begin : begin + CHUNK] = three_prismatic.branches(closed.chain, closed.prismatic, part)
+        q, full[begin : begin + CHUNK] = three_prismatic.branches(closed.chain, closed.prismatic, part)
         q = q.reshape(-1, 6)
         pose = np.repeat(np.arange(part.shape[0]), 2)
-        done = refine(closed.chain, closed.prismatic, q, part[pose], 4)
+        polished = refine(closed.chain, closed.prismatic, q, part[pose], 4)
         # where links are all but points the loop's unit is as small, and slides are millions of it long
         far = np.maximum(1.0, np.linalg.norm(part[pose, :3, 3], axis=1))
-        good = done.residual < tol.GRAZING * far
-        touching[begin + pose[good & (done.residual > tol.ELIMINATED * far)]] = True
-        found.append(answers_of(closed, begin + pose, done, good))
-    return stacked(found), touching, all_
+        good = polished.residual < tol.GRAZING * far
+        touching[begin + pose[good & (polished.residual > tol.ELIMINATED * far)]] = True
+        parts.append(answers_of(closed, begin + pose, polished, good))
+    return stacked(parts), touching, full

@@ -27,50 +27,50 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
         seed = _without_empty(closed, seed, goal, careful)
     target = goal[seed.pose]
     if careful:
-        done = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
+        moved = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
     else:
-        done = refine(closed.chain, closed.prismatic, seed.q, target, 4)
+        moved = refine(closed.chain, closed.prismatic, seed.q, target, 4)
     # In later passes also what is nearly an answer, at a double root: such poses are said to be near singular.
-    good = done.residual < (10 * tol.GRAZING if careful else tol.ELIMINATED)
+    good = moved.residual < (10 * tol.GRAZING if careful else tol.ELIMINATED)
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)
     # A complex pair that steps brought near the pose may be a real one, seen through rounding.
     # A move of the pose may turn two close real roots into such a pair.
     pair = tol.PAIRED + 10 * np.sqrt(shake)
     maybe = seed.tilt < pair
-    near = done.residual < tol.STRAY
+    near = moved.residual < tol.STRAY
     if careful:
-        near = (done.residual < tol.CLOSE_RESIDUAL) & (seed.tilt < max(pair, tol.STRAY))
+        near = (moved.residual < tol.CLOSE_RESIDUAL) & (seed.tilt < max(pair, tol.STRAY))
     missed = ~good & ((seed.tilt < tol.UPRIGHT) | near | seed.torn)
     touch = good & (seed.tilt > 0) & (seed.tilt < tol.UPRIGHT)
     unsure = good & (seed.tilt > 0) & maybe
     # A real root that was far from the answer it led to may have stood for another one.
-    strayed = good & (seed.tilt == 0) & (done.guess > tol.STRAY + 30 * shake)
+    strayed = good & (seed.tilt == 0) & (moved.guess > tol.STRAY + 30 * shake)
     # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
     # roots, and no two roots may have led to one answer. Near singularities roots are too far off to say so.
     weakest = np.zeros(goal.shape[0])
-    np.maximum.at(weakest, seed.pose[good], done.weakness[good])
-    away = difference(closed.prismatic, done.q, seed.q)[:, pencil.hidden_joint]
-    own = (np.abs(away) < tol.OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
+    np.maximum.at(weakest, seed.pose[good], moved.weakness[good])
+    away = difference(closed.prismatic, moved.q, seed.q)[:, pencil.hidden_joint]
+    own_root = (np.abs(away) < tol.OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
     # unless several solutions share the middle joints: these are one root
-    some = np.flatnonzero(strayed & own)
-    if some.size:
-        own[some] = roots.end_joints_follow(pencil, inverse(target[some]), done.q[some])
-    strayed &= ~own
+    strays = np.flatnonzero(strayed & own_root)
+    if strays.size:
+        own_root[strays] = roots.end_joints_follow(pencil, inverse(target[strays]), moved.q[strays])
+    strayed &= ~own_root
     unsettled[seed.pose[missed | unsure | strayed]] = True
-    touching[seed.pose[touch | (done.residual > tol.ELIMINATED) & (done.residual < 10 * tol.GRAZING)]] = True
+    touching[seed.pose[touch | (moved.residual > tol.ELIMINATED) & (moved.residual < 10 * tol.GRAZING)]] = True
     # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
     # and if the two answers are not the same.
-    answers = answers_of(closed, seed.pose, done, good)
+    answers = answers_of(closed, seed.pose, moved, good)
     # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
     stands = good & maybe
-    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], done.guess[stands] > tol.BLURRED_ROOT + 10 * shake
+    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], moved.guess[stands] > tol.BLURRED_ROOT + 10 * shake
     order = np.lexsort((hidden, pose))
     close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < tol.SAME_ROOT)
     close &= blurred[order][1:] | blurred[order][:-1]
-    close &= ~(own[stands][order][1:] & own[stands][order][:-1])
+    close &= ~(own_root[stands][order][1:] & own_root[stands][order][:-1])
     unsettled[pose[order][1:][close]] = True
     unsettled[_met_twice(closed, rows_of(answers, seed.tilt[good] == 0))] = True
-    guesses = answers_of(closed, seed.pose, done, ~good & (done.residual < tol.SEED))
+    guesses = answers_of(closed, seed.pose, moved, ~good & (moved.residual < tol.SEED))
     return answers, unsettled, touching, guesses
 
 
@@ -93,16 +93,16 @@ def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array, careful: bool) 
     """
     empty = (seed.defect > tol.NO_PRODUCT) & (seed.gap > tol.ALONE)
     upright = seed.tilt < tol.TWIN_ROOTS
-    some = np.flatnonzero(empty & upright)
-    kept = ~empty | careful | upright
-    if some.size:
-        target = np.ascontiguousarray(goal[seed.pose[some], :3].transpose(1, 2, 0))
-        frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[some].T))
-        kept[some[pose_error(frame, target)[1] > tol.STRAY]] = False
-    if kept.all():
+    simple = np.flatnonzero(empty & upright)
+    stays = ~empty | careful | upright
+    if simple.size:
+        target = np.ascontiguousarray(goal[seed.pose[simple], :3].transpose(1, 2, 0))
+        frame, _ = tip(closed.chain, closed.prismatic, np.ascontiguousarray(seed.q[simple].T))
+        stays[simple[pose_error(frame, target)[1] > tol.STRAY]] = False
+    if stays.all():
         return seed
     pose, q, hidden, tilt, rough, defect, gap = seed
-    return roots.Seeds(pose[kept], q[kept], hidden[kept], tilt[kept], rough, defect[kept], gap[kept])
+    return roots.Seeds(pose[stays], q[stays], hidden[stays], tilt[stays], rough, defect[stays], gap[stays])
 
 
 def shaken_goal(goal: Array, size: float) -> Array:
@@ -117,10 +117,10 @@ def shaken_goal(goal: Array, size: float) -> Array:
     return np.asarray(move @ goal)
 
 
-def answers_of(closed: Loop, pose: Int, done: Polished, good: Bool) -> Answers:
+def answers_of(closed: Loop, pose: Int, moved: Polished, good: Bool) -> Answers:
     """The good ones, their revolute joints wrapped to (-pi, pi]."""
-    wrapped = np.where(closed.prismatic, done.q, np.pi - np.mod(np.pi - done.q, 2 * np.pi))
-    return rows_of(Answers(pose, wrapped, done.residual, done.weakness), good)
+    wrapped = np.where(closed.prismatic, moved.q, np.pi - np.mod(np.pi - moved.q, 2 * np.pi))
+    return rows_of(Answers(pose, wrapped, moved.residual, moved.weakness), good)
 
 
 def none() -> Answers:

@@ -105,8 +105,8 @@ def build(role: Role, arm: Array, prismatic: Bool, psi: float) -> Pencil:
     constant = role.slot in (0, 1, 5)
     p, factors = (16, 4) if role.wide else (12, 2)
     K = _spurious(role, part, right) if constant and not part[2 + role.hidden] else np.empty((p, 0))
-    both = np.concatenate([K.real, K.imag], axis=1)
-    W = np.linalg.qr(both, mode="complete")[0][:, both.shape[1] :] if both.size else np.eye(p)
+    parts = np.concatenate([K.real, K.imag], axis=1)
+    W = np.linalg.qr(parts, mode="complete")[0][:, parts.shape[1] :] if parts.size else np.eye(p)
     columns = _columns(role, part, psi, K, W)
     if constant:
         columns, right = right @ columns, np.empty((15, 0))
@@ -145,11 +145,11 @@ def _dialytic(hidden: int, dialytic: int, sliding: bool, wide: bool, third_slidi
     sliding, third_sliding: the dialytic joint, the third one is prismatic.
     """
     multipliers = _POWERS if sliding else _HALF_ANGLE
-    others = (_POWERS if third_sliding else _HALF_ANGLE) if wide else np.eye(3)[None]
+    third = (_POWERS if third_sliding else _HALF_ANGLE) if wide else np.eye(3)[None]
     unit = np.eye(27).reshape(27, 3, 3, 3)
     unit = np.moveaxis(unit, (1 + hidden, 1 + dialytic, 4 - hidden - dialytic), (1, 2, 3))
-    products: Array = np.einsum("xhjk,sjp,tkr->hxstpr", unit, multipliers, others)
-    products = products.reshape(3, 27, 2 * len(others), 4 * others.shape[2])
+    products: Array = np.einsum("xhjk,sjp,tkr->hxstpr", unit, multipliers, third)
+    products = products.reshape(3, 27, 2 * len(third), 4 * third.shape[2])
     products.flags.writeable = False
     return products
 

@@ -36,23 +36,23 @@ def turn(frame: Array, q: Array, prismatic: bool) -> Array:
 
 def _signed(sine: Array) -> Array:
     """Sines (..., M) as `_moved` takes them: with both signs, (..., 2, M)."""
-    out = np.empty((*sine.shape[:-1], 2, sine.shape[-1]))
-    out[..., 0, :] = sine
-    np.negative(sine, out=out[..., 1, :])
-    return out
+    both_signs = np.empty((*sine.shape[:-1], 2, sine.shape[-1]))
+    both_signs[..., 0, :] = sine
+    np.negative(sine, out=both_signs[..., 1, :])
+    return both_signs
 
 
 def _moved(frame: Array, q: Array, cosine: Array, sine: Array, prismatic: bool) -> Array:
     """`turn` by angles of which the cosines (M,) and the sines with both signs (2, M) are known."""
-    out = np.empty_like(frame)
+    moved = np.empty_like(frame)
     if prismatic:
-        out[:, :3] = frame[:, :3]
-        out[:, 3] = frame[:, 3] + q * frame[:, 2]
-        return out
-    np.multiply(frame[:, :2], cosine, out=out[:, :2])
-    out[:, :2] += frame[:, 1::-1] * sine  # c x + s y, c y - s x
-    out[:, 2:] = frame[:, 2:]
-    return out
+        moved[:, :3] = frame[:, :3]
+        moved[:, 3] = frame[:, 3] + q * frame[:, 2]
+        return moved
+    np.multiply(frame[:, :2], cosine, out=moved[:, :2])
+    moved[:, :2] += frame[:, 1::-1] * sine  # c x + s y, c y - s x
+    moved[:, 2:] = frame[:, 2:]
+    return moved
 
 
 def advance(frame: Array, link: Array) -> Array:
@@ -87,13 +87,13 @@ def pose_error(frame: Array, goal: Array) -> tuple[Array, Array]:
 def jacobian(frame: Array, joints: Array, prismatic: Bool) -> Array:
     """Jacobians (M, 6, n) in the base's axes, from the frames that `tip` returns."""
     axis, arm = joints[:, :, 2], frame[:, 3] - joints[:, :, 3]  # (n, 3, M)
-    out = np.empty((frame.shape[2], 6, len(joints)))
+    J = np.empty((frame.shape[2], 6, len(joints)))
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        out[:, x] = (axis[:, y] * arm[:, z] - axis[:, z] * arm[:, y]).T
-    out[:, 3:] = axis.transpose(2, 1, 0)
+        J[:, x] = (axis[:, y] * arm[:, z] - axis[:, z] * arm[:, y]).T
+    J[:, 3:] = axis.transpose(2, 1, 0)
     if prismatic.any():
-        out[:, :3, prismatic], out[:, 3:, prismatic] = axis[prismatic].transpose(2, 1, 0), 0.0
-    return out
+        J[:, :3, prismatic], J[:, 3:, prismatic] = axis[prismatic].transpose(2, 1, 0), 0.0
+    return J
 
 
 def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damped: bool = False) -> Polished:

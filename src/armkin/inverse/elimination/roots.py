@@ -55,9 +55,9 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
     equations, recover = _equations(pencil, Y)
     lead = pencil.products
     count = equations.shape[2] - lead
-    rest = np.empty((X.shape[0], lead, count + 1))
-    rest[:, :, :count], rest[:, :, count] = equations[:, :, lead:], _ANYWHERE[:lead]
-    G = nudged(np.linalg.solve, equations[:, :, :lead], rest)
+    right = np.empty((X.shape[0], lead, count + 1))
+    right[:, :, :count], right[:, :, count] = equations[:, :, lead:], _ANYWHERE[:lead]
+    G = nudged(np.linalg.solve, equations[:, :, :lead], right)
     # A singular pencil may hide itself: what it has in common on both sides cancels. No side of its own can.
     rough = (np.abs(G[:, :, :count]).max(axis=(1, 2)) > 1e6) | (np.abs(G[:, :, count]).max(axis=1) > 1e9)
     steady = np.abs(G[:, :, :count]).max(axis=(1, 2)) < STEADY
@@ -68,26 +68,26 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
     companion[:, lead:, 2 * r : lead] = np.eye(w)
     roots, vectors = np.linalg.eig(companion)
     tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
-    pose, which = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
+    pose, index = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
     # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
     # pair of roots that almost touch.
-    x, u = roots[pose, which].real, vectors.real[pose, :, which]
-    candidates = _Candidates(pose, which, x, tilt[pose, which], u, np.zeros(len(pose), np.bool_))
+    x, u = roots[pose, index].real, vectors.real[pose, :, index]
+    candidates = _Candidates(pose, index, x, tilt[pose, index], u, np.zeros(len(pose), np.bool_))
     if part and not pencil.prismatic[2:5].any():
         candidates = _parted(pencil, candidates, vectors)
-    pose, which, x, slant, u, parted = candidates
+    pose, index, x, slant, u, parted = candidates
     middle, defect = _middle_joints(pencil, x, u)
     near = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
     if near.size < pose.size:
-        pose, which, slant, parted = pose[near], which[near], slant[near], parted[near]
+        pose, index, slant, parted = pose[near], index[near], slant[near], parted[near]
         middle, defect = middle[:, near], defect[near]
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)
     q = np.empty((pose.size, 6))
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
     gap = np.where(parted & steady[pose], np.inf, 0.0)
-    some = np.flatnonzero((defect > tol.NO_PRODUCT) & steady[pose] & ~parted)
-    gap[some] = _gaps(roots[pose[some]], vectors[pose[some]], which[some])
+    unsure = np.flatnonzero((defect > tol.NO_PRODUCT) & steady[pose] & ~parted)
+    gap[unsure] = _gaps(roots[pose[unsure]], vectors[pose[unsure]], index[unsure])
     return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
 
 
@@ -120,14 +120,14 @@ class _Candidates(NamedTuple):
     parted: Bool
 
 
-def _parted(pencil: Pencil, seen: _Candidates, vectors: NDArray[np.complex128]) -> _Candidates:
+def _parted(pencil: Pencil, single: _Candidates, vectors: NDArray[np.complex128]) -> _Candidates:
     """The same, a root that several solutions share with the vectors of these: see `equal_roots`."""
-    count = len(seen.pose)
+    count = len(single.pose)
     # rounding made a complex pair of some
-    twin = np.flatnonzero((seen.tilt > 0) & (seen.tilt < tol.EQUAL_ROOTS))
-    pose, which, x, tilt, u, parted = (np.concatenate([part, part[twin]]) for part in seen)
-    u[count:] = vectors.imag[seen.pose[twin], :, seen.which[twin]]
-    kept = np.arange(len(pose)) < count
+    twin = np.flatnonzero((single.tilt > 0) & (single.tilt < tol.EQUAL_ROOTS))
+    pose, index, x, tilt, u, parted = (np.concatenate([part, part[twin]]) for part in single)
+    u[count:] = vectors.imag[single.pose[twin], :, single.which[twin]]
+    stays = np.arange(len(pose)) < count
     for rows in filter(len, equal_roots.groups(pose, x)):
         d = rows.shape[1]
         span = u[rows] / np.linalg.norm(u[rows], axis=2, keepdims=True)
@@ -138,31 +138,31 @@ def _parted(pencil: Pencil, seen: _Candidates, vectors: NDArray[np.complex128]) 
         good &= size[:, -1] > tol.APART_VECTORS * size[:, 0]
         part = rows[good].ravel()
         u[part] = (weights[good] @ basis[good]).reshape(len(part), u.shape[1])
-        tilt[part], parted[part], kept[part] = 0.0, True, real[good].ravel()
-    order = np.flatnonzero(kept)
+        tilt[part], parted[part], stays[part] = 0.0, True, real[good].ravel()
+    order = np.flatnonzero(stays)
     order = order[np.argsort(pose[order], kind="stable")]
-    return _Candidates(pose[order], which[order], x[order], tilt[order], u[order], parted[order])
+    return _Candidates(pose[order], index[order], x[order], tilt[order], u[order], parted[order])
 
 
-def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], which: Int) -> Array:
+def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], index: Int) -> Array:
     """Distance (M,) of one of each row's roots (M, size) from the others, on the sphere of complex numbers.
 
     Not from its twin, the other half of a double root that has one vector (M, size, size): rounding parts the two. Nor
     from that of a complex pair whose vectors point elsewhere: it is farther off the real line than rounding takes it.
     """
-    if not which.size:
+    if not index.size:
         return np.empty(0)
     size = 1 + np.abs(roots) ** 2
-    row = np.arange(which.size)
-    x, v = roots[row, which][:, None], vectors[row, :, which]
+    row = np.arange(index.size)
+    x, v = roots[row, index][:, None], vectors[row, :, index]
     away = 2 * np.abs(roots - x) / np.sqrt(size * (1 + np.abs(x) ** 2))
-    away[row, which] = np.inf
+    away[row, index] = np.inf
     twin = away.argmin(axis=1)
     apart = away[row, twin]
-    other = vectors[row, :, twin]
-    sine = np.linalg.norm(other - v * (v.conj() * other).sum(axis=1, keepdims=True), axis=1)
+    twin_vectors = vectors[row, :, twin]
+    sine = np.linalg.norm(twin_vectors - v * (v.conj() * twin_vectors).sum(axis=1, keepdims=True), axis=1)
     double = (apart < tol.TWIN_ROOTS) & (sine < ONE * apart)
-    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, which].imag != 0) & (sine * apart > tol.REAL_PAIR)
+    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, index].imag != 0) & (sine * apart > tol.REAL_PAIR)
     away[row, twin] = np.where(double | pair, np.inf, apart)
     return np.asarray(away.min(axis=1))
 
@@ -223,8 +223,8 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     if pencil.prismatic[dialytic] or pencil.prismatic[third]:
         return value, np.zeros(v.shape[0])
     k = value[pencil.role.third]
-    other = _half_powers(k) if pencil.role.wide else np.stack([np.ones_like(k), np.cos(k), np.sin(k)], axis=1)
-    inner = (v * other[:, None, :]).sum(axis=2)
+    third_powers = _half_powers(k) if pencil.role.wide else np.stack([np.ones_like(k), np.cos(k), np.sin(k)], axis=1)
+    inner = (v * third_powers[:, None, :]).sum(axis=2)
     # a product's square is 2 x 2: of the powers of either joint, and of (1, cos, sin)
     along = (inner * _half_powers(value[pencil.role.dialytic])).sum(axis=1) ** 2 / (
         4.0 * np.maximum(size.sum(axis=(1, 2)), tol.TINY)

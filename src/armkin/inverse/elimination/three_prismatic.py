@@ -43,10 +43,10 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
     B = A[0].T @ goal[:, :3, :3] @ A[3].T
     u, v = A[1][2], A[2][:, 2]
     even, odd = u[0] * v[0] + u[1] * v[1], u[1] * v[0] - u[0] * v[1]
-    off = np.hypot(B[:, 0, 2], B[:, 1, 2])
-    one, other = off * np.hypot(v[0], v[1]), np.abs(u[2] - v[2] * B[:, 2, 2])
-    square = (one - other) * (one + other)
-    free = off < tol.PARALLEL_SLIDES
+    across = np.hypot(B[:, 0, 2], B[:, 1, 2])
+    longer, shorter = across * np.hypot(v[0], v[1]), np.abs(u[2] - v[2] * B[:, 2, 2])
+    square = (longer - shorter) * (longer + shorter)
+    free = across < tol.PARALLEL_SLIDES
     square[(square < tol.MERGED_SLIDES) & ~free] = 0.0
     half = np.arctan2(np.sqrt(np.maximum(square, 0.0)), B[:, 2, 2] - u[2] * v[2])
     q2 = np.arctan2(odd, even) + np.stack([half, -half], axis=1)
@@ -80,10 +80,10 @@ def _with_slides(chain: Array, prismatic: Bool, turned: Array, goal: Array) -> t
             frame = frame @ chain[i + 1]
         else:
             frame = frame @ joint_motion(False, q[..., i]) @ chain[i + 1]
-    rest = goal[:, None, :3, 3] - frame[..., :3, 3]
+    missing = goal[:, None, :3, 3] - frame[..., :3, 3]
     # an explicit pseudoinverse would lose as many digits as the weakest direction has
     U, S, Vt = np.linalg.svd(np.stack(axes, axis=-1))
-    ahead = np.swapaxes(U, -1, -2) @ rest[..., None]
+    ahead = np.swapaxes(U, -1, -2) @ missing[..., None]
     moves = np.divide(ahead, S[..., None], out=np.zeros_like(ahead), where=S[..., None] > tol.COPLANAR)
     q[..., prismatic] = (np.swapaxes(Vt, -1, -2) @ moves)[..., 0]
     return q, S[..., -1].min(axis=1)

@@ -98,16 +98,16 @@ def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
     """
     rng = np.random.default_rng(13)
     start = rng.uniform(-1.0, 1.0, (STARTS, arm.n)) * np.where(arm.prismatic, arm.reach, np.pi)
-    row, which = np.nonzero(np.repeat(lost[:, None], STARTS, axis=1))
-    out = np.full((len(target), STARTS, arm.n), np.nan)
-    q, size = correct(arm, task, start[which], target[row], steps=STEPS, patience=PATIENCE)
+    row, index = np.nonzero(np.repeat(lost[:, None], STARTS, axis=1))
+    postures = np.full((len(target), STARTS, arm.n), np.nan)
+    q, size = correct(arm, task, start[index], target[row], steps=STEPS, patience=PATIENCE)
     slow = np.flatnonzero((size > tol.CONVERGING) & (size < tol.SEED))
     if len(slow):
         even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
         better = missing(arm, task, even, target[row[slow]]) < size[slow]
         q[slow[better]] = even[better]
-    out[row, which] = np.where((size < tol.SEED)[:, None], q, np.nan)
-    return out
+    postures[row, index] = np.where((size < tol.SEED)[:, None], q, np.nan)
+    return postures
 
 
 def _least_step(J: Array, r: Array, least: Array) -> Array:
@@ -122,11 +122,11 @@ def _least_step(J: Array, r: Array, least: Array) -> Array:
         with np.errstate(over="ignore"):
             weak = ~(least * np.sqrt((inverse * inverse).sum(axis=(1, 2))) < 1.0)
         step[~weak] = (inverse[~weak] @ r[~weak, :, None])[:, :, 0]
-    few = np.flatnonzero(weak)
-    if len(few):
-        U, S, Vt = np.linalg.svd(J[few], full_matrices=False)
-        gain = np.where(least[few, None] < S, 1.0 / np.maximum(S, tol.TINY), 0.0)
-        step[few] = (Vt * (gain * (U * r[few, :, None]).sum(axis=1))[:, :, None]).sum(axis=1)
+    rows = np.flatnonzero(weak)
+    if len(rows):
+        U, S, Vt = np.linalg.svd(J[rows], full_matrices=False)
+        gain = np.where(least[rows, None] < S, 1.0 / np.maximum(S, tol.TINY), 0.0)
+        step[rows] = (Vt * (gain * (U * r[rows, :, None]).sum(axis=1))[:, :, None]).sum(axis=1)
     return step
 
 
@@ -143,18 +143,18 @@ def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:
 
 def distances(arm: Arm, a: Array, b: Array) -> Array:
     """`wrapped_distance` of each of a (N, A, n) to each of b (N, B, n): (N, A, B)."""
-    out = np.zeros((len(a), a.shape[1], b.shape[1]))
+    largest = np.zeros((len(a), a.shape[1], b.shape[1]))
     for i, slides in enumerate(arm.prismatic):  # one joint at a time: all at once leave the processor's cache
         d = np.ascontiguousarray(a[:, :, None, i]) - np.ascontiguousarray(b[:, None, :, i])
-        np.maximum(out, np.abs(d / arm.reach if slides else wrapped(d)), out=out)
-    return out
+        np.maximum(largest, np.abs(d / arm.reach if slides else wrapped(d)), out=largest)
+    return largest
 
 
 def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array, Int]:
     """Smallest singular value (M,) of the task's Jacobian, right vectors (M, n, n), and nullity (M,) below 1e-6."""
-    at = Linear.at(arm, task, q, target)
-    sigma, nullity = _smallest(arm, task, at.S)
-    return sigma, at.V, nullity
+    linear = Linear.at(arm, task, q, target)
+    sigma, nullity = _smallest(arm, task, linear.S)
+    return sigma, linear.V, nullity
 
 
 def _smallest(arm: Arm, task: Task, S: Array) -> tuple[Array, Int]:
@@ -194,12 +194,12 @@ class Lost(NamedTuple):
     place: Int
 
 
-def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) -> Lost:
-    """What the candidates q (K, M, n) lose that are asked (K, M), which solve their targets; others nothing."""
+def lost_directions(arm: Arm, task: Task, q: Array, chosen: Bool, target: Array) -> Lost:
+    """What the candidates q (K, M, n) lose that are chosen (K, M), which solve their targets; others nothing."""
     K, M, n = q.shape
     sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
     place, none = np.full((K, M), -1), np.zeros((0, 0))
-    k, b = np.nonzero(asked)
+    k, b = np.nonzero(chosen)
     if not len(k):
         return Lost(sigma, nullity, V, Linear(none, none, none, none), place)
     r, J = scaled(arm, task, q[k, b], target[k])
@@ -207,8 +207,8 @@ def lost_directions(arm: Arm, task: Task, q: Array, asked: Bool, target: Array) 
         # the Frobenius norm of the inverse is no smaller than its largest singular value
         inverse = nudged(np.linalg.inv, J)
         sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
-        some = bound < tol.FOLDED
-        k, b, r, J = k[some], b[some], r[some], J[some]
+        rows = bound < tol.FOLDED
+        k, b, r, J = k[rows], b[rows], r[rows], J[rows]
     weak = Linear(r, *np.linalg.svd(J))
     V[k, b], place[k, b] = weak.V, np.arange(len(k))
     sigma[k, b], nullity[k, b] = _smallest(arm, task, weak.S)

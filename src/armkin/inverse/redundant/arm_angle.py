@@ -96,11 +96,11 @@ def _circles(of: ArmAngle, target: Array) -> _Circles:
     still, swing = u @ u + p @ p + 2.0 * u[2] * p[2], float(np.hypot(a, b))
     cos = np.clip((far * far - still) / (2.0 * swing), -1.0, 1.0)
     miss = np.abs(far - np.sqrt(np.maximum(still + 2.0 * swing * cos, 0.0)))
-    there = (miss <= tol.SOLUTION * of.arm.reach) & (far > tol.NO_SIZE * of.arm.reach)
+    reached = (miss <= tol.SOLUTION * of.arm.reach) & (far > tol.NO_SIZE * of.arm.reach)
     apart = np.arccos(cos)
     apart = np.where(apart < tol.SAME, 0.0, np.where(apart > np.pi - tol.SAME, np.pi, apart))
-    one = (apart == 0.0) | (apart == np.pi)  # the two elbows are the same
-    row, half = np.nonzero(np.stack([there, there & ~one], axis=1))
+    single = (apart == 0.0) | (apart == np.pi)  # the two elbows are the same
+    row, half = np.nonzero(np.stack([reached, reached & ~single], axis=1))
     q4 = np.arctan2(b, a) + np.where(half == 0, apart[row], -apart[row])
     elbow = L[3][:3, :3] @ rotation_about(2, q4)
     # columns first, targets last
@@ -129,8 +129,8 @@ def _angles(of: ArmAngle, R: Array, psi: Array) -> Array:
 
 def _joints(of: ArmAngle, t: Array, flip: Array) -> Array:
     """Joint values (3, 2, ...) of shoulder and wrist: of the first half, or where flip of t + pi, -t, t + pi."""
-    other = np.stack([t[0] + np.pi, -t[1], t[2] + np.pi])
-    return np.asarray(np.where(flip, other, t) - of.offset.reshape(3, 2, *[1] * (t.ndim - 2)))
+    second_half = np.stack([t[0] + np.pi, -t[1], t[2] + np.pi])
+    return np.asarray(np.where(flip, second_half, t) - of.offset.reshape(3, 2, *[1] * (t.ndim - 2)))
 
 
 def _roots(a: Array, b: Array, c: Array) -> Array:
@@ -150,7 +150,7 @@ def _places(of: ArmAngle, R: Array, near: Array) -> Array:
     """Values of psi (M, K), sorted, where a joint may stand on a limit or at near (M, n), or the last one turns back,
     and some between."""
     turning = _turning(R)
-    out = [_roots(turning[0], turning[1], -turning[2])]
+    angles = [_roots(turning[0], turning[1], -turning[2])]
     for k, joints in enumerate(JOINTS):
         e = R[:, :, :, k]
         for i, joint in enumerate(joints):
@@ -159,12 +159,12 @@ def _places(of: ArmAngle, R: Array, near: Array) -> Array:
                 t = value + of.offset[i, k]
                 c, s = np.cos(t), np.sin(t)
                 if i == 1:
-                    out.append(_roots(e[1, 2, 2], e[2, 2, 2], -c - e[0, 2, 2]))
+                    angles.append(_roots(e[1, 2, 2], e[2, 2, 2], -c - e[0, 2, 2]))
                 else:
                     f = e[:, 0, 2] * s - e[:, 1, 2] * c if i == 0 else e[:, 2, 0] * s + e[:, 2, 1] * c
-                    out.append(_roots(f[1], f[2], -f[0]))
-    out.append(np.broadcast_to(np.arange(EVEN) * (TURN / EVEN), (len(near), EVEN)))
-    return np.sort(np.remainder(np.concatenate(out, axis=1), TURN), axis=1)
+                    angles.append(_roots(f[1], f[2], -f[0]))
+    angles.append(np.broadcast_to(np.arange(EVEN) * (TURN / EVEN), (len(near), EVEN)))
+    return np.sort(np.remainder(np.concatenate(angles, axis=1), TURN), axis=1)
 
 
 class _Samples(NamedTuple):
@@ -194,13 +194,13 @@ def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     for half in range(2):
         q = _joints(of, t, np.array(half == 1))
         for k, joints in enumerate(JOINTS):
-            some = (slice(None), half) if k == 0 else (slice(None), slice(None), half)
+            halves = (slice(None), half) if k == 0 else (slice(None), slice(None), half)
             for i, joint in enumerate(joints):
                 close = near[:, joint, None]
-                value, ok = nearest_of_joint(arm, joint, q[i, k], close)
-                moved, fits = np.abs(value - close), np.broadcast_to(ok, (M, 2 * K))
-                cost[some] += moved[:, None]
-                legal[some] &= fits[:, None]
+                value, within = nearest_of_joint(arm, joint, q[i, k], close)
+                moved, fits = np.abs(value - close), np.broadcast_to(within, (M, 2 * K))
+                cost[halves] += moved[:, None]
+                legal[halves] &= fits[:, None]
     a, b, c = (x[:, None] for x in _turning(circles.R))
     middle = psi[:, 1::2]
     up = (a * np.cos(middle) + b * np.sin(middle) + c >= 0.0) | (np.hypot(a, b) + np.abs(c) < tol.NO_SIZE)
@@ -227,9 +227,9 @@ class Turning(NamedTuple):
     def along(cls, of: ArmAngle, target: Array, near: Array) -> Turning:
         """The curves of targets, near (N, n)."""
         circles = _circles(of, target)
-        found = _pieces(of, circles, near[circles.row]) if len(circles.row) else none(of.arm.n)
-        curves = cls(of, circles, near, found, np.zeros(len(target), bool))
-        return curves._replace(pieces=found._replace(start=curves.at(found, found.at)[0]))
+        pieces = _pieces(of, circles, near[circles.row]) if len(circles.row) else none(of.arm.n)
+        curves = cls(of, circles, near, pieces, np.zeros(len(target), bool))
+        return curves._replace(pieces=pieces._replace(start=curves.at(pieces, pieces.at)[0]))
 
     @property
     def complete(self) -> Bool:
@@ -254,12 +254,12 @@ def _pieces(of: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     turns = s.up != np.roll(s.up, 1, axis=1)  # the last joint turns back here
     of_curves = np.broadcast_to(turns[:, None, None], s.between.shape).reshape(-1, K)
     between, point = s.between.reshape(-1, K), s.point.reshape(-1, K)
-    found = [runs(between, of_curves), (*np.nonzero(point), np.zeros(point.sum(), np.intp))]
-    other, begin, count = runs(np.ones_like(between), of_curves)
-    empty = holding_none(between | point, other, begin, count)
-    found.append((other[empty], begin[empty], count[empty]))
-    legal = np.repeat([True, True, False], [len(curve) for curve, *_ in found])
-    curve, first, length = (np.concatenate(column) for column in zip(*found, strict=True))
+    spans = [runs(between, of_curves), (*np.nonzero(point), np.zeros(point.sum(), np.intp))]
+    circle_half, begin, count = runs(np.ones_like(between), of_curves)
+    empty = holding_none(between | point, circle_half, begin, count)
+    spans.append((circle_half[empty], begin[empty], count[empty]))
+    legal = np.repeat([True, True, False], [len(curve) for curve, *_ in spans])
+    curve, first, length = (np.concatenate(column) for column in zip(*spans, strict=True))
     circle, wrist = curve // 4, curve % 2
     # the best sample, and how far the last joint turns: it is monotone between samples, which makes it sure
     costs = np.concatenate([s.cost, np.where(s.legal, s.cost, np.inf)]).reshape(-1, 2 * K)
@@ -276,11 +276,11 @@ def _pieces(of: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     def psi(sample: Int) -> Array:
         return np.asarray(s.psi[circle, sample % (2 * K)] + TURN * (sample // (2 * K)))
 
-    on = 2 * first + best
+    best_at = 2 * first + best
     return Pieces(
         circles.row[circle], circles.half[circle] * 4 + curve % 4, legal,
         np.minimum(start, end), np.maximum(start, end),
         psi(2 * first), psi(2 * (first + length)),
-        psi(np.maximum(on - 1, 2 * first)), psi(on), psi(np.minimum(on + 1, 2 * (first + length))),
+        psi(np.maximum(best_at - 1, 2 * first)), psi(best_at), psi(np.minimum(best_at + 1, 2 * (first + length))),
         np.zeros((len(curve), of.arm.n)),
     )  # fmt: skip

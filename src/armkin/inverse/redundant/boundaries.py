@@ -139,9 +139,9 @@ def _shoulder(held: _Held, e0: Array, e3: Array, cosine: float) -> Complex:
     to = held.before5(of.upper, of.fore)  # the shoulder from the wrist
     w = held.before5(of.link[3][:3, :3].T @ e3, np.zeros(3))
     k = to[2]
-    on = to[0] * w[0] + to[1] * w[1] + to[2] * w[2]
+    dot = to[0] * w[0] + to[1] * w[1] + to[2] * w[2]
     # w = (a z5 + b to + c z5 x to) / across, and axis 5 is (d2 z6 + (k1 p + g q) / round), q at right angles to p
-    a, b, c = w[2] * far - k * on, on - k * w[2], w[1] * to[0] - w[0] * to[1]
+    a, b, c = w[2] * far - k * dot, dot - k * w[2], w[1] * to[0] - w[0] * to[1]
     across, round6 = k * k * -1.0 + far, px * px + py * py
     k1 = k - h * d[2]
     nx, ny, nz = held.turned(e0 @ (held.target[:, :3, :3] @ of.link[7][:3, :3].T))
@@ -150,11 +150,11 @@ def _shoulder(held: _Held, e0: Array, e3: Array, cosine: float) -> Complex:
     still = still + c * (k1 * (-h * q) + d[2] * q * round6) - across * (cosine * round6)
     moving = a * q + c * (h * p - nz * round6)
     g2 = k1 * k1 * -1.0 + (d[0] * d[0] + d[1] * d[1]) * round6
-    both = still * still - g2 * (moving * moving)
-    out = both.product() / (round6 * round6 * across.product())
+    product = still * still - g2 * (moving * moving)
+    value = product.product() / (round6 * round6 * across.product())
     if of.in_line is not None and np.array_equal(e3, Z):  # twice a root there, of branches that are not real
-        out = out / (held.cos - of.in_line) ** 2
-    return np.asarray(out)
+        value = value / (held.cos - of.in_line) ** 2
+    return np.asarray(value)
 
 
 def _limits(arm: Arm, j: int) -> list[float]:
@@ -169,18 +169,18 @@ def _equations(of: Boundaries, target: Array) -> Complex:
     R, limits = of.link[:, :3, :3], [_limits(of.arm, j) for j in range(6)]
     axis1, axis5 = R[0] @ Z, R[5].T @ Z
     to, h = held.before5(of.upper, of.fore), held.to[2]
-    out = [_shoulder(held, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
-    out += [_shoulder(held, axis1, Z, float((R[1] @ rotation_about(2, q) @ R[2])[2, 2])) for q in limits[1]]
-    out += [_shoulder(held, axis1, rotation_about(2, -q) @ R[2].T @ Z, float(R[1][2, 2])) for q in limits[2]]
-    out += [held.cos - cos for cos in (1.0, -1.0, *(float(np.cos(q - of.middle)) for q in limits[3]))]
+    values = [_shoulder(held, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
+    values += [_shoulder(held, axis1, Z, float((R[1] @ rotation_about(2, q) @ R[2])[2, 2])) for q in limits[1]]
+    values += [_shoulder(held, axis1, rotation_about(2, -q) @ R[2].T @ Z, float(R[1][2, 2])) for q in limits[2]]
+    values += [held.cos - cos for cos in (1.0, -1.0, *(float(np.cos(q - of.middle)) for q in limits[3]))]
     for q in limits[4]:  # axis 6 and the line to the shoulder
         x, y, z = rotation_about(2, q) @ R[5] @ Z
-        out.append((to[0] * x + to[1] * y + to[2] * z - h).product())
+        values.append((to[0] * x + to[1] * y + to[2] * z - h).product())
     for q in limits[5]:  # axis 5 and that line
-        out.append((to[2] - np.tensordot(rotation_about(2, -q) @ axis5, held.to, 1)).product())
+        values.append((to[2] - np.tensordot(rotation_about(2, -q) @ axis5, held.to, 1)).product())
     k1 = to[2] - h * axis5[2]  # g is nothing
-    out.append((k1 * k1 * -1.0 + (axis5[0] ** 2 + axis5[1] ** 2) * (held.to[:2] ** 2).sum(axis=0)).product())
-    return np.stack(out)
+    values.append((k1 * k1 * -1.0 + (axis5[0] ** 2 + axis5[1] ** 2) * (held.to[:2] ** 2).sum(axis=0)).product())
+    return np.stack(values)
 
 
 def places(of: Boundaries, target: Array) -> tuple[Array, Bool]:
@@ -188,31 +188,31 @@ def places(of: Boundaries, target: Array) -> tuple[Array, Bool]:
     (S,)."""
     values = _equations(of, target)
     F, S, M = values.shape
-    found = roots(values.reshape(-1, M), DEGREE)
-    own = np.array(_limits(of.arm, 6))
-    row = np.concatenate([found.which % S, np.repeat(np.arange(S), len(own))])
-    at = np.concatenate([found.at, np.tile(own, S)])
-    at = np.remainder(at + np.pi, 2 * np.pi) - np.pi
-    order = np.lexsort((at, row))
-    row, at = row[order], at[order]
-    apart = np.append(True, (np.diff(row) != 0) | (np.diff(at) > tol.SAME_END))
-    row, at = row[apart], at[apart]
+    zeros = roots(values.reshape(-1, M), DEGREE)
+    limits = np.array(_limits(of.arm, 6))
+    row = np.concatenate([zeros.which % S, np.repeat(np.arange(S), len(limits))])
+    angles = np.concatenate([zeros.at, np.tile(limits, S)])
+    angles = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
+    order = np.lexsort((angles, row))
+    row, angles = row[order], angles[order]
+    apart = np.append(True, (np.diff(row) != 0) | (np.diff(angles) > tol.SAME_END))
+    row, angles = row[apart], angles[apart]
     count = np.bincount(row, minlength=S)
-    out = np.full((S, int(count.max(initial=0))), np.inf)
-    out[row, numbers_within(count)] = at
-    return out, np.asarray(found.decided.reshape(F, S).all(axis=0))
+    table = np.full((S, int(count.max(initial=0))), np.inf)
+    table[row, numbers_within(count)] = angles
+    return table, np.asarray(zeros.decided.reshape(F, S).all(axis=0))
 
 
-def on_both_sides(at: Array) -> Array:
+def on_both_sides(angles: Array) -> Array:
     """Samples on both sides of places (S, V) of a turn: (S, 2 V), inf where there is none."""
-    real = np.isfinite(at)
+    real = np.isfinite(angles)
     count = real.sum(axis=1)
-    some = np.where(real, at, 0.0)
-    first, last = some[:, :1] + 2 * np.pi, some[np.arange(len(at)), count - 1] - 2 * np.pi
-    before = some - np.concatenate([last[:, None], some[:, :-1]], axis=1)
-    following = np.concatenate([some[:, 1:], first], axis=1)
-    behind = np.where(np.arange(at.shape[1]) == count[:, None] - 1, first, following) - some
-    both = np.concatenate(
-        [some - np.minimum(before / 3, tol.BESIDE_END), some + np.minimum(behind / 3, tol.BESIDE_END)], axis=1
+    finite = np.where(real, angles, 0.0)
+    first, last = finite[:, :1] + 2 * np.pi, finite[np.arange(len(angles)), count - 1] - 2 * np.pi
+    before = finite - np.concatenate([last[:, None], finite[:, :-1]], axis=1)
+    following = np.concatenate([finite[:, 1:], first], axis=1)
+    behind = np.where(np.arange(angles.shape[1]) == count[:, None] - 1, first, following) - finite
+    sides = np.concatenate(
+        [finite - np.minimum(before / 3, tol.BESIDE_END), finite + np.minimum(behind / 3, tol.BESIDE_END)], axis=1
     )
-    return np.where(np.tile(real, 2), np.remainder(both + np.pi, 2 * np.pi) - np.pi, np.inf)
+    return np.where(np.tile(real, 2), np.remainder(sides + np.pi, 2 * np.pi) - np.pi, np.inf)

@@ -29,18 +29,18 @@ class _Ends:
     def __init__(self, find: Follower, row: Int, branch: Int, of_limits: bool) -> None:
         self.find, self.row, self.branch, self.of_limits = find, row, branch, of_limits
 
-    def rooms(self, some: Int, value: Array) -> Array:
+    def rooms(self, ends: Int, value: Array) -> Array:
         """How good ends (M,) are at values (M,): positive where they are, linear about the end, nan where the branch is
         not there.
 
         The way to the limits [rad], or the squared distance of the nearest other branch.
         """
-        row, branch = self.row[some], self.branch[some]
+        row, branch = self.row[ends], self.branch[ends]
         if self.of_limits:
             return margin(self.find.arm, self.find.own(row, branch, value))
         q = self.find.found(row, value)
         *_, apart = beside(q, branch)
-        return np.asarray(np.where(np.isnan(q[np.arange(len(some)), branch, 0]), np.nan, apart))
+        return np.asarray(np.where(np.isnan(q[np.arange(len(ends)), branch, 0]), np.nan, apart))
 
     def between(self, good: Array, bad: Array, before: Array, rooms: tuple[Array, Array, Array]) -> Array:
         """Where each ends (M,): good and bad are the values on its sides, before lies beyond good.
@@ -49,7 +49,7 @@ class _Ends:
         """
         lo, hi, last = good.copy(), bad.copy(), before.copy()
         at_lo, at_hi, at_last = np.maximum(rooms[0], tol.TINY), rooms[1].copy(), rooms[2].copy()
-        out, going = 0.5 * (lo + hi), np.arange(len(lo))
+        value, going = 0.5 * (lo + hi), np.arange(len(lo))
         over, side = np.zeros(len(lo), bool), np.zeros(len(lo), bool)
         for k in range(HALVINGS):
             low, high, a, b, c = lo[going], hi[going], at_lo[going], at_hi[going], at_last[going]
@@ -58,10 +58,10 @@ class _Ends:
                 along = low + (low - last[going]) * a / (c - a)
                 guess = np.where(b <= 0, across, along)
                 inside = ((guess - low) * (high - guess) > 0) & ~over[going] & (k < SECANTS)
-            step = np.where(inside, np.abs(guess - out[going]), np.abs(high - low))
+            step = np.where(inside, np.abs(guess - value[going]), np.abs(high - low))
             # a secant along the branch that has gone past the end: it is close by
             guess = np.where(inside, guess, np.where(over[going], high - BACK * (high - low), 0.5 * (low + high)))
-            out[going] = np.where(b == 0, high, np.where(inside | ~over[going], guess, out[going]))
+            value[going] = np.where(b == 0, high, np.where(inside | ~over[going], guess, value[going]))
             left = (step > tol.SAME_END) & (b != 0)
             going, guess, inside = going[left], guess[left], inside[left]
             if not len(going):
@@ -75,17 +75,17 @@ class _Ends:
             at_hi[going[better & side[going]]] *= 0.5
             at_lo[going[~better & ~side[going]]] *= 0.5
             side[going] = better
-            some = going[better]
-            last[some], at_last[some] = lo[some], at_lo[some]
-            lo[some], at_lo[some] = guess[better], room[better]
-            some = going[~better]
-            hi[some], at_hi[some] = guess[~better], room[~better]
-        return out
+            moved = going[better]
+            last[moved], at_last[moved] = lo[moved], at_lo[moved]
+            lo[moved], at_lo[moved] = guess[better], room[better]
+            moved = going[~better]
+            hi[moved], at_hi[moved] = guess[~better], room[~better]
+        return value
 
 
-def crossed_at(find: Follower, at: Changes, value: Array) -> Array:
+def crossed_at(find: Follower, changes: Changes, value: Array) -> Array:
     """Where limits are crossed (M,), known but for the rounding of their polynomials: a secant step in the joints."""
-    near, far = (margin(find.arm, find.own(at.row, at.branch, value + h)) for h in (0.0, tol.BESIDE_CROSSING))
+    near, far = (margin(find.arm, find.own(changes.row, changes.branch, value + h)) for h in (0.0, tol.BESIDE_CROSSING))
     with np.errstate(invalid="ignore", divide="ignore"):
         step = near * tol.BESIDE_CROSSING / (near - far)
         return np.asarray(np.where(np.abs(step) < tol.BESIDE_CROSSING, value + step, value))
@@ -106,12 +106,12 @@ def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, A
     begin, end = value_at(t, row, k), value_at(t, row, k + 1)
     _, _, peak, least = golden_section(depth, begin, end, PEAK)
     top = -least
-    some = np.flatnonzero(top > 0)
-    row, k, branch = row[some], k[some], branch[some]
-    sign, peak, top = sign[some], peak[some], top[some]
+    hidden = np.flatnonzero(top > 0)
+    row, k, branch = row[hidden], k[hidden], branch[hidden]
+    sign, peak, top = sign[hidden], peak[hidden], top[hidden]
     near = _Ends(find, np.tile(row, 2), np.tile(branch, 2), True)
-    at_sample = room[some].T.ravel()
-    outer, inner = np.concatenate([begin[some], end[some]]), np.tile(peak, 2)
+    at_sample = room[hidden].T.ravel()
+    outer, inner = np.concatenate([begin[hidden], end[hidden]]), np.tile(peak, 2)
     inside = np.tile(sign < 0, 2)  # the stretch is the legal one
     good, bad = np.where(inside, inner, outer), np.where(inside, outer, inner)
     at_inner = np.tile(-sign * top, 2)
@@ -125,31 +125,31 @@ def _merged(find: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
 
     Of two that are nearest to each other before both vanish one is asked, if it has joined the other one there.
     """
-    at, every = gone.at, np.arange(len(gone.twin))
-    good = at.value(0, t)
-    number = {key: i for i, key in enumerate(zip(*(column.tolist() for column in at), strict=True))}
-    whose = zip(at.row.tolist(), at.k.tolist(), gone.twin.tolist(), at.set_before.tolist(), strict=True)
+    changes, every = gone.at, np.arange(len(gone.twin))
+    good = changes.value(0, t)
+    number = {key: i for i, key in enumerate(zip(*(column.tolist() for column in changes), strict=True))}
+    whose = zip(changes.row.tolist(), changes.k.tolist(), gone.twin.tolist(), changes.set_before.tolist(), strict=True)
     twin = np.array([number.get(key, i) for i, key in enumerate(whose)], np.intp)
     first = np.where((twin < every) & (twin[twin] == every), twin, every)  # which end is asked for each
     value, room, joined = np.empty(len(every)), np.empty(len(every)), np.zeros(len(every), bool)
-    own = np.flatnonzero(first == every)
-    while len(own):
-        ends = _Ends(find, at.row[own], at.branch[own], False)
-        rooms = gone.apart[own, 0], np.full(len(own), np.nan), gone.apart[own, 1]
-        value[own] = ends.between(good[own], at.value(1, t)[own], at.value(-1, t)[own], rooms)
-        some = np.flatnonzero(~joined & np.isin(first, own))
-        value[some] = value[first[some]]
+    leaders = np.flatnonzero(first == every)
+    while len(leaders):
+        ends = _Ends(find, changes.row[leaders], changes.branch[leaders], False)
+        rooms = gone.apart[leaders, 0], np.full(len(leaders), np.nan), gone.apart[leaders, 1]
+        value[leaders] = ends.between(good[leaders], changes.value(1, t)[leaders], changes.value(-1, t)[leaders], rooms)
+        rows = np.flatnonzero(~joined & np.isin(first, leaders))
+        value[rows] = value[first[rows]]
         q = find.found(
-            at.row[some], value[some] + np.clip(good[some] - value[some], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
+            changes.row[rows], value[rows] + np.clip(good[rows] - value[rows], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
         )
-        away, _, apart = beside(q, at.branch[some])
-        mine = q[np.arange(len(some)), at.branch[some]]
-        there = ~np.isnan(mine[:, 0])
+        away, _, apart = beside(q, changes.branch[rows])
+        mine = q[np.arange(len(rows)), changes.branch[rows]]
+        present = ~np.isnan(mine[:, 0])
         middle = margin(find.arm, mine + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away))
-        room[some] = np.where(there, middle, gone.room[some])
-        joined[some] = (first[some] == some) | (there & (apart <= tol.JOINED * gone.apart[some, 0]))
-        own = some[~joined[some]]
-        first[own] = own
+        room[rows] = np.where(present, middle, gone.room[rows])
+        joined[rows] = (first[rows] == rows) | (present & (apart <= tol.JOINED * gone.apart[rows, 0]))
+        leaders = rows[~joined[rows]]
+        first[leaders] = leaders
     return value, room
 
 
@@ -162,34 +162,34 @@ class Places(NamedTuple):
     ends: tuple[Array, Array]  # of these: where the branch ends, and where its limit is crossed
 
 
-def places_of(find: Follower, found: Seen) -> Places:
+def places_of(find: Follower, shown: Seen) -> Places:
     """All ends of some targets.
 
     Where two branches merge both are legal, or none: one that is not at the next sample is for a stretch.
     """
-    t, gone, illegal = found.t, found.gone.at, found.crossed.at
-    merged, room = _merged(find, t, found.gone)
-    inside, outside = found.crossed.rooms.T
+    t, gone, illegal = shown.t, shown.gone.at, shown.crossed.at
+    merged, room = _merged(find, t, shown.gone)
+    inside, outside = shown.crossed.rooms.T
     # which of the branches that are not legal at the next sample end there, too, and where
     ending = np.isnan(outside)
-    which = np.zeros(len(ending), np.intp)
-    which[ending] = number_of(gone, illegal.row[ending], illegal.k[ending], illegal.branch[ending], t.shape[1])
+    place = np.zeros(len(ending), np.intp)
+    place[ending] = number_of(gone, illegal.row[ending], illegal.k[ending], illegal.branch[ending], t.shape[1])
     if len(gone.row):
-        outside = np.where(ending, room[which], outside)
+        outside = np.where(ending, room[place], outside)
     to_end = ending & (outside >= 0.0)
     legal = np.empty(len(ending))
-    legal[to_end] = merged[which[to_end]]
-    crossing, which = rows_of(illegal, ~to_end), which[~to_end]
-    lone = (room >= 0.0) & ~found.gone.legal
+    legal[to_end] = merged[place[to_end]]
+    crossing, place = rows_of(illegal, ~to_end), place[~to_end]
+    lone = (room >= 0.0) & ~shown.gone.legal
     short = rows_of(gone, lone)
     row, branch = np.concatenate([crossing.row, short.row]), np.concatenate([crossing.branch, short.branch])
     far = crossing.value(1, t)
     if len(gone.row):
-        far = np.where(ending[~to_end], merged[which], far)
+        far = np.where(ending[~to_end], merged[place], far)
     good, bad = np.concatenate([crossing.value(0, t), merged[lone]]), np.concatenate([far, short.value(0, t)])
     rooms = (
         np.concatenate([inside[~to_end], room[lone]]),
-        np.concatenate([outside[~to_end], found.gone.room[lone]]),
+        np.concatenate([outside[~to_end], shown.gone.room[lone]]),
         np.full(len(row), np.nan),
     )
     crossed = _Ends(find, row, branch, True).between(good, bad, good, rooms)

@@ -53,19 +53,19 @@ def _onto(find: Follower, row: Int, q: Array, last: Array, enough: float) -> Poi
     for _ in range(NEWTON):
         if not len(going):
             break
-        some = slice(None) if len(going) == len(q) else going
-        missing, J = newton.scaled(arm, task, q[some], target[some])
-        rows = np.concatenate([J, last[some, None]], axis=1)
+        part = slice(None) if len(going) == len(q) else going
+        missing, J = newton.scaled(arm, task, q[part], target[part])
+        rows = np.concatenate([J, last[part, None]], axis=1)
         right = np.zeros((*rows.shape[:2], 2))
         right[:, :-1, 0], right[:, -1, 1] = missing, 1.0
         # the direction of a tool's axis is three numbers for two constraints
         x = nudged(np.linalg.solve, rows, right) if rows.shape[1] == arm.n else np.linalg.pinv(rows) @ right
         step = x[:, :, 0]
-        tangent[some] = x[:, :, 1] / np.sqrt((x[:, :, 1] ** 2).sum(axis=1, keepdims=True))
+        tangent[part] = x[:, :, 1] / np.sqrt((x[:, :, 1] ** 2).sum(axis=1, keepdims=True))
         longest = np.abs(step).max(axis=1)
-        q[some] += step * np.minimum(1.0, FARTHEST / np.maximum(longest, FARTHEST))[:, None] * unit
-        size[some] = np.where(np.isnan(longest), np.inf, longest)
-        going = going[~(size[some] < enough)]  # its square is left
+        q[part] += step * np.minimum(1.0, FARTHEST / np.maximum(longest, FARTHEST))[:, None] * unit
+        size[part] = np.where(np.isnan(longest), np.inf, longest)
+        going = going[~(size[part] < enough)]  # its square is left
     return Points(q, tangent, size)
 
 
@@ -88,14 +88,14 @@ class Ways(NamedTuple):
     def at(self, find: Follower, share: Array | float) -> Array:
         """Postures at shares (M,) of the way, or all at one."""
         u = np.asarray(share)[..., None]
-        on = self.chord * (u * u * (3.0 - 2.0 * u)) + (self.begin * (1.0 - u) - self.end * u) * (u * (1.0 - u))
-        return np.asarray(self.q + on * radian_or_reach(find.arm))
+        offset = self.chord * (u * u * (3.0 - 2.0 * u)) + (self.begin * (1.0 - u) - self.end * u) * (u * (1.0 - u))
+        return np.asarray(self.q + offset * radian_or_reach(find.arm))
 
     def slope(self, share: Array | float, j: int) -> Array:
         """How joint j changes there (M,)."""
         u = share
-        own = self.begin[:, j] * (1.0 - u) * (1.0 - 3.0 * u) + self.end[:, j] * u * (3.0 * u - 2.0)
-        return np.asarray(6.0 * u * (1.0 - u) * self.chord[:, j] + own)
+        ends = self.begin[:, j] * (1.0 - u) * (1.0 - 3.0 * u) + self.end[:, j] * u * (3.0 * u - 2.0)
+        return np.asarray(6.0 * u * (1.0 - u) * self.chord[:, j] + ends)
 
     def follow(self, find: Follower, row: Int) -> Bool:
         """Which lie on the curves of their targets row (M,), as their middles tell."""

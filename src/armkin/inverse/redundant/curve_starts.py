@@ -58,9 +58,9 @@ class Planes(NamedTuple):
 
     def held(self, count: int) -> Array:
         """Directions (M, n) in which that joint alone moves."""
-        out = np.zeros((count, self.find.arm.n))
-        out[:, self.guide.joint] = 1.0
-        return out
+        directions = np.zeros((count, self.find.arm.n))
+        directions[:, self.guide.joint] = 1.0
+        return directions
 
     def place(self, row: Int, plane: Int) -> Int:
         """One number for targets and their planes (M,), counted round the turn."""
@@ -74,34 +74,34 @@ class Planes(NamedTuple):
         return Nodes(row[good], plane[good], rows_of(points, good)), good
 
 
-def answered(find: Follower, known: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
+def answered(find: Follower, whose: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
     """The planes of all targets, and the answers on them; which is whose, by plane and branch (N, V, B), -1: none.
 
-    known: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
+    whose: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
     """
     guide, even, N = nearly_closed(find.arm, find.free), over_a_turn(PLANES), len(find.target)
     row, t = np.repeat(np.arange(N), PLANES), np.tile(even, N)
     source = find._replace(free=guide)
     if guide is find.free:
         q = find.found(row, t)
-        there, own = ~np.isnan(q[:, :, 0]), q[:0, 0]
+        near, extra = ~np.isnan(q[:, :, 0]), q[:0, 0]
     else:
         q, missed = source.candidates(row, t)
-        more, own = _answers_between(source, even, missed.reshape(N, PLANES, -1))
-        more, own = np.append(more, known), np.append(own, postures, axis=0)
-        row, t = np.append(row, more), np.append(t, own[:, guide.joint])
-        others = source.candidates(more, t[N * PLANES :])
-        q, there = np.append(q, others[0], axis=0), np.append(missed, others[1], axis=0) < tol.NEAR
+        more, extra = _answers_between(source, even, missed.reshape(N, PLANES, -1))
+        more, extra = np.append(more, whose), np.append(extra, postures, axis=0)
+        row, t = np.append(row, more), np.append(t, extra[:, guide.joint])
+        beside = source.candidates(more, t[N * PLANES :])
+        q, near = np.append(q, beside[0], axis=0), np.append(missed, beside[1], axis=0) < tol.NEAR
     order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
     plane = np.empty_like(row)
     plane[order] = numbers_within(count)
     planes = Planes(find, guide, np.full((N, int(count.max(initial=PLANES))), np.inf), count)
     planes.values[row, plane] = t
-    one, branch = np.nonzero(there)
+    sample, branch = np.nonzero(near)
     last = np.arange(N * PLANES, len(row))  # those between are answers already, of no branch
-    start = np.append(q[one, branch], own, axis=0)
-    one, branch = np.append(one, last), np.append(branch, np.full(len(last), q.shape[1]))
-    nodes, good = planes.answers(row[one], plane[one], start)
+    start = np.append(q[sample, branch], extra, axis=0)
+    sample, branch = np.append(sample, last), np.append(branch, np.full(len(last), q.shape[1]))
+    nodes, good = planes.answers(row[sample], plane[sample], start)
     grid = np.full((*planes.values.shape, q.shape[1] + 1), -1)
     grid[nodes.row, nodes.plane, branch[good]] = np.arange(len(good))
     return planes, nodes, grid[:, :, :-1]
@@ -111,13 +111,13 @@ def _answers_between(source: Follower, t: Array, missed: Array) -> tuple[Int, Ar
     """Answers (M, n) of targets (M,) where these may be between values t (K,) alone, as what branches miss (N, K, B)
     tells: of a short curve, whose joint cannot be held where it turns back."""
     width, part = t[1] - t[0], np.arange(1, BETWEEN) / BETWEEN
-    off = np.where(missed <= tol.ACCEPTED, np.nan, -missed)
-    row, k = np.nonzero(turning(off, np.broadcast_to(t, missed.shape[:2])).any(axis=2))
+    misses = np.where(missed <= tol.ACCEPTED, np.nan, -missed)
+    row, k = np.nonzero(turning(misses, np.broadcast_to(t, missed.shape[:2])).any(axis=2))
     row, values = np.repeat(row, len(part)), (t[k, None] + width * part).ravel()
     q, missed = source.candidates(row, values)
     best = missed.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
-    some, branch = np.nonzero(missed[best] < tol.NEAR)
-    row, q = row[best[some]], q[best[some], branch]
+    place, branch = np.nonzero(missed[best] < tol.NEAR)
+    row, q = row[best[place]], q[best[place], branch]
     q, miss = newton.correct(source.arm, source.free.task, q, source.target[row])
     good = np.flatnonzero(miss < tol.SAME_SEED)
     good = good[once(source, row[good], q[good])]
@@ -130,10 +130,10 @@ def once(find: Follower, group: Int, q: Array) -> Bool:
     order = np.lexsort((key, group))
     first, second = order[:-1], order[1:]
     near = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
-    some = np.flatnonzero(near)
-    out = np.ones(len(q), bool)
-    out[second[some[newton.wrapped_distance(find.arm, q[first[some]], q[second[some]]) < tol.SAME_SEED]]] = False
-    return out
+    pairs = np.flatnonzero(near)
+    unique = np.ones(len(q), bool)
+    unique[second[pairs[newton.wrapped_distance(find.arm, q[first[pairs]], q[second[pairs]]) < tol.SAME_SEED]]] = False
+    return unique
 
 
 def missed(find: Follower, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
@@ -149,26 +149,26 @@ def missed(find: Follower, points: Points, row: Int, after: Int) -> tuple[Int, A
 
 def _missed_at(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
     """Those with the joint at a value."""
-    rest = arm_without(find.arm, ((find.arm.joint_names[joint], value),))
-    s = find.ik(rest, find.target, find.free.task.name, examine=False)
+    held_arm = arm_without(find.arm, ((find.arm.joint_names[joint], value),))
+    s = find.ik(held_arm, find.target, find.free.task.name, examine=False)
     whose, branch = np.nonzero(s.valid)
     q = np.insert(s.q[whose, branch], joint, value, axis=1)
     crossing, owner = _crossings(find, joint, value, points, row, after)
     order, count = np.argsort(owner, kind="stable"), np.bincount(owner, minlength=len(find.target))
     place = np.arange(int(count.max(initial=0)))
-    some, k = np.nonzero(place < count[whose, None])
-    own = order[(np.cumsum(count) - count)[whose[some]] + k]
+    pair, k = np.nonzero(place < count[whose, None])
+    index = order[(np.cumsum(count) - count)[whose[pair]] + k]
     passed = np.zeros(len(q), bool)
-    passed[some[newton.wrapped_distance(find.arm, q[some], crossing[own]) < ON_CURVE]] = True
+    passed[pair[newton.wrapped_distance(find.arm, q[pair], crossing[index]) < ON_CURVE]] = True
     return whose[~passed], q[~passed]
 
 
 def _crossings(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Array, Int]:
     """Postures (M, n) in which curves have the joint at a value, and of which targets they are (M,)."""
-    off, change = wrapped(points.q[:, joint] - value), wrapped(points.q[after, joint] - points.q[:, joint])
-    some = np.flatnonzero((off * (off + change) <= 0) & (change != 0))
-    ways = Ways.between(find, rows_of(points, some), rows_of(points, after[some]))
-    share = -off[some] / change[some]
+    away, change = wrapped(points.q[:, joint] - value), wrapped(points.q[after, joint] - points.q[:, joint])
+    begins = np.flatnonzero((away * (away + change) <= 0) & (change != 0))
+    ways = Ways.between(find, rows_of(points, begins), rows_of(points, after[begins]))
+    share = -away[begins] / change[begins]
     for _ in range(SECANTS):
-        share = np.clip(share - wrapped(ways.at(find, share)[:, joint] - value) / change[some], 0.0, 1.0)
-    return ways.at(find, share), row[some]
+        share = np.clip(share - wrapped(ways.at(find, share)[:, joint] - value) / change[begins], 0.0, 1.0)
+    return ways.at(find, share), row[begins]

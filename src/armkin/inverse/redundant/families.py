@@ -58,20 +58,20 @@ def families(
         return _with_tool_turn(ik, arm, free, targets, near, rounding)
     task = free.task
     values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
-    goal, lead, off = read_targets(task, values)
+    goal, lead, defect = read_targets(task, values)
     close = read_near(arm, near, lead)
-    each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
+    nears = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
     of = arm_angle(arm) if free.joint else None
-    numbers = (shaped(task, values)[0], off)
-    known, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
-    stands = (newton.missing(arm, task, each, goal) <= most) & ~outside(arm, each).any(axis=1)
-    rows = _Rows(arm, free.joint, each, stands)
-    some = CIRCLES if of else AT_ONCE // SAMPLES if free.by_formula else TRACED
-    for k in range(0, len(goal), some):
+    numbers = (shaped(task, values)[0], defect)
+    roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
+    stands = (newton.missing(arm, task, nears, goal) <= most) & ~outside(arm, nears).any(axis=1)
+    rows = _Rows(arm, free.joint, nears, stands)
+    chunk = CIRCLES if of else AT_ONCE // SAMPLES if free.by_formula else TRACED
+    for k in range(0, len(goal), chunk):
         if of:
-            rows.add(k, Turning.along(of, goal[k : k + some], each[k : k + some]))
+            rows.add(k, Turning.along(of, goal[k : k + chunk], nears[k : k + chunk]))
         else:
-            find = Follower(ik, arm, free, goal[k : k + some], each[k : k + some])
+            find = Follower(ik, arm, free, goal[k : k + chunk], nears[k : k + chunk])
             for curves in [Followed.along(find)] if free.by_formula else traced(find):
                 rows.add(k, curves)
                 k += len(curves.short)
@@ -82,8 +82,8 @@ def families(
     names = ik(free.rest, moved(arm, free, goal[:1], np.zeros(1)), task.name, examine=False).names if len(goal) else ()
     names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
     method, why, _ = described(arm, free)
-    out = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(each.shape, bool), rows.complete)
-    s = as_solutions(Goals(arm, task, goal, each), close, lead, out, known, (names, method, why))
+    out = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(nears.shape, bool), rows.complete)
+    s = as_solutions(Goals(arm, task, goal, nears), close, lead, out, roundings, (names, method, why))
     return replace(s, interval=interval.reshape(*s.valid.shape, 2))
 
 
@@ -121,15 +121,15 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     if free.still:
         why = f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: "
         return f"families of {joint}", why + free.geometry.why, free.geometry.complete
-    true, complete = actual(arm), False
-    if free.joint and arm_angle(true) is not None:
+    turned, complete = actual(arm), False
+    if free.joint and arm_angle(turned) is not None:
         how, complete = "in closed form by the arm angle", True
-    elif free.joint and free.by_formula and boundaries(true) is not None:
+    elif free.joint and free.by_formula and boundaries(turned) is not None:
         how, complete = f"{free.geometry.name}, between all values of it where a limit or a merging may be", True
     elif free.by_formula:
         how = f"{free.geometry.name}, at {SAMPLES} values of it"
     else:
-        guide = nearly_closed(true, free)
+        guide = nearly_closed(turned, free)
         name = free.geometry.name if guide is free else f"near {guide.geometry.name}"
         how = f"{name}, at {PLANES} values of {arm.joint_names[guide.joint]}, and traced between them"
     why = f"{joint} is redundant: ik lists the intervals of its values; the others: {how}"
@@ -154,16 +154,16 @@ class _Rows:
         q = _nearest_postures(self.arm, curves, near)
         if isinstance(curves, Traced):
             q = curves.settled(pieces, q)
-        some = np.flatnonzero(self.stands[begin + pieces.row])
-        q[some] = _with_near(self.arm, self.joint, rows_of(pieces, some), q[some], near[some])
+        standing = np.flatnonzero(self.stands[begin + pieces.row])
+        q[standing] = _with_near(self.arm, self.joint, rows_of(pieces, standing), q[standing], near[standing])
         if self.arm.keep_out:
             q = _with_free_postures(self.arm, curves, q, near)
-        whole = pieces.b - pieces.a >= 2 * np.pi
+        full_turn = pieces.b - pieces.a >= 2 * np.pi
         ends = np.stack([pieces.a, pieces.b], axis=1)
         # of the turns of the interval that in which the posture lies
         ends += (2 * np.pi) * np.round((q[:, self.joint] - ends.mean(axis=1)) / (2 * np.pi))[:, None]
         order = np.lexsort((~pieces.legal, pieces.row))
-        interval = np.where(whole[:, None], [-np.pi, np.pi], ends)[order]
+        interval = np.where(full_turn[:, None], [-np.pi, np.pi], ends)[order]
         self.parts.append((begin + pieces.row[order], q[order], interval, pieces.legal[order], pieces.branch[order]))
 
     def add_points(self, task: Task, target: Array, search: bool) -> None:
@@ -171,8 +171,8 @@ class _Rows:
 
         All postures of a stretched arm may lie within less than a sample, or be one.
         """
-        known = [part[0] for part in self.parts]
-        lost = ~np.isin(np.arange(len(target)), np.concatenate([np.zeros(0, np.intp), *known]))
+        answered = [part[0] for part in self.parts]
+        lost = ~np.isin(np.arange(len(target)), np.concatenate([np.zeros(0, np.intp), *answered]))
         sought = lost & ~self.stands & search & (self.arm.prismatic.any() | (distance(self.arm, task, target) <= 1.0))
         for k in np.flatnonzero(lost & (self.stands | sought)).tolist():
             q, goal = self.near[k][None], target[[k]]
@@ -193,12 +193,12 @@ class _Rows:
         order = np.argsort(row, kind="stable")
         count = np.bincount(row, minlength=N)
         B = int(count.max(initial=0))
-        where = row[order], numbers_within(count)
+        cells = row[order], numbers_within(count)
         q, interval = np.full((N, B, n), np.nan), np.full((N, B, 2), np.nan)
         legal, branch = np.zeros((N, B), bool), np.full((N, B), -1, np.int8)
         if len(row):
-            for k, out in enumerate((q, interval, legal, branch), 1):
-                out[where] = np.concatenate([part[k] for part in self.parts])[order]
+            for k, array in enumerate((q, interval, legal, branch), 1):
+                array[cells] = np.concatenate([part[k] for part in self.parts])[order]
         return q, interval, legal, branch
 
 
@@ -211,35 +211,35 @@ def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
     best = curves.pieces.start.copy()
     least = motion(arm, best, near)
 
-    def costs(some: Int, t: Array) -> Array:
+    def costs(rows: Int, t: Array) -> Array:
         """Of legal postures; better ones are kept."""
-        q, legal = curves.at(rows_of(curves.pieces, some), t)
-        cost = np.where(legal, motion(arm, q, near[some]), np.inf)
-        better = cost < least[some]
-        best[some[better]], least[some[better]] = q[better], cost[better]
+        q, legal = curves.at(rows_of(curves.pieces, rows), t)
+        cost = np.where(legal, motion(arm, q, near[rows]), np.inf)
+        better = cost < least[rows]
+        best[rows[better]], least[rows[better]] = q[better], cost[better]
         return np.asarray(cost)
 
-    some = np.flatnonzero(curves.pieces.legal)
-    if not len(some):
+    rows = np.flatnonzero(curves.pieces.legal)
+    if not len(rows):
         return best
     if isinstance(curves, Followed):  # of others these are samples
-        for t in curves.tried(rows_of(curves.pieces, some), near[some]):
-            costs(some, t)
+        for t in curves.tried(rows_of(curves.pieces, rows), near[rows]):
+            costs(rows, t)
     # beside a kink or a limit the motion grows on both sides: it is the nearest posture
-    p = rows_of(curves.pieces, some)
-    beside = [costs(some, p.at + tol.PROBE * (end - p.at)) for end in (p.low, p.high)]
-    some = some[np.minimum(*beside) < motion(arm, p.start, near[some])]
-    p = rows_of(curves.pieces, some)
-    low, high, middle, value = golden_section(lambda t: costs(some, t), p.low, p.high, curves.steps)
-    if len(some):  # in what is left: by a secant where a joint passes its near, a kink of the motion; by a parabola
+    p = rows_of(curves.pieces, rows)
+    beside = [costs(rows, p.at + tol.PROBE * (end - p.at)) for end in (p.low, p.high)]
+    rows = rows[np.minimum(*beside) < motion(arm, p.start, near[rows])]
+    p = rows_of(curves.pieces, rows)
+    low, high, middle, value = golden_section(lambda t: costs(rows, t), p.low, p.high, curves.steps)
+    if len(rows):  # in what is left: by a secant where a joint passes its near, a kink of the motion; by a parabola
         q = [curves.at(p, t)[0] for t in (low, high)]
-        ends = [end - near[some] for end in q]
+        ends = [end - near[rows] for end in q]
         passes = np.where(ends[0] * ends[1] < 0, np.abs(ends[1] - ends[0]), 0.0)
-        index = np.arange(len(some)), passes.argmax(axis=1)
+        index = np.arange(len(rows)), passes.argmax(axis=1)
         a, b = (end[index] for end in ends)
-        costs(some, np.where(a * b < 0, low + (high - low) * a / np.where(a == b, 1.0, a - b), low))
-        at_low, at_high = (motion(arm, end, near[some]) for end in q)
-        costs(some, vertex(low, middle, high, at_low, value, at_high))
+        costs(rows, np.where(a * b < 0, low + (high - low) * a / np.where(a == b, 1.0, a - b), low))
+        at_low, at_high = (motion(arm, end, near[rows]) for end in q)
+        costs(rows, vertex(low, middle, high, at_low, value, at_high))
     return best
 
 
@@ -251,31 +251,31 @@ def _with_near(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> A
     middle, half = 0.5 * (pieces.a + pieces.b), 0.5 * (pieces.b - pieces.a)
     inside = np.abs(wrapped(near[:, joint] - middle)) <= half + tol.SAME
     cost = np.where(pieces.legal & inside, motion(arm, q, near), np.inf)
-    out = q.copy()
+    placed = q.copy()
     for row in np.unique(pieces.row).tolist():
-        own = np.flatnonzero(pieces.row == row)
-        best = own[cost[own].argmin()]
+        members = np.flatnonzero(pieces.row == row)
+        best = members[cost[members].argmin()]
         if np.isfinite(cost[best]):
-            out[best] = near[best]
-    return out
+            placed[best] = near[best]
+    return placed
 
 
 def _with_free_postures(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
     """The nearest postures (P, n) of legal pieces that hit nothing, to `FREE`; where there is none, q as it is."""
-    out, pieces = q.copy(), curves.pieces
+    freed, pieces = q.copy(), curves.pieces
     for p in np.flatnonzero(pieces.legal & ~hits_nothing(arm, q)):
         a, b = pieces.first[p], pieces.last[p]
         t = np.linspace(a, b, max(int((b - a) / FREE) + 2, 2))[1:-1]
-        there, legal = curves.at(rows_of(pieces, np.full(len(t), p)), t)
-        good = legal & hits_nothing(arm, np.nan_to_num(there))
+        postures, legal = curves.at(rows_of(pieces, np.full(len(t), p)), t)
+        good = legal & hits_nothing(arm, np.nan_to_num(postures))
         if good.any():
-            out[p] = there[np.where(good, motion(arm, there, near[p]), np.inf).argmin()]
-    return out
+            freed[p] = postures[np.where(good, motion(arm, postures, near[p]), np.inf).argmin()]
+    return freed
 
 
 def intervals_out(s: Solutions) -> list[list[list[float]]] | None:
     """Intervals (N, B, 2) of the redundant joint [deg]; None where no joint is."""
     if s.interval is None:
         return None
-    found: list[list[list[float]]] = units.angles_out(s.interval).tolist()
-    return found
+    degrees: list[list[list[float]]] = units.angles_out(s.interval).tolist()
+    return degrees

@@ -39,77 +39,77 @@ class Followed(NamedTuple):
         parts, short, complete = [none(find.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
         of = boundaries(find.arm) if find.free.joint == find.arm.n - 1 else None
         if of is not None:
-            at, known = places(of, find.target)
-            if len(some := np.flatnonzero(known)):
-                own, short[some], complete[some] = _between_places(find.of(some), at[some])
-                parts.append(own._replace(row=some[own.row]))
-        if len(some := np.flatnonzero(~complete)):
-            own, short[some] = _sampled(find.of(some), 1)
-            parts.append(own._replace(row=some[own.row]))
+            angles, decided = places(of, find.target)
+            if len(rows := np.flatnonzero(decided)):
+                pieces, short[rows], complete[rows] = _between_places(find.of(rows), angles[rows])
+                parts.append(pieces._replace(row=rows[pieces.row]))
+        if len(rows := np.flatnonzero(~complete)):
+            pieces, short[rows] = _sampled(find.of(rows), 1)
+            parts.append(pieces._replace(row=rows[pieces.row]))
         return cls(find, stacked(parts), short, complete)
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
         """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: where
         near has the joint, and beside that sample."""
-        own = near[:, self.find.free.joint]
-        own = own + np.round((pieces.at - own) / (2 * np.pi)) * 2 * np.pi
-        return [np.where((own >= pieces.a) & (own <= pieces.b), own, pieces.at), pieces.low, pieces.high]
+        value = near[:, self.find.free.joint]
+        value = value + np.round((pieces.at - value) / (2 * np.pi)) * 2 * np.pi
+        return [np.where((value >= pieces.a) & (value <= pieces.b), value, pieces.at), pieces.low, pieces.high]
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Turning.at`."""
         return self.find.one(pieces.row, pieces.branch, parameter)
 
 
-def _between_places(find: Follower, at: Array) -> tuple[Pieces, Bool, Bool]:
-    """Pieces of those of some targets whose curves change at places (N, V) alone; which are short (N,), and which
+def _between_places(find: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
+    """Pieces of those of some targets whose curves change at angles (N, V) alone; which are short (N,), and which
     targets those are (N,)."""
-    found = seen(find, over_a_turn(EVEN), at)
-    changes = found.crossed.at, found.gone.at
-    legal, there = ends = [place_between(found.t, one, at) for one in changes]
-    crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(found.crossed.rooms).any(axis=1))
+    shown = seen(find, over_a_turn(EVEN), angles)
+    changes = shown.crossed.at, shown.gone.at
+    legal, present = ends = [place_between(shown.t, change, angles) for change in changes]
+    crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(shown.crossed.rooms).any(axis=1))
     legal[crossing] = crossed_at(find, rows_of(changes[0], crossing), legal[crossing])
-    explained = np.ones(len(at), bool)
-    for one, end in zip(changes, ends, strict=True):
-        explained[one.row[np.isinf(end)]] = False
-    intervals, families = (rows_of(runs, explained[runs.row]) for runs in (found.legal, found.there))
-    pieces = _of_runs(found.t, intervals, True, changes[0], legal)
-    without = _of_runs(found.t, rows_of(families, ~families.within), False, changes[1], there)
-    return stacked([pieces, without]), found.short, explained
+    explained = np.ones(len(angles), bool)
+    for change, end in zip(changes, ends, strict=True):
+        explained[change.row[np.isinf(end)]] = False
+    intervals, families = (rows_of(runs, explained[runs.row]) for runs in (shown.legal, shown.there))
+    pieces = _of_runs(shown.t, intervals, True, changes[0], legal)
+    without = _of_runs(shown.t, rows_of(families, ~families.within), False, changes[1], present)
+    return stacked([pieces, without]), shown.short, explained
 
 
 def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
     """Pieces of some targets, and which are short: one of which something may be hidden between samples, or without an
     answer, is asked again: all of a nearly stretched arm lie within a degree."""
-    found = seen(find, over_a_turn(SAMPLES * finer))
-    pieces, short = _pieces(find, found), found.short
+    shown = seen(find, over_a_turn(SAMPLES * finer))
+    pieces, short = _pieces(find, shown), shown.short
     if finer == 1:
         near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + tol.SOLUTION)
-        lost = found.lost & near_enough
-        for more, which in ((CLOSER, found.hidden & ~lost), (FINER, lost)):
-            again = np.flatnonzero(which)
-            each = max(SAMPLES // more, 1)
-            for some in (again[k : k + each] for k in range(0, len(again), each)):
-                part, few = _sampled(find.of(some), more)
-                kept, new = rows_of(pieces, ~np.isin(pieces.row, some)), part._replace(row=some[part.row])
-                pieces = stacked([kept, new])
-                short[some] = few
+        lost = shown.lost & near_enough
+        for more, asked_again in ((CLOSER, shown.hidden & ~lost), (FINER, lost)):
+            again = np.flatnonzero(asked_again)
+            at_once = max(SAMPLES // more, 1)
+            for rows in (again[k : k + at_once] for k in range(0, len(again), at_once)):
+                part, part_short = _sampled(find.of(rows), more)
+                others, closer = rows_of(pieces, ~np.isin(pieces.row, rows)), part._replace(row=rows[part.row])
+                pieces = stacked([others, closer])
+                short[rows] = part_short
     return pieces, short
 
 
-def _pieces(find: Follower, found: Seen) -> Pieces:
+def _pieces(find: Follower, shown: Seen) -> Pieces:
     """All pieces of the curves of some targets."""
-    t, K = found.t, found.t.shape[1]
-    places = places_of(find, found)
-    hidden, stretch = hidden_stretches(find, t, found.turns)
+    t, K = shown.t, shown.t.shape[1]
+    places = places_of(find, shown)
+    hidden, stretch = hidden_stretches(find, t, shown.turns)
     gaps = hidden.set_before
     more, short = rows_of(hidden, ~gaps), places.short
-    parts = [_of_runs(t, found.legal, True, found.crossed.at, places.legal)]
-    there = found.there
-    of = there.row[:, None] == np.append(hidden.row, short.row)
-    of &= there.branch[:, None] == np.append(hidden.branch, short.branch)
-    of &= (np.append(hidden.k, short.sample(0, K)) - there.first[:, None]) % K < there.length[:, None]
-    families = _of_runs(t, there, False, found.gone.at, places.there)
-    parts.append(rows_of(families, ~(there.within | of.any(axis=1))))  # without those that hold one of these
+    parts = [_of_runs(t, shown.legal, True, shown.crossed.at, places.legal)]
+    present = shown.there
+    of = present.row[:, None] == np.append(hidden.row, short.row)
+    of &= present.branch[:, None] == np.append(hidden.branch, short.branch)
+    of &= (np.append(hidden.k, short.sample(0, K)) - present.first[:, None]) % K < present.length[:, None]
+    families = _of_runs(t, present, False, shown.gone.at, places.there)
+    parts.append(rows_of(families, ~(present.within | of.any(axis=1))))  # without those that hold one of these
     parts[0] = _without_gaps(find, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
     row, branch = np.append(short.row, more.row), np.append(short.branch, more.branch)
     if len(row):
@@ -123,15 +123,15 @@ def _pieces(find: Follower, found: Seen) -> Pieces:
 def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -> Pieces:
     """The pieces that hold runs of samples at t (N, K); ends: where changes are."""
     K, best = t.shape[1], runs.first + runs.best
-    low, at, high = (value_at(t, runs.row, best + side) for side in (-1, 0, 1))
-    a, b = np.full(len(at), -np.pi), np.full(len(at), np.pi)
-    some = np.flatnonzero(runs.length < K)
-    row, first, branch, middle = runs.row[some], runs.first[some], runs.branch[some], at[some]
+    low, centre, high = (value_at(t, runs.row, best + side) for side in (-1, 0, 1))
+    a, b = np.full(len(centre), -np.pi), np.full(len(centre), np.pi)
+    cut = np.flatnonzero(runs.length < K)
+    row, first, branch, middle = runs.row[cut], runs.first[cut], runs.branch[cut], centre[cut]
     begin = ends[number_of(changes, row, (first - 1) % K, branch, K)]
-    end = ends[number_of(changes, row, (first + runs.length[some] - 1) % K, branch, K)]
-    a[some], b[some] = middle - (middle - begin) % (2 * np.pi), middle + (end - middle) % (2 * np.pi)
-    low[some], high[some] = np.clip(low[some], a[some], b[some]), np.clip(high[some], a[some], b[some])
-    return Pieces(runs.row, runs.branch, np.full(len(at), legal), a, b, a, b, low, at, high, runs.start)
+    end = ends[number_of(changes, row, (first + runs.length[cut] - 1) % K, branch, K)]
+    a[cut], b[cut] = middle - (middle - begin) % (2 * np.pi), middle + (end - middle) % (2 * np.pi)
+    low[cut], high[cut] = np.clip(low[cut], a[cut], b[cut]), np.clip(high[cut], a[cut], b[cut])
+    return Pieces(runs.row, runs.branch, np.full(len(centre), legal), a, b, a, b, low, centre, high, runs.start)
 
 
 def _without_gaps(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
@@ -140,18 +140,18 @@ def _without_gaps(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) ->
         turns = 2 * np.pi * np.round((0.5 * (pieces.a + pieces.b) - begin) / (2 * np.pi))
         inside = (pieces.row == row) & (pieces.branch == branch) & (pieces.a < begin + turns) & (end + turns < pieces.b)
         for p in np.flatnonzero(inside):
-            one = rows_of(pieces, np.array([p]))
+            piece = rows_of(pieces, np.array([p]))
             before, behind = np.array([begin + turns[p]]), np.array([end + turns[p]])
-            sides = [(one.a, before), (behind, one.b)]
+            sides = [(piece.a, before), (behind, piece.b)]
             if pieces.b[p] - pieces.a[p] >= 2 * np.pi:  # a whole turn is one piece that begins behind the gap
                 sides = [(behind, before + 2 * np.pi)]
             parts = [rows_of(pieces, np.arange(len(pieces.row)) != p)]
             for a, b in sides:
-                holds = (a <= one.at) & (one.at <= b)
-                at = np.where(holds, one.at, 0.5 * (a + b))
-                low, high = (np.clip(one.low, a, b), np.clip(one.high, a, b)) if holds else (a, b)
-                start, _ = find.one(one.row, one.branch, at)
-                parts.append(one._replace(a=a, b=b, first=a, last=b, low=low, at=at, high=high, start=start))
+                holds = (a <= piece.at) & (piece.at <= b)
+                centre = np.where(holds, piece.at, 0.5 * (a + b))
+                low, high = (np.clip(piece.low, a, b), np.clip(piece.high, a, b)) if holds else (a, b)
+                start, _ = find.one(piece.row, piece.branch, centre)
+                parts.append(piece._replace(a=a, b=b, first=a, last=b, low=low, at=centre, high=high, start=start))
             pieces = stacked(parts)
             break
     return pieces

@@ -47,16 +47,16 @@ def motion_of_joint(arm: Arm, j: int, value: Array, near: Array) -> Array:
     return way if arm.prismatic[j] else way * (180 / np.pi)
 
 
-def runs(good: Bool, new: Bool) -> tuple[Int, Int, Int]:
-    """Runs of good (M, K), round the end of the last axis; new (M, K): a run that comes to this sample ends before it.
+def runs(good: Bool, breaks: Bool) -> tuple[Int, Int, Int]:
+    """Runs of good (M, K), round the end of the last axis; breaks (M, K): a run that comes there ends before it.
 
     Returns of each its row, first sample and length. A run of all samples begins at the first one.
     """
     M, K = good.shape
-    begins = good & (new | ~np.roll(good, 1, axis=1))
-    begins[:, 0] |= (good & ~new).all(axis=1)
+    begins = good & (breaks | ~np.roll(good, 1, axis=1))
+    begins[:, 0] |= (good & ~breaks).all(axis=1)
     row, first = np.nonzero(begins)
-    stops = np.flatnonzero(new | ~good)
+    stops = np.flatnonzero(breaks | ~good)
     # the next stop behind the first sample, or round the end the first one of the row
     begin, end = np.searchsorted(stops, K * np.arange(M)), np.append(stops, M * K)
     behind = end[np.searchsorted(stops, K * row + first + 1)]
@@ -83,8 +83,8 @@ def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
     costs = cost.ravel()[np.repeat(curve * K, count) + np.where(sample < K, sample, sample - K)]
     begin = np.cumsum(count) - count
     least = np.minimum.reduceat(costs, begin)
-    where = np.flatnonzero(costs == np.repeat(least, count))
-    return np.asarray(index[where[np.searchsorted(where, begin)]])
+    least_at = np.flatnonzero(costs == np.repeat(least, count))
+    return np.asarray(index[least_at[np.searchsorted(least_at, begin)]])
 
 
 def margin(arm: Arm, q: Array) -> Array:
@@ -100,9 +100,9 @@ def within_limits(arm: Arm, j: int, value: Array, room: Array) -> None:
     lower, upper = float(arm.lower[j]), float(arm.upper[j])
     if not np.isfinite(lower) or not np.isfinite(upper) or (not arm.prismatic[j] and upper - lower >= 2 * np.pi):
         return
-    off = value - 0.5 * (lower + upper)
-    off = np.abs(off if arm.prismatic[j] else wrapped(off))
-    np.minimum(room, 0.5 * (upper - lower) - off, out=room)
+    away = value - 0.5 * (lower + upper)
+    away = np.abs(away if arm.prismatic[j] else wrapped(away))
+    np.minimum(room, 0.5 * (upper - lower) - away, out=room)
 
 
 def turning(values: Array, t: Array) -> Bool:
@@ -112,10 +112,10 @@ def turning(values: Array, t: Array) -> Bool:
     following = np.roll(values, -1, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         slope = (following - values) / width
-        on = values + width * np.roll(slope, 1, axis=1)
+        ahead = values + width * np.roll(slope, 1, axis=1)
         back = following - width * np.roll(slope, -1, axis=1)
         up, down = (values < 0) & (following < 0), (values > 0) & (following > 0)
-        return np.asarray((up & (on > 0) & (back > 0)) | (down & (on < 0) & (back < 0)))
+        return np.asarray((up & (ahead > 0) & (back > 0)) | (down & (ahead < 0) & (back < 0)))
 
 
 def golden_section(
@@ -129,9 +129,9 @@ def golden_section(
     for _ in range(steps if len(low) else 0):
         go = at_left <= at_right
         low, high = np.where(go, low, left), np.where(go, right, high)
-        new = np.where(go, high - ratio * (high - low), low + ratio * (high - low))
-        at_new = cost(new)
-        left, right = np.where(go, new, right), np.where(go, left, new)
+        trial = np.where(go, high - ratio * (high - low), low + ratio * (high - low))
+        at_new = cost(trial)
+        left, right = np.where(go, trial, right), np.where(go, left, trial)
         at_left, at_right = np.where(go, at_new, at_right), np.where(go, at_left, at_new)
     return low, high, np.where(at_left <= at_right, left, right), np.minimum(at_left, at_right)
 

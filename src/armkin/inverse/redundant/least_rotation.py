@@ -73,17 +73,17 @@ class _Tangent(NamedTuple):
     slope: Array  # (M, n) of the Lagrangian
 
 
-def _tangent(at: _Local, held: Bool) -> _Tangent:
+def _tangent(local: _Local, held: Bool) -> _Tangent:
     n = held.shape[1]
-    J = np.where(held[:, None, :], 0.0, at.J)
+    J = np.where(held[:, None, :], 0.0, local.J)
     U, S, Vt = np.linalg.svd(J, full_matrices=False)
     gain = np.where(S > tol.WEAK, 1.0 / np.maximum(S, tol.WEAK), 0.0)
     back = np.einsum("mkn,mk,mak->mna", Vt, gain, U)
     rows = Vt * (S > tol.WEAK)[:, :, None]
     P = np.eye(n) * ~held[:, :, None] - rows.swapaxes(1, 2) @ rows
-    multipliers = -np.einsum("mna,mn->ma", back, np.where(held, 0.0, at.g))
-    slope = at.g + np.einsum("man,ma->mn", at.J, multipliers)
-    H = at.H + np.einsum("maij,ma->mij", at.bend, multipliers)
+    multipliers = -np.einsum("mna,mn->ma", back, np.where(held, 0.0, local.g))
+    slope = local.g + np.einsum("man,ma->mn", local.J, multipliers)
+    H = local.H + np.einsum("maij,ma->mij", local.bend, multipliers)
     return _Tangent(P, back, P @ H @ P, slope)
 
 
@@ -99,28 +99,28 @@ class _Move(NamedTuple):
     blocked: Bool  # (M,) a limit takes hold first
 
 
-def _move(box: Box, at: _Local, x: Array, held: Bool) -> _Move:
+def _move(box: Box, local: _Local, x: Array, held: Bool) -> _Move:
     """Newton's step of postures x (M, n), at limits held (M, n), which lets go of one of them where it is to."""
     low, high = x <= box.lower, x >= box.upper
     held &= low | high
-    tangent = _tangent(at, held)
-    across = np.einsum("mij,mj->mi", tangent.P, at.g)
+    tangent = _tangent(local, held)
+    across = np.einsum("mij,mj->mi", tangent.P, local.g)
     flat = np.abs(across).max(axis=1) <= tol.STATIONARY
     # at rest: a limit whose multiplier pulls away from it lets go, the strongest first
     pull = np.where(held & low, -tangent.slope, np.where(held & high, tangent.slope, -np.inf))
     leaves = flat & (pull.max(axis=1) > tol.STATIONARY)
     values, vectors = np.linalg.eigh(tangent.H)
-    there = np.abs(at.missed).max(axis=1) <= tol.SOLUTION * tol.SAME * 10
-    rest = flat & ~leaves & (values[:, 0] > -tol.LEVEL_CURVATURE) & there
+    placed = np.abs(local.missed).max(axis=1) <= tol.SOLUTION * tol.SAME * 10
+    minimum = flat & ~leaves & (values[:, 0] > -tol.LEVEL_CURVATURE) & placed
     held[leaves, pull.argmax(axis=1)[leaves]] = False
-    saddle = flat & ~leaves & ~rest
+    saddle = flat & ~leaves & ~minimum
     along = np.einsum("mij,mi->mj", vectors, -across)
     step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), tol.LEVEL_CURVATURE))
     step[saddle] = vectors[saddle, :, 0] * 0.05
-    step = np.where(held, 0.0, step + np.einsum("mna,ma->mn", tangent.back, at.missed))
+    step = np.where(held, 0.0, step + np.einsum("mna,ma->mn", tangent.back, local.missed))
     pressed = ((low & (step < 0)) | (high & (step > 0))) & ~held
     held |= pressed
-    return _Move(step, tangent.back, pressed, flat, rest, leaves, pressed.any(axis=1) & ~leaves)
+    return _Move(step, tangent.back, pressed, flat, minimum, leaves, pressed.any(axis=1) & ~leaves)
 
 
 def _tried(arm: Arm, box: Box, x: Array, goal: Array, move: _Move, trust: Array) -> tuple[Array, Bool]:
@@ -144,21 +144,21 @@ def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
     q, M = q.copy(), len(q)
     held = np.zeros(q.shape, bool)
     trust = np.full(M, 0.5)
-    done = np.zeros(M, bool)
+    arrived = np.zeros(M, bool)
     active = np.arange(M)
     for _ in range(STEPS):
         if not len(active):
             break
         x, goal, hold = q[active], target[active], held[active]
-        at = _local(arm, box, x, goal)
-        move = _move(box, at, x, hold)
-        done[active[move.rest]] = True
+        local = _local(arm, box, x, goal)
+        move = _move(box, local, x, hold)
+        arrived[active[move.rest]] = True
         held[active] = hold
         trial, hit = _tried(arm, box, x, goal, move, trust[active])
         T = fk(arm, trial)
         missed = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
         f = 0.5 * (3.0 - np.einsum("mij,mij->m", T[:, :3, :3], goal[:, :3, :3]))
-        before = at.f + 10.0 * np.linalg.norm(at.missed, axis=1)
+        before = local.f + 10.0 * np.linalg.norm(local.missed, axis=1)
         better = (f + 10.0 * missed <= before + tol.SOLUTION * tol.SAME) & ~move.rest & ~move.leaves
         better &= ~(move.blocked & move.flat)
         go = active[better]
@@ -168,15 +168,15 @@ def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
         refused = active[~better & ~move.rest & ~move.blocked & ~move.leaves]
         trust[refused] *= 0.25
         active = active[~move.rest & (trust[active] > tol.SOLUTION)]
-    return q, done
+    return q, arrived
 
 
 def flat_minima(arm: Arm, q: Array, target: Array) -> Bool:
     """Whether minima (M, n) of one target lie on a curve of such."""
     box = box_of(arm)
-    at = _local(arm, box, q, np.broadcast_to(target, (len(q), 4, 4)))
+    local = _local(arm, box, q, np.broadcast_to(target, (len(q), 4, 4)))
     held = (q <= box.lower) | (q >= box.upper)
-    tangent = _tangent(at, held)
+    tangent = _tangent(local, held)
     values, vectors = np.linalg.eigh(tangent.H)
     inside = np.linalg.norm(tangent.P @ vectors, axis=1) > 0.5
     return np.asarray((inside & (np.abs(values) <= tol.LEVEL_CURVATURE)).any(axis=1))

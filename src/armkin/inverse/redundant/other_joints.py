@@ -53,9 +53,9 @@ class Sampled(NamedTuple):
 
     def postures(self, row: Int, k: Int) -> Array:
         """All branches (M, B, n) at samples k (M,) of targets (M,), nan where there is none."""
-        some = row * self.valid.shape[1] + k
-        shape = math.prod(self.axes), len(some)
-        columns = [np.broadcast_to(v[..., some], (*self.axes, len(some))).reshape(shape) for v in self.values]
+        samples = row * self.valid.shape[1] + k
+        shape = math.prod(self.axes), len(samples)
+        columns = [np.broadcast_to(v[..., samples], (*self.axes, len(samples))).reshape(shape) for v in self.values]
         q = np.stack(columns).transpose(2, 1, 0)
         np.copyto(q, np.nan, where=~self.valid[row, k][:, :, None])
         return q
@@ -64,14 +64,14 @@ class Sampled(NamedTuple):
 @lru_cache(maxsize=64)
 def _recorded(arm: Arm, free: Redundancy) -> tuple[StraightLineCode, tuple[int, ...]]:
     """The closed form of the others with the redundant joint as an argument: of a target's entries and its pair."""
-    rest = recorded(free.rest, solver(free.rest, free.task.name)[0], free.geometry)
+    others = recorded(free.rest, solver(free.rest, free.task.name)[0], free.geometry)
     inputs = 12 if free.task.orientation == "full" else len(free.task.labels)
 
     def formula(x: list[Entry]) -> list[Entry]:
         goal = moved_entries(arm, free, x[:inputs], Pair(x[inputs], x[inputs + 1]))
-        return rest.candidates(goal, [None] * rest.arm.n)
+        return others.candidates(goal, [None] * others.arm.n)
 
-    return StraightLineCode(formula, inputs + 2), rest.axes
+    return StraightLineCode(formula, inputs + 2), others.axes
 
 
 def over_a_turn(count: int) -> Array:
@@ -88,9 +88,9 @@ class Follower(NamedTuple):
     target: Array
     near: Array
 
-    def of(self, some: Int) -> Follower:
+    def of(self, rows: Int) -> Follower:
         """For some of the targets."""
-        return self._replace(target=self.target[some], near=self.near[some])
+        return self._replace(target=self.target[rows], near=self.near[rows])
 
     def found(self, rows: Int, t: Array) -> Array:
         """Branches (M, B, n) of targets (M,) at values t (M,), of a closed form each in the column of its index, nan
@@ -106,16 +106,16 @@ class Follower(NamedTuple):
     def candidates(self, rows: Int, t: Array) -> tuple[Array, Array]:
         """Of a closed form all branches (M, B, n), real or not, and what they miss (M, B)."""
         axes = _recorded(self.arm, self.free)[1]
-        out = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
-        missed = np.empty(out.shape[1:])
+        columns = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
+        missed = np.empty(columns.shape[1:])
         room: list[NDArray[Any]] = []
-        for some in slices(len(t), AT_A_TIME):
-            shape = (*axes, some.stop - some.start)
-            *values, miss, room = self._candidates(rows[some], t[some], room)
+        for part in slices(len(t), AT_A_TIME):
+            shape = (*axes, part.stop - part.start)
+            *values, miss, room = self._candidates(rows[part], t[part], room)
             for j, q in enumerate(values):
-                out[j, :, some] = np.broadcast_to(q, shape).reshape(-1, shape[-1])
-            missed[:, some] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
-        return out.transpose(2, 1, 0), np.sqrt(missed.T)
+                columns[j, :, part] = np.broadcast_to(q, shape).reshape(-1, shape[-1])
+            missed[:, part] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
+        return columns.transpose(2, 1, 0), np.sqrt(missed.T)
 
     def _candidates(self, rows: Int, t: Array, room: list[NDArray[Any]]) -> list[Any]:
         """The values of all joints and what they miss, squared, on their own branch axes before targets (M,); the
@@ -128,43 +128,43 @@ class Follower(NamedTuple):
         values.insert(self.free.joint, t)
         return [*values, miss, room]
 
-    def sampled(self, some: Int, t: Array, more: Array | None = None) -> Sampled:
+    def sampled(self, pick: Int, t: Array, more: Array | None = None) -> Sampled:
         """Some of the targets (S,), of a closed form, at all of t (K,) and at more values (S, M), inf where there are
         fewer; by default between those at which more may happen."""
-        rows, values = np.repeat(some, len(t)), np.tile(t, len(some))
+        rows, values = np.repeat(pick, len(t)), np.tile(t, len(pick))
         axes = _recorded(self.arm, self.free)[1]
         *columns, missed, _ = self._candidates(rows, values, [])
         if more is None:
             more = _values_between(self.arm, columns, missed, axes, t)
         real = np.isfinite(more)
-        *others, other, _ = self._candidates(np.broadcast_to(some[:, None], more.shape)[real], more[real], [])
-        every = np.concatenate([np.tile(t, (len(some), 1)), np.where(real, more, t[-1])], axis=1)
+        *added, added_miss, _ = self._candidates(np.broadcast_to(pick[:, None], more.shape)[real], more[real], [])
+        every = np.concatenate([np.tile(t, (len(pick), 1)), np.where(real, more, t[-1])], axis=1)
         order = np.argsort(every, axis=1, kind="stable")
 
         def merged(first: Array, second: Array) -> Array:
             """With the values between; where there is none the last sample is there once more."""
             axes, (S, K) = first.shape[:-1], every.shape
-            out = np.empty((*axes, S, K))
-            out[..., : len(t)] = first.reshape(*axes, S, len(t))
-            out[..., len(t) :] = out[..., len(t) - 1, None]
-            out[..., len(t) :][..., real] = second
-            return np.take_along_axis(out, order.reshape(*[1] * len(axes), S, K), axis=-1).reshape(*axes, -1)
+            samples = np.empty((*axes, S, K))
+            samples[..., : len(t)] = first.reshape(*axes, S, len(t))
+            samples[..., len(t) :] = samples[..., len(t) - 1, None]
+            samples[..., len(t) :][..., real] = second
+            return np.take_along_axis(samples, order.reshape(*[1] * len(axes), S, K), axis=-1).reshape(*axes, -1)
 
-        columns = [merged(*pair) for pair in zip(columns, others, strict=True)]
-        return self._within(some, np.take_along_axis(every, order, axis=1), columns, merged(missed, other), axes)
+        columns = [merged(*pair) for pair in zip(columns, added, strict=True)]
+        return self._within(pick, np.take_along_axis(every, order, axis=1), columns, merged(missed, added_miss), axes)
 
-    def _within(self, some: Int, t: Array, columns: list[Array], missed: Array, axes: tuple[int, ...]) -> Sampled:
+    def _within(self, pick: Int, t: Array, columns: list[Array], missed: Array, axes: tuple[int, ...]) -> Sampled:
         """Values of all joints on their own branch axes before samples of some of the targets, at legal copies."""
-        there = missed <= tol.ACCEPTED**2
-        near = self.near[np.repeat(some, t.shape[1])].T
+        present = missed <= tol.ACCEPTED**2
+        near = self.near[np.repeat(pick, t.shape[1])].T
         shape = (*axes, t.size)
-        legal, cost, room = there, np.zeros(()), np.full(shape, 2 * np.pi)
+        legal, cost, room = present, np.zeros(()), np.full(shape, 2 * np.pi)
         for j in sorted(range(len(columns)), key=lambda j: columns[j].size):  # those on few branch axes first
-            columns[j], ok = nearest_of_joint(self.arm, j, columns[j], near[j])
-            legal, cost = legal & ok, cost + motion_of_joint(self.arm, j, columns[j], near[j])
+            columns[j], fits = nearest_of_joint(self.arm, j, columns[j], near[j])
+            legal, cost = legal & fits, cost + motion_of_joint(self.arm, j, columns[j], near[j])
             within_limits(self.arm, j, columns[j], room)
-        room = np.where(there, room, np.nan)
-        every = (there, legal, room, np.where(there, cost, np.inf), missed)
+        room = np.where(present, room, np.nan)
+        every = (present, legal, room, np.where(present, cost, np.inf), missed)
         dense = (np.broadcast_to(x, shape).reshape(-1, *t.shape).transpose(1, 2, 0) for x in every)
         return Sampled(t, columns, axes, *dense)
 
@@ -175,8 +175,8 @@ class Follower(NamedTuple):
 
         def picked(values: Array) -> Array:
             axes = values.shape[:-1]
-            at = (k if size > 1 else 0 for k, size in zip(place[len(place) - len(axes) :], axes, strict=True))
-            return np.asarray(values[*at, np.arange(len(t))])
+            index = (k if size > 1 else 0 for k, size in zip(place[len(place) - len(axes) :], axes, strict=True))
+            return np.asarray(values[*index, np.arange(len(t))])
 
         q = np.stack([picked(values) for values in columns]).T
         q[~(picked(miss) <= tol.ACCEPTED**2)] = np.nan
@@ -184,10 +184,10 @@ class Follower(NamedTuple):
 
     def one(self, rows: Int, branch: Int, t: Array) -> tuple[Array, Bool]:
         """One branch each (M, n), at its nearest legal copy, nan where there is none; which are within limits (M,)."""
-        own = self.own(rows, branch, t)
-        there = ~np.isnan(own[:, 0])
-        q, legal = nearest_row(self.arm, np.where(there[:, None], own, 0.0), self.near[rows])
-        return np.where(there[:, None], q, np.nan), legal & there
+        postures = self.own(rows, branch, t)
+        present = ~np.isnan(postures[:, 0])
+        q, legal = nearest_row(self.arm, np.where(present[:, None], postures, 0.0), self.near[rows])
+        return np.where(present[:, None], q, np.nan), legal & present
 
 
 def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[int, ...], t: Array) -> Array:
@@ -201,7 +201,7 @@ def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[i
     def by_target(x: Array) -> Array:
         return x.reshape(*x.shape[:-1], *shape[-2:])
 
-    there = by_target(missed) <= tol.ACCEPTED**2
+    present = by_target(missed) <= tol.ACCEPTED**2
     room, may, crossed = np.full(shape, 2 * np.pi), np.zeros(shape, bool), np.zeros(shape, np.int8)
     for j, column in enumerate(columns):
         left = np.full(column.shape, 2 * np.pi)
@@ -210,10 +210,10 @@ def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[i
         np.minimum(room, left, out=room)
         may |= _may_touch(left)
         crossed += (left < 0) != _next(left < 0)
-    room = np.where(there, room, -np.inf)
+    room = np.where(present, room, -np.inf)
     room = np.maximum(room, _next(room))
-    gone = ~there & ~_next(there)
-    ends = there != _next(there)
+    gone = ~present & ~_next(present)
+    ends = present != _next(present)
     hidden = gone & _may_touch(np.sqrt(by_target(missed)))
     limits = ~gone & ~ends & (may | (crossed > 1)) & (room > -BESIDE)
     often = (limits | (ends & (room > -ASIDE)) | hidden).sum(axis=tuple(range(len(axes))))
@@ -231,12 +231,12 @@ def _next(x: NDArray[Any]) -> NDArray[Any]:
 
 def _may_touch(left: Array) -> Bool:
     """Whether what is left (..., K) may come to nothing and back between a sample and the next."""
-    out, values, K = np.abs(_next(left) - left) > FAST, left.ravel(), left.shape[-1]
-    some = np.flatnonzero(np.abs(values) < NEAR)
-    k = some % K
-    before, now, then, behind = (values[some - k + (k + offset) % K] for offset in (-1, 0, 1, 2))
-    step = then - now
-    bend = SAFE * np.maximum(np.abs(step - (now - before)), np.abs((behind - then) - step))
-    least = np.minimum(np.abs(now), np.abs(then))
-    out.ravel()[some] |= (least < bend / 8) & (np.abs(step) < bend / 2)
-    return out
+    touches, values, K = np.abs(_next(left) - left) > FAST, left.ravel(), left.shape[-1]
+    near = np.flatnonzero(np.abs(values) < NEAR)
+    k = near % K
+    before, first, second, behind = (values[near - k + (k + offset) % K] for offset in (-1, 0, 1, 2))
+    step = second - first
+    bend = SAFE * np.maximum(np.abs(step - (first - before)), np.abs((behind - second) - step))
+    least = np.minimum(np.abs(first), np.abs(second))
+    touches.ravel()[near] |= (least < bend / 8) & (np.abs(step) < bend / 2)
+    return touches

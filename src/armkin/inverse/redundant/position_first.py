@@ -63,51 +63,51 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
     task = task_for(arm, "pose")
     goal, lead, rounding = read_targets(task, targets)
     close = read_near(arm, near, lead)
-    each = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
-    found: list[Array] = []
+    nears = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
+    lists: list[Array] = []
     for rows in slices(len(goal), AT_ONCE):
-        found += _of_chunk(ik, arm, task, goal[rows], each[rows])
+        lists += _of_chunk(ik, arm, task, goal[rows], nears[rows])
     if arm.keep_out:
-        found = [minima[np.argsort(~hits_nothing(arm, minima), kind="stable")] for minima in found]
-    B = max(map(len, found), default=0)
-    out = empty(len(goal), B, arm.n)
-    out.q[...], out.branch[...], out.status[...], out.complete[...] = np.nan, -1, Status.UNREACHABLE, False
-    for row, branch, minima in zip(out.q, out.branch, found, strict=True):
+        lists = [minima[np.argsort(~hits_nothing(arm, minima), kind="stable")] for minima in lists]
+    B = max(map(len, lists), default=0)
+    batch = empty(len(goal), B, arm.n)
+    batch.q[...], batch.branch[...], batch.status[...], batch.complete[...] = np.nan, -1, Status.UNREACHABLE, False
+    for row, branch, minima in zip(batch.q, batch.branch, lists, strict=True):
         row[: len(minima)], branch[: len(minima)] = minima, np.arange(len(minima))
-    out.valid[...] = out.within[...] = out.branch >= 0
-    q = out.q.reshape(-1, arm.n)
+    batch.valid[...] = batch.within[...] = batch.branch >= 0
+    q = batch.q.reshape(-1, arm.n)
     missing = residual(task, fk(arm, q), q, np.repeat(goal, B, axis=0)).reshape(len(goal), B, 6)
     angle = np.linalg.norm(missing[:, :, 3:], axis=2)
     if B:
-        out.status[out.valid[:, 0]] = Status.POSITION
-        off = np.hypot(np.linalg.norm(missing[:, 0, :3], axis=1) / arm.reach, angle[:, 0])
-        out.status[off <= tol.SOLUTION] = Status.EXACT
+        batch.status[batch.valid[:, 0]] = Status.POSITION
+        miss = np.hypot(np.linalg.norm(missing[:, 0, :3], axis=1) / arm.reach, angle[:, 0])
+        batch.status[miss <= tol.SOLUTION] = Status.EXACT
     names = tuple(f"minimum {i + 1}" for i in range(B))
     text = names, METHOD, f"minima of the rotation angle at the position, from {STARTS} postures"
-    s = as_solutions(Goals(arm, task, goal, each), close, lead, out, rounding, text)
+    s = as_solutions(Goals(arm, task, goal, nears), close, lead, batch, rounding, text)
     return replace(s, angle=angle.reshape(s.valid.shape))
 
 
 def closest_each(arm: Arm, targets: Array, near: Array) -> list[Closest]:
     """The postures within limits nearest to the positions of targets (N, 4, 4); near: (n,)."""
-    found = closest.closest_each(arm, targets[:, :3, 3], "xyz", near=near)
-    q = np.array([one.q for one in found]).reshape(-1, arm.n)
+    poses = closest.closest_each(arm, targets[:, :3, 3], "xyz", near=near)
+    q = np.array([pose.q for pose in poses]).reshape(-1, arm.n)
     missing = residual(task_for(arm, "pose"), fk(arm, q), q, targets)
-    return [replace(one, angle=float(np.linalg.norm(m[3:]))) for one, m in zip(found, missing, strict=True)]
+    return [replace(pose, angle=float(np.linalg.norm(m[3:]))) for pose, m in zip(poses, missing, strict=True)]
 
 
 def _of_chunk(ik: Ik, arm: Arm, task: Task, target: Array, near: Array) -> list[Array]:
     """The minima (B, n) of each of some targets, sorted."""
     box = box_of(arm)
     q, row = _seeds(arm, box, target, near)
-    q, done = descend(arm, box, q, target[row])
-    q, row = q[done], row[done]
+    q, arrived = descend(arm, box, q, target[row])
+    q, row = q[arrived], row[arrived]
     exact = _exact_branches(ik, arm, target, near)
-    out = []
+    minima = []
     for k, goal in enumerate(target):
-        some = np.concatenate([exact[k], nearest_row(arm, q[row == k], near[k][None])[0]])
-        out.append(_sorted_minima(arm, task, some, len(exact[k]), goal, near[k]))
-    return out
+        postures = np.concatenate([exact[k], nearest_row(arm, q[row == k], near[k][None])[0]])
+        minima.append(_sorted_minima(arm, task, postures, len(exact[k]), goal, near[k]))
+    return minima
 
 
 def _exact_branches(ik: Ik, arm: Arm, target: Array, near: Array) -> list[Array]:
@@ -135,13 +135,13 @@ def _sorted_minima(arm: Arm, task: Task, q: Array, exact: int, target: Array, ne
     order = np.lexsort((motion.round(tol.EQUAL), searched, level))
     q, level = q[order], level[order]
     flat = flat_minima(arm, q, target)
-    kept: list[int] = []
+    chosen: list[int] = []
     for i in range(len(q)):
-        same = [j for j in kept if level[j] == level[i]]
+        same = [j for j in chosen if level[j] == level[i]]
         apart = newton.wrapped_distance(arm, q[same], q[i])
         if not any(d <= tol.ONE_MINIMUM or (flat[i] and flat[j]) for d, j in zip(apart, same, strict=True)):
-            kept.append(i)
-    return q[kept]
+            chosen.append(i)
+    return q[chosen]
 
 
 @lru_cache(maxsize=16)
@@ -163,12 +163,12 @@ def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, Int]:
     point = target[:, :3, 3]
     apart = (tips * tips).sum(axis=1) - 2.0 * (point @ tips.T)
     nearest = pool[np.argpartition(apart, NEAREST, axis=1)[:, :NEAREST]]
-    own = np.clip(near, arm.lower, arm.upper)[:, None]
-    starts = np.concatenate([own, _farthest_apart(arm, nearest)], axis=1).reshape(-1, arm.n)
+    clipped = np.clip(near, arm.lower, arm.upper)[:, None]
+    starts = np.concatenate([clipped, _farthest_apart(arm, nearest)], axis=1).reshape(-1, arm.n)
     row = np.repeat(np.arange(len(target)), STARTS + 1)
     q, missed = _to_position(arm, box, starts, point[row], 24)
-    there = missed <= tol.SOLUTION
-    return q[there], row[there]
+    placed = missed <= tol.SOLUTION
+    return q[placed], row[placed]
 
 
 def _farthest_apart(arm: Arm, q: Array) -> Array:
@@ -179,8 +179,8 @@ def _farthest_apart(arm: Arm, q: Array) -> Array:
     taken = np.zeros((len(q), STARTS), int)
     apart = np.full(q.shape[:2], np.inf)
     for k in range(1, STARTS):
-        off = places - places[rows, taken[:, k - 1]][:, None]
-        apart = np.minimum(apart, np.einsum("nki,nki->nk", off, off))
+        away = places - places[rows, taken[:, k - 1]][:, None]
+        apart = np.minimum(apart, np.einsum("nki,nki->nk", away, away))
         taken[:, k] = apart.argmax(axis=1)
     return np.asarray(q[rows[:, None], taken])
 

@@ -100,55 +100,55 @@ class Seen(NamedTuple):
     t: Array  # (N, K) the samples' values of the joint
 
 
-def seen(find: Follower, t: Array, known: Array | None = None) -> Seen:
-    """What samples of all targets along t (K,) show, and others between them; known: all places where something may
+def seen(find: Follower, t: Array, places: Array | None = None) -> Seen:
+    """What samples of all targets along t (K,) show, and others between them; places: all places where something may
     change (N, V), with samples beside each."""
     N = len(find.target)
-    each = max(AT_A_TIME // len(t), 1)
-    some = (np.arange(k, min(k + each, N)) for k in range(0, max(N, 1), each))
-    if known is None:
-        return stacked([_seen(find.sampled(rows, t), rows, False) for rows in some])
-    more = on_both_sides(known)
-    return stacked([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in some])
+    at_once = max(AT_A_TIME // len(t), 1)
+    parts = (np.arange(k, min(k + at_once, N)) for k in range(0, max(N, 1), at_once))
+    if places is None:
+        return stacked([_seen(find.sampled(rows, t), rows, False) for rows in parts])
+    more = on_both_sides(places)
+    return stacked([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in parts])
 
 
-def place_between(t: Array, at: Changes, known: Array) -> Array:
-    """The known place (N, V) of a turn that each change (M,) between samples at t (N, K) is at; inf where there is
+def place_between(t: Array, changes: Changes, places: Array) -> Array:
+    """The one of places (N, V) of a turn that each change (M,) between samples at t (N, K) is at; inf where there is
     none."""
-    low, own = value_at(t, at.row, at.k)[:, None], known[at.row]
-    width = value_at(t, at.row, at.k + 1)[:, None] - low
+    low, nearby = value_at(t, changes.row, changes.k)[:, None], places[changes.row]
+    width = value_at(t, changes.row, changes.k + 1)[:, None] - low
     with np.errstate(invalid="ignore"):
-        on = np.remainder(own - low, 2 * np.pi)
-        return np.asarray(np.where(on <= width, low + on, np.inf).min(axis=1, initial=np.inf))
+        ahead = np.remainder(nearby - low, 2 * np.pi)
+        return np.asarray(np.where(ahead <= width, low + ahead, np.inf).min(axis=1, initial=np.inf))
 
 
-def _seen(found: Sampled, rows: Int, known: bool) -> Seen:
-    """What samples of some targets, rows (S,) of all, show; known: nothing happens between them that they do not."""
-    valid, legal, room = found.valid, found.legal, found.room
+def _seen(sampled: Sampled, rows: Int, sure: bool) -> Seen:
+    """What samples of some targets, rows (S,) of all, show; sure: nothing happens between them that they do not."""
+    valid, legal, room = sampled.valid, sampled.legal, sampled.room
     gone, crossed = Changes.of(valid), Changes.of(legal)
     K, every = valid.shape[1], np.arange(len(gone.row))
-    now, before = gone.sample(0, K), gone.sample(-1, K)
-    twin, apart = beside(found.postures(gone.row, now), gone.branch)[1:]
-    other = found.postures(gone.row, before)
-    earlier = np.where(np.isnan(other[every, gone.branch, 0]), np.nan, beside(other, gone.branch)[2])
-    own = gone.row, now, gone.branch
+    last, before = gone.sample(0, K), gone.sample(-1, K)
+    twin, apart = beside(sampled.postures(gone.row, last), gone.branch)[1:]
+    postures = sampled.postures(gone.row, before)
+    earlier = np.where(np.isnan(postures[every, gone.branch, 0]), np.nan, beside(postures, gone.branch)[2])
+    cells = gone.row, last, gone.branch
     rooms = [room[crossed.row, crossed.sample(k, K), crossed.branch] for k in (0, 1)]
-    row, k, branch = turns = np.nonzero(np.zeros_like(valid) if known else turning(room, found.t))
+    row, k, branch = turns = np.nonzero(np.zeros_like(valid) if sure else turning(room, sampled.t))
     hidden: Bool = np.zeros(len(rows), bool)
-    if not known:
-        off = np.where(valid, np.nan, -np.sqrt(found.missed))
-        hidden = np.asarray(turning(off, found.t).any(axis=(1, 2)))
-    there = _runs(found, valid, rows)
+    if not sure:
+        misses = np.where(valid, np.nan, -np.sqrt(sampled.missed))
+        hidden = np.asarray(turning(misses, sampled.t).any(axis=(1, 2)))
+    present = _runs(sampled, valid, rows)
     return Seen(
-        Gone(gone._replace(row=rows[gone.row]), twin, np.stack([apart, earlier], axis=1), room[own], legal[own]),
+        Gone(gone._replace(row=rows[gone.row]), twin, np.stack([apart, earlier], axis=1), room[cells], legal[cells]),
         Crossed(crossed._replace(row=rows[crossed.row]), np.stack(rooms, axis=1)),
         Turns(rows[row], k, branch, np.stack([room[turns], room[row, (k + 1) % K, branch]], axis=1)),
-        _runs(found, legal, rows),
-        there,
+        _runs(sampled, legal, rows),
+        present,
         hidden,
         np.asarray(~valid.any(axis=(1, 2))),
-        _all_short(found, there.row - rows[0], there.first, there.length) if len(rows) else np.zeros(0, bool),
-        found.t,
+        _all_short(sampled, present.row - rows[0], present.first, present.length) if len(rows) else np.zeros(0, bool),
+        sampled.t,
     )
 
 
@@ -164,26 +164,26 @@ def beside(q: Array, branch: Int) -> tuple[Array, Int, Array]:
     return away[index, nearest], nearest, apart[index, nearest]
 
 
-def _runs(found: Sampled, good: Bool, rows: Int) -> Runs:
+def _runs(sampled: Sampled, good: Bool, rows: Int) -> Runs:
     """Those of good samples (S, K, B)."""
     K, B = good.shape[1:]
-    samples, legal = (flags.transpose(0, 2, 1).reshape(-1, K) for flags in (good, found.legal))
-    cost = found.cost.transpose(0, 2, 1).reshape(-1, K)
+    samples, legal = (flags.transpose(0, 2, 1).reshape(-1, K) for flags in (good, sampled.legal))
+    cost = sampled.cost.transpose(0, 2, 1).reshape(-1, K)
     curve, first, length = runs(samples, np.zeros_like(samples))
     best = best_samples(cost, curve, first, length) if len(curve) else first
     row, branch = curve // B, curve % B
-    start = found.postures(row, (first + best) % K)[np.arange(len(row)), branch]
+    start = sampled.postures(row, (first + best) % K)[np.arange(len(row)), branch]
     return Runs(rows[row], branch, first, length, best, start, ~holding_none(legal, curve, first, length))
 
 
-def _all_short(found: Sampled, row: Int, first: Int, length: Int) -> Bool:
+def _all_short(sampled: Sampled, row: Int, first: Int, length: Int) -> Bool:
     """Whether no joint moves by REACH along any family of a target (S,), of which runs (R,) of samples are there."""
-    wide = value_at(found.t, row, first + length - 1) - value_at(found.t, row, first) > tol.REACH
-    short = np.asarray(found.valid.any(axis=(1, 2)))
+    wide = value_at(sampled.t, row, first + length - 1) - value_at(sampled.t, row, first) > tol.REACH
+    short = np.asarray(sampled.valid.any(axis=(1, 2)))
     short[row[wide]] = False
     for k in np.flatnonzero(short).tolist():
-        K, valid = found.valid.shape[1], found.valid[k]
-        q = found.postures(np.full(K, k), np.arange(K))
+        K, valid = sampled.valid.shape[1], sampled.valid[k]
+        q = sampled.postures(np.full(K, k), np.arange(K))
         step = np.abs(wrapped(np.roll(q, -1, axis=0) - q))
         way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
         short[k] = 2.0 * way.max(initial=0.0) < tol.REACH

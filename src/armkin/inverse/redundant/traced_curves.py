@@ -31,15 +31,15 @@ ROUNDS = 20  # of arcs, each to the next plane
 class _Curves:
     """Nodes of curves, and which halves are joined."""
 
-    def __init__(self, find: Follower, known: Int, q: Array) -> None:
+    def __init__(self, find: Follower, whose: Int, q: Array) -> None:
         self.find = find
-        self.planes, self.nodes, grid = answered(find, known, q)
+        self.planes, self.nodes, grid = answered(find, whose, q)
         self.partner = np.full(2 * len(self.nodes.row), -1)
         self.traced = np.zeros(len(self.partner), bool)  # a half that comes to nothing would do so again
         behind = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
         following = np.take_along_axis(grid, behind[:, :, None], axis=1)
-        both = (grid >= 0) & (following >= 0)
-        self._join(2 * grid[both], 2 * following[both] + 1)
+        adjacent = (grid >= 0) & (following >= 0)
+        self._join(2 * grid[adjacent], 2 * following[adjacent] + 1)
 
     def _add(self, nodes: Nodes) -> Int:
         """More nodes: their numbers."""
@@ -75,8 +75,8 @@ class _Curves:
             good = (points.step < tol.SAME_SEED) & (aside < ASIDE * size[left])
             failed[whose[left[~good]]] = True
             left = left[good]
-            new = self._add(Nodes(row[left], np.full(len(left), -1), rows_of(points, good)))
-            a, b = np.concatenate([a[left], 2 * new]), np.concatenate([2 * new + 1, b[left]])
+            middles = self._add(Nodes(row[left], np.full(len(left), -1), rows_of(points, good)))
+            a, b = np.concatenate([a[left], 2 * middles]), np.concatenate([2 * middles + 1, b[left]])
             whose = np.tile(whose[left], 2)
         a, b, whose = (np.concatenate(column) for column in zip(*links, strict=True)) if links else (a, b, whose)
         a, b = a[~failed[whose]], b[~failed[whose]]
@@ -100,9 +100,9 @@ class _Curves:
         first, behind = np.searchsorted(slab, slab, "left"), np.searchsorted(slab, slab, "right")
         place = first[:, None] + np.arange(max((behind - first).max(initial=0), 1))
         a, b = np.broadcast_to(every[:, None], place.shape), np.minimum(place, len(half) - 1)
-        one, other = self.nodes.leaving(half), self.nodes.leaving(half[b])
-        chord = newton.difference(self.find.arm, other.q, one.q[:, None])
-        along = (chord * (one.tangent[:, None] - other.tangent)).sum(axis=2)
+        begin, end = self.nodes.leaving(half), self.nodes.leaving(half[b])
+        chord = newton.difference(self.find.arm, end.q, begin.q[:, None])
+        along = (chord * (begin.tangent[:, None] - end.tangent)).sum(axis=2)
         cost = 2.0 * np.sqrt((chord * chord).sum(axis=2)) - 0.5 * along
         cost[(along <= 0) | (place >= behind[:, None]) | (a == b)] = np.inf
         best = cost.argmin(axis=1)
@@ -116,72 +116,72 @@ class _Curves:
         ray = ray[~self.traced[ray]]
         self.traced[ray] = True
         passed, end, plane = self._steps(ray)
-        there, every = np.flatnonzero(plane >= 0), np.arange(len(ray))
+        arrived, every = np.flatnonzero(plane >= 0), np.arange(len(ray))
         row, slab = self.nodes.row[ray >> 1], self.slab(ray)
-        number = self._on_plane(Nodes(row[there], plane[there], rows_of(end, there)))
+        number = self._on_plane(Nodes(row[arrived], plane[arrived], rows_of(end, arrived)))
         to, place = np.full(len(ray), -1), np.full(len(self.partner), len(ray))
-        to[there], place[ray] = 2 * number + (plane[there] != slab[there]), every
+        to[arrived], place[ray] = 2 * number + (plane[arrived] != slab[arrived]), every
         # an arc is traced from both of its ends: once will do
-        kept = (to >= 0) & (self.partner[to] < 0) & (every < place[to]) & (to != ray)
-        kept &= np.isin(every, np.unique(to, return_index=True)[1])
-        some, whose = np.flatnonzero(kept), np.concatenate([some for some, _ in passed])
-        on = np.flatnonzero(kept[whose])
-        points, whose = rows_of(stacked([points for _, points in passed]), on), whose[on]
-        new = self._add(Nodes(row[whose], np.full(len(on), -1), points))
-        a = np.append(ray[some], 2 * new)[np.argsort(np.append(some, whose), kind="stable")]
-        b = np.append(2 * new + 1, to[some])[np.argsort(np.append(whose, some), kind="stable")]
+        chosen = (to >= 0) & (self.partner[to] < 0) & (every < place[to]) & (to != ray)
+        chosen &= np.isin(every, np.unique(to, return_index=True)[1])
+        rays, whose = np.flatnonzero(chosen), np.concatenate([rays for rays, _ in passed])
+        passing = np.flatnonzero(chosen[whose])
+        points, whose = rows_of(stacked([points for _, points in passed]), passing), whose[passing]
+        added = self._add(Nodes(row[whose], np.full(len(passing), -1), points))
+        a = np.append(ray[rays], 2 * added)[np.argsort(np.append(rays, whose), kind="stable")]
+        b = np.append(2 * added + 1, to[rays])[np.argsort(np.append(whose, rays), kind="stable")]
         self._join(a, b)
 
-    def _on_plane(self, found: Nodes) -> Int:
+    def _on_plane(self, arrived: Nodes) -> Int:
         """The nodes that others, on planes, are; those that are none yet become one."""
-        own, number = self.planes.place(found.row, found.plane), np.full(len(found.row), -1)
+        places, number = self.planes.place(arrived.row, arrived.plane), np.full(len(arrived.row), -1)
         for _ in range(2):
             near = np.flatnonzero(self.nodes.plane >= 0)
             place = self.planes.place(self.nodes.row[near], self.nodes.plane[near])
-            asked = np.isin(place, own)
-            i, k = np.nonzero(own[:, None] == place[asked])
-            k = near[asked][k]
-            apart = newton.wrapped_distance(self.find.arm, found.points.q[i], self.nodes.points.q[k])
+            shared = np.isin(place, places)
+            i, k = np.nonzero(places[:, None] == place[shared])
+            k = near[shared][k]
+            apart = newton.wrapped_distance(self.find.arm, arrived.points.q[i], self.nodes.points.q[k])
             number[i[apart < tol.SAME_SEED]] = k[apart < tol.SAME_SEED]
-            new = np.flatnonzero(number < 0)
-            if not len(new):
+            added = np.flatnonzero(number < 0)
+            if not len(added):
                 break
-            new = new[once(self.find, own[new], found.points.q[new])]
-            self._add(Nodes(found.row[new], found.plane[new], rows_of(found.points, new)))
+            added = added[once(self.find, places[added], arrived.points.q[added])]
+            self._add(Nodes(arrived.row[added], arrived.plane[added], rows_of(arrived.points, added)))
         return number
 
     def _steps(self, ray: Int) -> tuple[list[tuple[Int, Points]], Points, Int]:
         """From halves (M,): the points passed on the way, of which rays; those on the plane at the end, and which, -1:
         lost."""
         find, j, unit, values = self.find, self.planes.guide.joint, radian_or_reach(self.find.arm), self.planes.values
-        row, slab, now = self.nodes.row[ray >> 1], self.slab(ray), self.nodes.leaving(ray)
+        row, slab, current = self.nodes.row[ray >> 1], self.slab(ray), self.nodes.leaving(ray)
         behind = (slab + 1) % self.planes.counts[row]
         low, h = values[row, slab], np.full(len(ray), LONGEST)
         wide = np.remainder(values[row, behind] - low, 2 * np.pi)
-        end, plane = Points(*(x.copy() for x in now)), np.full(len(ray), -1)
-        passed, going = [(ray[:0], rows_of(now, ray[:0]))], np.arange(len(ray))
+        end, plane = Points(*(x.copy() for x in current)), np.full(len(ray), -1)
+        passed, going = [(ray[:0], rows_of(current, ray[:0]))], np.arange(len(ray))
         for _ in range(TRIES):
-            here, step = rows_of(now, going), h[going, None]
-            then = onto(find, row[going], here.q + step * here.tangent * unit, here.tangent, tol.SAME_SEED)
-            way = Ways.between(find, here, then)
-            aside = np.sqrt(((way.chord - step * here.tangent) ** 2).sum(axis=1))
+            begin, step = rows_of(current, going), h[going, None]
+            then = onto(find, row[going], begin.q + step * begin.tangent * unit, begin.tangent, tol.SAME_SEED)
+            way = Ways.between(find, begin, then)
+            aside = np.sqrt(((way.chord - step * begin.tangent) ** 2).sum(axis=1))
             good = (then.step < tol.SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(find, row[going])
             h[going] = np.where(good, np.minimum(1.5 * h[going], LONGEST), 0.5 * h[going])
             middle = low[going] + 0.5 * wide[going]
-            depth, before = (wrapped(one.q[:, j] - middle) for one in (then, here))
+            depth, before = (wrapped(points.q[:, j] - middle) for points in (then, begin))
             left = good & (np.abs(depth) >= 0.5 * wide[going]) & (np.abs(depth - before) > tol.TINY)
-            some, far = going[left], depth[left] > 0
-            goal = np.where(far, 0.5, -0.5) * wide[some]
+            leaving, far = going[left], depth[left] > 0
+            goal = np.where(far, 0.5, -0.5) * wide[leaving]
             share = np.clip((goal - before[left]) / (depth[left] - before[left]), 0.0, 1.0)
-            guess = here.q[left] + share[:, None] * way.chord[left] * unit
+            guess = begin.q[left] + share[:, None] * way.chord[left] * unit
             guess[:, j] = middle[left] + goal
-            there = onto(find, row[some], guess, self.planes.held(len(some)))
-            plane[some] = np.where(there.settled, np.where(far, behind[some], slab[some]), -1)
+            landed = onto(find, row[leaving], guess, self.planes.held(len(leaving)))
+            plane[leaving] = np.where(landed.settled, np.where(far, behind[leaving], slab[leaving]), -1)
             inside = good & ~left
             passed.append((going[inside], rows_of(then, inside)))
-            for one, new, last, final in zip(now, then, end, there, strict=True):
-                one[going[inside]] = new[inside]
-                last[some] = final
+            for column, moved, last, final in zip(current, then, end, landed, strict=True):
+                column[going[inside]] = moved[inside]
+                last[leaving] = final
             going = going[~left & (h[going] > tol.SHORTEST_ARC)]
             if not len(going):
                 break
@@ -204,12 +204,12 @@ class Chains(NamedTuple):
         after[begin + self.counts - 1] = np.where(self.closed, begin, begin + self.counts - 1)
         return after
 
-    def curves(self, which: Int) -> Chains:
+    def curves(self, chosen: Int) -> Chains:
         """Some of the curves, in that order."""
-        count = self.counts[which]
+        count = self.counts[chosen]
         first = np.cumsum(self.counts) - self.counts
-        point = numbers_within(count) + np.repeat(first[which], count)
-        return Chains(rows_of(self.points, point), self.row[which], count, self.closed[which])
+        point = numbers_within(count) + np.repeat(first[chosen], count)
+        return Chains(rows_of(self.points, point), self.row[chosen], count, self.closed[chosen])
 
 
 def curves_of(find: Follower) -> Chains:
@@ -218,16 +218,16 @@ def curves_of(find: Follower) -> Chains:
     row, q = missed(find, chains.points, np.repeat(chains.row, chains.counts), chains.after)
     if not len(row):
         return chains
-    some, place = np.unique(row, return_inverse=True)
-    more = _joined(find.of(some), place, q)
-    kept = chains.curves(np.flatnonzero(~np.isin(chains.row, some)))
-    both = stacked([kept, more._replace(row=some[more.row])])
-    return both.curves(np.argsort(both.row, kind="stable"))
+    again, place = np.unique(row, return_inverse=True)
+    more = _joined(find.of(again), place, q)
+    others = chains.curves(np.flatnonzero(~np.isin(chains.row, again)))
+    joined = stacked([others, more._replace(row=again[more.row])])
+    return joined.curves(np.argsort(joined.row, kind="stable"))
 
 
-def _joined(find: Follower, known: Int, q: Array) -> Chains:
-    """Curves of all targets that an answer on a plane, or one of q (M, n) of targets known (M,), is on."""
-    curves = _Curves(find, known, q)
+def _joined(find: Follower, whose: Int, q: Array) -> Chains:
+    """Curves of all targets that an answer on a plane, or one of q (M, n) of targets whose (M,), is on."""
+    curves = _Curves(find, whose, q)
     for _ in range(ROUNDS):
         if curves.traced[curves.open()].all():
             break
@@ -257,11 +257,11 @@ def _chained(curves: _Curves) -> Chains:
     begins = np.ones(M + 1, bool)
     begins[behind] = False
     first[last[begins[:-1]]] = np.flatnonzero(begins[:-1])
-    one = np.where(ring, least[:-1] < least[every ^ 1], last < (first[last] ^ 1))
-    one &= (nodes.plane[every >> 1] >= 0) | (left[:-1] > 0) | (last != first[last])  # not a middle of a way that failed
-    some = np.flatnonzero(one)
-    row = nodes.row[some >> 1]
-    order = np.lexsort((-left[some], last[some], row))
-    some, row = some[order], row[order]
-    begin = np.flatnonzero(np.diff(last[some], prepend=-1))
-    return Chains(nodes.leaving(some), row[begin], np.diff(begin, append=len(some)), ring[some[begin]])
+    use = np.where(ring, least[:-1] < least[every ^ 1], last < (first[last] ^ 1))
+    use &= (nodes.plane[every >> 1] >= 0) | (left[:-1] > 0) | (last != first[last])  # not a middle of a way that failed
+    halves = np.flatnonzero(use)
+    row = nodes.row[halves >> 1]
+    order = np.lexsort((-left[halves], last[halves], row))
+    halves, row = halves[order], row[order]
+    begin = np.flatnonzero(np.diff(last[halves], prepend=-1))
+    return Chains(nodes.leaving(halves), row[begin], np.diff(begin, append=len(halves)), ring[halves[begin]])

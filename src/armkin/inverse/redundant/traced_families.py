@@ -35,10 +35,10 @@ def traced(find: Follower) -> Iterator[Traced]:
     point = np.append(0, np.cumsum(chains.counts))
     for k in range(0, len(find.target), AT_ONCE):
         a, b = np.searchsorted(chains.row, [k, k + AT_ONCE])
-        some = slice(a, b)
+        part = slice(a, b)
         points = rows_of(chains.points, slice(point[a], point[b]))
-        own = Chains(points, chains.row[some] - k, chains.counts[some], chains.closed[some])
-        yield Traced.of(find.of(np.arange(k, min(k + AT_ONCE, len(find.target)))), own)
+        curves = Chains(points, chains.row[part] - k, chains.counts[part], chains.closed[part])
+        yield Traced.of(find.of(np.arange(k, min(k + AT_ONCE, len(find.target)))), curves)
 
 
 class Traced(NamedTuple):
@@ -79,11 +79,11 @@ class Traced(NamedTuple):
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Turning.at`."""
         curve = self.curve[pieces.row, pieces.branch]
-        whole = np.floor(parameter)
-        point = self.begin[curve] + whole.astype(np.intp) % self.counts[curve]
-        there = self._between(point, parameter - whole, tol.REACH)  # a cubic's miss squared is left
-        q, legal = nearest_row(self.find.arm, there.q, self.find.near[pieces.row])
-        return q, legal & (there.step < tol.REACH)
+        floor = np.floor(parameter)
+        point = self.begin[curve] + floor.astype(np.intp) % self.counts[curve]
+        points = self._between(point, parameter - floor, tol.REACH)  # a cubic's miss squared is left
+        q, legal = nearest_row(self.find.arm, points.q, self.find.near[pieces.row])
+        return q, legal & (points.step < tol.REACH)
 
     def settled(self, pieces: Pieces, q: Array) -> Array:
         """Postures (P, n) of pieces, without what `at` leaves, by steps of least norm."""
@@ -104,8 +104,8 @@ class Traced(NamedTuple):
         """Samples of all curves, and where something changes between them."""
         arm, j, P = self.find.arm, self.find.free.joint, len(self.row)
         point, parts = np.repeat(np.arange(P), PARTS), np.arange(PARTS) / PARTS
-        part, own = np.tile(parts, P), [self.ways.at(self.find, u) for u in parts]
-        q = np.stack(own, axis=1).reshape(-1, arm.n)
+        part, samples = np.tile(parts, P), [self.ways.at(self.find, u) for u in parts]
+        q = np.stack(samples, axis=1).reshape(-1, arm.n)
         up = (np.stack([self.ways.slope(u, j) for u in parts], axis=1) > 0).ravel()
         alive = self.after[point] != point
         following = np.arange(1, len(point) + 1)
@@ -134,37 +134,37 @@ class Traced(NamedTuple):
         guess = ways.at(self.find, share)
         free = (arm.upper - arm.lower == np.inf) | (~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi))
         low, high = np.where(free, 0.0, arm.lower), np.where(free, 0.0, arm.upper)
-        off = guess - 0.5 * (low + high)
-        off = np.where(arm.prismatic, off, wrapped(off))
-        room = np.where(free, np.inf, 0.5 * (high - low) - np.abs(off))
-        which, index = room.argmin(axis=1), np.arange(len(point))
+        away = guess - 0.5 * (low + high)
+        away = np.where(arm.prismatic, away, wrapped(away))
+        room = np.where(free, np.inf, 0.5 * (high - low) - np.abs(away))
+        joint, index = room.argmin(axis=1), np.arange(len(point))
         held = np.zeros_like(guess)
-        held[index, which] = 1.0
-        guess[index, which] += np.sign(off[index, which]) * room[index, which]
-        there = onto(self.find, self.row[point], guess, held)
-        good = there.settled & (np.abs(there.q - guess).max(axis=1, initial=0.0) < tol.REACH)
-        some = np.flatnonzero(~good)  # it touches its limit alone
-        there.q[some] = self._between(point[some], share[some]).q
-        return share, there.q
+        held[index, joint] = 1.0
+        guess[index, joint] += np.sign(away[index, joint]) * room[index, joint]
+        points = onto(self.find, self.row[point], guess, held)
+        good = points.settled & (np.abs(points.q - guess).max(axis=1, initial=0.0) < tol.REACH)
+        touching = np.flatnonzero(~good)  # it touches its limit alone
+        points.q[touching] = self._between(point[touching], share[touching]).q
+        return share, points.q
 
     def _turning(self, point: Int, low: Array) -> tuple[Array, Array]:
         """Shares of the way (M,) at which the joint turns back, and the postures there: by a step along the tangent."""
         j, ways = self.find.free.joint, rows_of(self.ways, point)
         share = _root(lambda t: ways.slope(t, j), low, low + 1.0 / PARTS)
-        there = self._between(point, share)
+        end = self._between(point, share)
         size = np.maximum(np.sqrt((ways.begin**2).sum(axis=1)), tol.TINY)
         bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, tol.TINY))
         for _ in range(TURNS if len(point) else 0):
             step = np.clip(
-                -there.tangent[:, j] / np.where(np.abs(bend) > tol.TINY, bend, np.inf),
+                -end.tangent[:, j] / np.where(np.abs(bend) > tol.TINY, bend, np.inf),
                 -tol.REACH * size,
                 tol.REACH * size,
             )
-            ahead = there.q + step[:, None] * there.tangent * radian_or_reach(self.find.arm)
-            after = onto(self.find, self.row[point], ahead, there.tangent)
-            bend = np.where(step == 0.0, bend, (after.tangent - there.tangent)[:, j] / np.where(step == 0.0, 1.0, step))
-            there = after
-        return share, there.q
+            ahead = end.q + step[:, None] * end.tangent * radian_or_reach(self.find.arm)
+            after = onto(self.find, self.row[point], ahead, end.tangent)
+            bend = np.where(step == 0.0, bend, (after.tangent - end.tangent)[:, j] / np.where(step == 0.0, 1.0, step))
+            end = after
+        return share, end.q
 
 
 def _root(value: Callable[[Array], Array], lo: Array, hi: Array) -> Array:
@@ -175,10 +175,10 @@ def _root(value: Callable[[Array], Array], lo: Array, hi: Array) -> Array:
         apart = np.where(at_hi == at_lo, 1.0, at_hi - at_lo)
         share = np.where(at_hi == at_lo, 0.5 * (lo + hi), (lo * at_hi - hi * at_lo) / apart)
         share = np.clip(share, lo, hi)
-        here = value(share)
-        low = (here >= 0) == (at_lo >= 0)
-        at_hi = np.where(low, np.where(side > 0, 0.5 * at_hi, at_hi), here)
-        at_lo = np.where(low, here, np.where(side < 0, 0.5 * at_lo, at_lo))
+        middle = value(share)
+        low = (middle >= 0) == (at_lo >= 0)
+        at_hi = np.where(low, np.where(side > 0, 0.5 * at_hi, at_hi), middle)
+        at_lo = np.where(low, middle, np.where(side < 0, 0.5 * at_lo, at_lo))
         lo, hi, side = np.where(low, share, lo), np.where(low, hi, share), np.where(low, 1.0, -1.0)
     return share
 
@@ -200,40 +200,40 @@ class _Nodes(NamedTuple):
         C, K = len(row), int(count.max())
         k = np.arange(K)
         last = cuts + count - 1
-        own = np.minimum(cuts[:, None] + k, last[:, None])
-        good, up, alive = self.legal[own], self.up[own], self.alive[own]
-        whole = curves.counts
+        index = np.minimum(cuts[:, None] + k, last[:, None])
+        good, up, alive = self.legal[index], self.up[index], self.alive[index]
+        turn = curves.counts
         padded = (k >= count[:, None]) & self.alive[last][:, None]
-        at = np.where(padded, whole[:, None], self.at[own] - curves.begin[:, None])
-        own = np.where(padded, cuts[:, None], own)
+        values = np.where(padded, turn[:, None], self.at[index] - curves.begin[:, None])
+        index = np.where(padded, cuts[:, None], index)
         q, fits = nearest_row(arm, self.q, near[curves.row[self.at.astype(np.intp)]])
         cost = motion(arm, q, near[curves.row[self.at.astype(np.intp)]])
-        costs = np.concatenate([cost[own], np.where(fits, cost, np.inf)[own]])
+        costs = np.concatenate([cost[index], np.where(fits, cost, np.inf)[index]])
         turns = up != np.roll(up, 1, axis=1)
         of, first, length = runs(good, turns)
-        other, begin, run = runs(alive, turns)
-        empty = holding_none(good, other, begin, run)
+        curve, begin, run = runs(alive, turns)
+        empty = holding_none(good, curve, begin, run)
         legal = np.repeat([True, False], [len(of), int(empty.sum())])
-        of, first = np.append(of, other[empty]), np.append(first, begin[empty])
+        of, first = np.append(of, curve[empty]), np.append(first, begin[empty])
         length = np.append(length, run[empty])
         best = best_samples(costs, of + C * legal, first, length + 1)
-        t = self.q[own, curves.find.free.joint]
+        t = self.q[index, curves.find.free.joint]
         way = np.cumsum(np.tile(wrapped(np.roll(t, -1, axis=1) - t), 2), axis=1)
         way = np.concatenate([np.zeros((C, 1)), way], axis=1)
         start = t[of, first]
         end = start + way[of, first + length] - way[of, first]
 
         def parameter(node: Int) -> Array:
-            return np.asarray(at[of, node % K] + whole[of] * (node // K))
+            return np.asarray(values[of, node % K] + turn[of] * (node // K))
 
-        on = first + best
+        mid = first + best
         low = np.minimum(start, end)
-        found = Pieces(
+        pieces = Pieces(
             row[of], branch[of], legal, low, np.where(length == K, low + 2 * np.pi, np.maximum(start, end)),
             parameter(first), parameter(first + length),
-            parameter(np.maximum(on - 1, first)), parameter(on), parameter(np.minimum(on + 1, first + length)),
-            q[own[of, on % K]],
+            parameter(np.maximum(mid - 1, first)), parameter(mid), parameter(np.minimum(mid + 1, first + length)),
+            q[index[of, mid % K]],
         )  # fmt: skip
-        exact, allowed = curves.at(found, found.at)
+        exact, allowed = curves.at(pieces, pieces.at)
         inside = (best > 0) & (best < length) & (allowed | ~legal)
-        return found._replace(start=np.where(inside[:, None], exact, found.start))
+        return pieces._replace(start=np.where(inside[:, None], exact, pieces.start))

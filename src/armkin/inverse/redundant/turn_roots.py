@@ -59,11 +59,11 @@ def _coefficients(degree: int) -> NDArray[np.complex128]:
 @lru_cache(maxsize=1)
 def _halves() -> Array:
     """Taylor coefficients of a half about its own middle, of those of the whole: (2, TERMS, TERMS), left and right."""
-    out = np.zeros((2, TERMS, TERMS))
+    halves = np.zeros((2, TERMS, TERMS))
     for i in range(TERMS):
         for j in range(i + 1):
-            out[:, i, j] = math.comb(i, j) * np.array([-1.0, 1.0]) ** (i - j) / 2.0**i
-    return out
+            halves[:, i, j] = math.comb(i, j) * np.array([-1.0, 1.0]) ** (i - j) / 2.0**i
+    return halves
 
 
 def sampled_at(degree: int) -> NDArray[np.complex128]:
@@ -81,31 +81,31 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
     c, above = c[:, : degree + 1], np.abs(c[:, degree + 1 :]) * np.exp(ASIDE * np.arange(degree + 1, degree + MORE + 1))
     slack = SAFE * (2 * degree + 1) * above.max(axis=1) + 10.0 * tol.ROUNDING * np.abs(c).sum(axis=1)
     a = (np.concatenate([c.real, c.imag], axis=1) @ series).reshape(-1, TERMS)
-    which, at = np.repeat(np.arange(F), len(middle)), np.tile(middle, F)
+    index, angle = np.repeat(np.arange(F), len(middle)), np.tile(middle, F)
     found_which, found_at, decided = [], [], np.ones(F, bool)
     for _ in range(HALVINGS):
-        rest, blur = np.abs(a), slack[which]
-        some = np.flatnonzero(rest[:, 0] <= rest[:, 1:].sum(axis=1) + blur)
-        a, which, at, rest, blur = a[some], which[some], at[some], rest[some], blur[some]
-        single = rest[:, 1] > (rest[:, 2:] * order[2:]).sum(axis=1) + TERMS * blur
+        sizes, blur = np.abs(a), slack[index]
+        open_ = np.flatnonzero(sizes[:, 0] <= sizes[:, 1:].sum(axis=1) + blur)
+        a, index, angle, sizes, blur = a[open_], index[open_], angle[open_], sizes[open_], blur[open_]
+        single = sizes[:, 1] > (sizes[:, 2:] * order[2:]).sum(axis=1) + TERMS * blur
         ends = a[:, ::2].sum(axis=1)[:, None] + a[:, 1::2].sum(axis=1)[:, None] * np.array([-1.0, 1.0])
         touches = (ends[:, 0] * ends[:, 1] <= 0.0) | (np.abs(ends).min(axis=1) <= blur)
-        one = np.flatnonzero(single & touches)
-        found_which.append(which[one])
-        found_at.append(at[one] + half * _zero(a[one]))
-        noise = ~single & (rest[:, 1:].sum(axis=1) <= TERMS * blur)
-        decided[which[noise]] = False
-        found_which.append(which[noise])
-        found_at.append(at[noise])
+        simple = np.flatnonzero(single & touches)
+        found_which.append(index[simple])
+        found_at.append(angle[simple] + half * _zero(a[simple]))
+        noise = ~single & (sizes[:, 1:].sum(axis=1) <= TERMS * blur)
+        decided[index[noise]] = False
+        found_which.append(index[noise])
+        found_at.append(angle[noise])
         left = np.flatnonzero(~single & ~noise)
         half *= 0.5
         a = (a[left] @ _halves()).reshape(-1, TERMS)
-        at = (at[left] + half * np.array([[-1.0], [1.0]])).ravel()
-        which = np.tile(which[left], 2)
-        if not len(which):
+        angle = (angle[left] + half * np.array([[-1.0], [1.0]])).ravel()
+        index = np.tile(index[left], 2)
+        if not len(index):
             break
-    decided[which] = False
-    return Roots(np.concatenate([*found_which, which]), np.concatenate([*found_at, at]), decided)
+    decided[index] = False
+    return Roots(np.concatenate([*found_which, index]), np.concatenate([*found_at, angle]), decided)
 
 
 def _zero(a: Array) -> Array:

@@ -31,69 +31,69 @@ TURNED_AT_ONCE = 512  # poses whose columns become rows: both stay in a core's o
 
 
 def solve(  # noqa: C901 - one pass over a batch's arrays
-    arm: Arm, task: Task, geometry: Geometry, given: Array, near: Array, one: Array | None, examine: bool, workers: int
+    arm: Arm, task: Task, geometry: Geometry, raw: Array, near: Array, common: Array | None, examine: bool, workers: int
 ) -> tuple[Batch, int, Array, Array, Int]:
     """All branches of targets (N, m), or of poses (N, 4, 4) that have not been read yet.
 
-    near: (N, n), one: (n,) if it serves all; workers: threads. Also how many branch columns the class has, the targets
-    as they were solved, their `rounding`, and those on an edge, of a class that has another way for them.
+    near: (N, n), common: (n,) if it serves all; workers: threads. Also how many branch columns the class has, the
+    targets as they were solved, their `rounding`, and those on an edge, of a class that has another way for them.
     """
-    runner, N = recorded(arm, task, geometry), len(given)
+    runner, N = recorded(arm, task, geometry), len(raw)
     step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts: one set of buffers serves all
-    out = empty(N, math.prod(runner.axes), arm.n)
-    target, rounding = np.empty_like(given), np.zeros(N)
-    tip = None if one is None else position(arm, one)
+    batch = empty(N, math.prod(runner.axes), arm.n)
+    target, rounding = np.empty_like(raw), np.zeros(N)
+    tip = None if common is None else position(arm, common)
 
     def part(rows: slice) -> list[Doubted]:
         """Some rows, by a thread of its own; returns those on an edge."""
         workspace: list[NDArray[Any]] = []
         left: list[Doubted] = []
         for start in range(rows.start, rows.stop, step):
-            some = slice(start, min(start + step, rows.stop))
-            goal, columns, close = given[some], None, near[some] if one is None else one
+            chunk = slice(start, min(start + step, rows.stop))
+            goal, columns, close = raw[chunk], None, near[chunk] if common is None else common
             if task.orientation == "full":
-                goal, rounding[some], columns = read_poses(goal)
-            target[some] = goal
+                goal, rounding[chunk], columns = read_poses(goal)
+            target[chunk] = goal
             if len(goal) == 1:
-                found = runner.in_numbers(goal)
+                values = runner.in_numbers(goal)
             else:
                 workspace = workspace or runner.code.workspace(len(goal))
                 room = [buffer[..., : len(goal)] for buffer in workspace]
-                found = list(runner.code.run(entries(task, goal) if columns is None else columns, room))
+                values = list(runner.code.run(entries(task, goal) if columns is None else columns, room))
             first = goal[:, 0] if columns is None else cast("Array", columns[9])
-            there = np.empty(0, np.intp)
+            hits = np.empty(0, np.intp)
             if examine:
-                there = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
-            edge = _keep(Goals(arm, task, goal, near[some]), runner.axes, rows_of(out, some), found, close, there)
+                hits = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
+            edge = _keep(Goals(arm, task, goal, near[chunk]), runner.axes, rows_of(batch, chunk), values, close, hits)
             if len(edge.rows):
                 left.append(edge._replace(rows=start + edge.rows))
         return left
 
     parts = [part(slice(0, N))] if workers == 1 else shared(part, N, workers, step, step)
-    doubted = [some for one_part in parts for some in one_part]
-    out.complete[...] = geometry.complete
-    edge = np.concatenate([np.empty(0, np.intp), *(some.rows for some in doubted)])
+    doubted = [chunk for one_part in parts for chunk in one_part]
+    batch.complete[...] = geometry.complete
+    edge = np.concatenate([np.empty(0, np.intp), *(chunk.rows for chunk in doubted)])
     if geometry.doubts is None:
         if examine and doubted:
             goals = Goals(arm, task, target, near)
-            if any(some.plain.any() for some in doubted) and not geometry.ends:
-                edge = tell(goals, runner, out, stacked(doubted))
+            if any(chunk.plain.any() for chunk in doubted) and not geometry.ends:
+                edge = tell(goals, runner, batch, stacked(doubted))
             for start in range(0, len(edge), AT_ONCE):
-                out = decided(goals, runner, out, edge[start : start + AT_ONCE])
+                batch = decided(goals, runner, batch, edge[start : start + AT_ONCE])
         edge = edge[:0]
-    return out, math.prod(runner.axes), target, rounding, edge
+    return batch, math.prod(runner.axes), target, rounding, edge
 
 
-def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], near: Array, there: Int) -> Doubted:
+def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Array], near: Array, hits: Int) -> Doubted:
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
     targets on an edge.
 
-    there: `near_itself.reached`, none where that is not asked.
+    hits: `near_itself.reached`, none where that is not asked.
     """
     arm = goals.arm
     doubt: Any  # flags
     free: Any
-    *values, miss, doubt, free = found
+    *values, miss, doubt, free = outputs
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
     miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
@@ -107,18 +107,18 @@ def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, found: list[Array], 
         if inside is not True:
             within = (within.reshape(shape) & inside).reshape(B, N)
     columns, rows = legal.reshape(-1, N), part.q.reshape(N, -1)
-    for some in arrays.slices(N, TURNED_AT_ONCE):
-        rows[some] = columns[:, some].T
+    for chunk in arrays.slices(N, TURNED_AT_ONCE):
+        rows[chunk] = columns[:, chunk].T
     part.valid[...] = True if full else valid.T
     part.within[...] = part.valid if within is valid else within.T
     part.branch[...] = _every_branch(B, arrays.CHUNK)[:N]
     on_edge = _on_edge(doubt, miss, None if full else valid)
-    if len(there):
-        on_edge = np.union1d(on_edge, near_itself.take(goals, part, there))
+    if len(hits):
+        on_edge = np.union1d(on_edge, near_itself.take(goals, part, hits))
     flags = (np.broadcast_to(x, shape)[..., on_edge].reshape(B, -1).T for x in (miss.reshape(shape), doubt, free))
-    off, edge, loose = flags if len(on_edge) else np.empty((3, 0, B))
-    plain: Bool = np.asarray(~(loose > 0.0).any(axis=1) & np.isin(on_edge, there, invert=True))
-    doubted = Doubted(on_edge, part.q[on_edge], off, edge > 0.0, plain)
+    missed, edge, loose = flags if len(on_edge) else np.empty((3, 0, B))
+    plain: Bool = np.asarray(~(loose > 0.0).any(axis=1) & np.isin(on_edge, hits, invert=True))
+    doubted = Doubted(on_edge, part.q[on_edge], missed, edge > 0.0, plain)
     if not full:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
@@ -168,9 +168,9 @@ def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool 
         N = len(goal)
         if kept or not workspace or workspace[-1].shape[-1] != N:
             workspace = runner.code.workspace(N)
-        *found, doubt, _ = runner.code.run(entries(task, goal), workspace)
+        *outputs, doubt, _ = runner.code.run(entries(task, goal), workspace)
         shape = (*runner.axes, N)
-        *values, miss = (np.broadcast_to(one, shape).reshape(B, N) for one in found)
+        *values, miss = (np.broadcast_to(column, shape).reshape(B, N) for column in outputs)
         valid: Bool = np.asarray(miss <= tol.ACCEPTED**2)
         left = np.union1d(_on_edge(doubt, miss, valid), near_itself.reached(arm, task, goal, tip))
         yield Columns(slice(start, start + N), values, miss, valid, left)

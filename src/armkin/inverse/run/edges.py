@@ -38,7 +38,7 @@ class _Doubts(NamedTuple):
     simple: Bool
 
 
-def decided(goals: Goals, runner: Recorded, out: Batch, rows: Int) -> Batch:
+def decided(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Batch:
     """Decide what the targets `rows` are, which are on an edge: at most `AT_ONCE`.
 
     Where a joint is free, the candidates are not all.
@@ -46,24 +46,24 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: Int) -> Batch:
     _, _, target, near = goals
     doubts = _doubts(goals, runner, rows)
     parts, left = _on_linkages(goals, runner, doubts), np.ones(len(rows), bool)
-    for known, seeds in parts:
-        left[known] = False
+    for part_rows, seeds in parts:
+        left[part_rows] = False
         if runner.geometry.ends:
-            out = examined(goals, out, rows[known], seeds, runner.others)
+            batch = examined(goals, batch, rows[part_rows], seeds, runner.others)
     unsettled = None
     if left.any():
         if len(part := np.flatnonzero(left & doubts.narrow)):  # there may be another part
-            whole = rows[part]
-            doubts.first[part], other, _ = _candidates_at_two(runner, target[whole], near[whole], near[whole] + 1.0)
-            doubts.other[part] = np.where(doubts.loose[part][:, :, None], other, np.nan)
-        open_, tight, first, other, loose, _, at_ends, _, simple = rows_of(doubts, left)
+            narrow = rows[part]
+            doubts.first[part], second, _ = _candidates_at_two(runner, target[narrow], near[narrow], near[narrow] + 1.0)
+            doubts.other[part] = np.where(doubts.loose[part][:, :, None], second, np.nan)
+        open_, tight, first, second, loose, _, at_ends, _, simple = rows_of(doubts, left)
         # with the preferred values for joints that are free, and those that other values would change
-        more = [first, other] if loose.any() else [first]
+        more = [first, second] if loose.any() else [first]
         if runner.geometry.ends:
             hangs: Bool = np.asarray(loose.any(axis=1))
             more.append(np.where(hangs[:, None, None], tight, np.nan))  # it may be that the joint is not quite free
             unsettled = np.zeros(len(target), bool)
-            unsettled[open_[at_ends]], out.complete[open_[at_ends]] = True, False
+            unsettled[open_[at_ends]], batch.complete[open_[at_ends]] = True, False
         label = np.tile(np.arange(loose.shape[1]), len(more))
         if len(more) > 1:
             fixed = np.zeros((len(loose), (len(more) - 1) * loose.shape[1]), bool)
@@ -71,63 +71,63 @@ def decided(goals: Goals, runner: Recorded, out: Batch, rows: Int) -> Batch:
         seeds = Seeds.of(np.concatenate(more, axis=1), label, loose, simple)
         parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(left), seeds)]
     elif runner.geometry.ends:
-        return out
+        return batch
     seeds = stacked([seeds for _, seeds in parts])
-    return examined(goals, out, rows[np.concatenate([part for part, _ in parts])], seeds, runner.others, unsettled)
+    return examined(goals, batch, rows[np.concatenate([part for part, _ in parts])], seeds, runner.others, unsettled)
 
 
 def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:
     """Those of the targets whose self-motions are known in closed form, with their seeds."""
-    out: list[tuple[Int, Seeds]] = []
+    settled: list[tuple[Int, Seeds]] = []
     if not (goals.task.constraints == goals.arm.n and goals.task.orientation == "full"):
-        return out
+        return settled
     part = np.flatnonzero(doubts.free & ~doubts.ends)
     q = np.stack([doubts.first[part], doubts.other[part]], axis=1)
     for _ in range(2):
         if not len(part):
             break
-        some, loose = goals.of(doubts.rows[part]), doubts.loose[part]
+        subset, loose = goals.of(doubts.rows[part]), doubts.loose[part]
         # of the candidates those that are loose in front
         B = np.arange(loose.shape[1])
         column = np.argsort(~loose, axis=1, kind="stable")[:, : max(int(loose.sum(axis=1).max()), 1)]
-        found = linkages.settle(
-            some, np.take_along_axis(q, column[:, None, :, None], axis=2), np.take_along_axis(loose, column, axis=1)
+        linked = linkages.settle(
+            subset, np.take_along_axis(q, column[:, None, :, None], axis=2), np.take_along_axis(loose, column, axis=1)
         )
-        if len(known := np.flatnonzero(found.known)):
+        if len(rows := np.flatnonzero(linked.known)):
             # postures of known self-motions, and the candidates that are not loose, by their labels
-            whose, there = part[known], ~np.isnan(found.q[known, :, 0])
-            at = np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max())]
-            fixed = np.where(loose[known][:, :, None], np.nan, doubts.first[whose])
-            label = np.take_along_axis(np.tile(column[known], q.shape[1]), at, axis=1)
-            label = np.concatenate([np.broadcast_to(B, loose[known].shape), label], axis=1)
+            whose, present = part[rows], ~np.isnan(linked.q[rows, :, 0])
+            places = np.argsort(~present, axis=1, kind="stable")[:, : int(present.sum(axis=1).max())]
+            fixed = np.where(loose[rows][:, :, None], np.nan, doubts.first[whose])
+            label = np.take_along_axis(np.tile(column[rows], q.shape[1]), places, axis=1)
+            label = np.concatenate([np.broadcast_to(B, loose[rows].shape), label], axis=1)
             order = np.argsort(label, axis=1, kind="stable")
-            on, joints = (np.take_along_axis(x[known], at[:, :, None], axis=1) for x in (found.q, found.joints))
+            curve, joints = (np.take_along_axis(x[rows], places[:, :, None], axis=1) for x in (linked.q, linked.joints))
             motion = np.concatenate([np.zeros(fixed.shape, bool), joints], axis=1)
             seeds = Seeds(
-                q=np.take_along_axis(np.concatenate([fixed, on], axis=1), order[:, :, None], axis=1),
+                q=np.take_along_axis(np.concatenate([fixed, curve], axis=1), order[:, :, None], axis=1),
                 loose=np.zeros(order.shape, bool),
                 label=np.take_along_axis(label, order, axis=1),
                 sure=np.take_along_axis(motion, order[:, :, None], axis=1),
-                simple=np.take_along_axis(np.pad(doubts.simple[whose], ((0, 0), (0, at.shape[1]))), order, axis=1),
+                simple=np.take_along_axis(np.pad(doubts.simple[whose], ((0, 0), (0, places.shape[1]))), order, axis=1),
             )
-            out.append((whose, seeds))
-        lacking = np.flatnonzero(found.lacking)
+            settled.append((whose, seeds))
+        lacking = np.flatnonzero(linked.lacking)
         part, q = part[lacking], q[lacking]
         if len(part):
-            q = np.concatenate([q, runner.samples(some.target[lacking], some.near[lacking])], axis=1)
-    return out
+            q = np.concatenate([q, runner.samples(subset.target[lacking], subset.near[lacking])], axis=1)
+    return settled
 
 
 def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     """The targets `rows`, with preferred values for joints that are free; what is on no edge and misses is nan."""
     arm, task, target, near = goals.arm, goals.task, goals.target[rows], goals.near[rows]
     # what is singular hangs on the last digit
-    found = as_rows(runner.in_numbers(target), len(rows))
-    tight, (miss, edge, free) = found[:, :, :-3], np.moveaxis(found[:, :, -3:], 2, 0)
+    outputs = as_rows(runner.in_numbers(target), len(rows))
+    tight, (miss, edge, free) = outputs[:, :, :-3], np.moveaxis(outputs[:, :, -3:], 2, 0)
     plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
     plain[near_itself.reached(arm, task, target, position(arm, near))] = False
     gone = plain & (miss > tol.NEARBY**2)
-    out = _Doubts(
+    doubts = _Doubts(
         rows=rows,
         tight=np.where(gone[:, :, None], np.nan, tight),
         first=np.where(gone[:, :, None], np.nan, tight),
@@ -138,7 +138,7 @@ def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
         narrow=np.zeros(len(rows), bool),
         simple=plain & (miss <= tol.ACCEPTED**2),
     )
-    part = np.flatnonzero(out.free)
+    part = np.flatnonzero(doubts.free)
     if len(part):
         goal, close = target[part], near[part]
         first, second, solved = _candidates_at_two(runner, goal, close, close + 1.0)
@@ -149,38 +149,38 @@ def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
             shift, single = runner.best_shift(goal[lost], close[lost], changed[lost])
             best = close[lost] + shift
             first[lost], second[lost], solved = _candidates_at_two(runner, goal[lost], best, best + tol.FOLD_WAY)
-            out.narrow[part[lost]] = solved[1].any(axis=1)
-            single &= ~out.narrow[part[lost]]
-            out.free[part[lost]], second[lost[single]] = ~single, np.nan  # one value alone is no freedom
-        out.first[part] = np.where(plain[part][:, :, None], out.first[part], first)
-        out.other[part], out.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
+            doubts.narrow[part[lost]] = solved[1].any(axis=1)
+            single &= ~doubts.narrow[part[lost]]
+            doubts.free[part[lost]], second[lost[single]] = ~single, np.nan  # one value alone is no freedom
+        doubts.first[part] = np.where(plain[part][:, :, None], doubts.first[part], first)
+        doubts.other[part], doubts.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
         apart = np.minimum(apart, np.abs(apart - 2 * np.pi))[:, :, list(runner.geometry.ends)]
-        out.ends[part] = (apart > tol.SAME).any(axis=(1, 2))
-    return out
+        doubts.ends[part] = (apart > tol.SAME).any(axis=(1, 2))
+    return doubts
 
 
-def _candidates_at_two(runner: Recorded, target: Array, values: Array, others: Array) -> tuple[Array, Array, Bool]:
+def _candidates_at_two(runner: Recorded, target: Array, values: Array, second: Array) -> tuple[Array, Array, Bool]:
     """Candidates for two values of free joints, (N, B, n) each, and which solve their targets (2, N, B)."""
-    found = runner.with_values(np.concatenate([target, target]), np.concatenate([values, others]))
-    solved = found[..., -1].reshape(2, len(target), -1) <= tol.ACCEPTED**2
-    return found[: len(target), :, :-1], found[len(target) :, :, :-1], solved
+    rows = runner.with_values(np.concatenate([target, target]), np.concatenate([values, second]))
+    solved = rows[..., -1].reshape(2, len(target), -1) <= tol.ACCEPTED**2
+    return rows[: len(target), :, :-1], rows[len(target) :, :, :-1], solved
 
 
 def examined(
-    goals: Goals, out: Batch, doubted: Int, seeds: Seeds, others: components.More, unsettled: Bool | None = None
+    goals: Goals, batch: Batch, doubted: Int, seeds: Seeds, more: components.More, unsettled: Bool | None = None
 ) -> Batch:
     """Examine the doubted targets and write what is found: branches first, nan behind.
 
-    seeds: candidates of these; others, unsettled: (N,), see `components.examine`.
+    seeds: candidates of these; more, unsettled: (N,), see `components.examine`.
     """
     for part in slices(len(doubted), AT_ONCE):
         rows = doubted[part]
-        some = goals.of(rows)
-        lacking = (None, None) if unsettled is None else (unsettled[rows], unsettled[rows] & ~out.complete[rows])
-        seen = components.examine(some, rows_of(seeds, part), others, *lacking)
-        if seen.surface.any():
-            seen = surfaces.swept(some, seen)
-        out = write(goals.arm, out, rows, seen.q, seen.valid, seen.label, some.near)
-        out.status[rows], out.free[rows] = seen.status, seen.free
-        out.complete[rows] &= ~seen.again
-    return out
+        subset = goals.of(rows)
+        lacking = (None, None) if unsettled is None else (unsettled[rows], unsettled[rows] & ~batch.complete[rows])
+        decision = components.examine(subset, rows_of(seeds, part), more, *lacking)
+        if decision.surface.any():
+            decision = surfaces.swept(subset, decision)
+        batch = write(goals.arm, batch, rows, decision.q, decision.valid, decision.label, subset.near)
+        batch.status[rows], batch.free[rows] = decision.status, decision.free
+        batch.complete[rows] &= ~decision.again
+    return batch

@@ -41,64 +41,65 @@ class Doubted(NamedTuple):
     plain: Bool
 
 
-def tell(goals: Goals, runner: Recorded, out: Batch, at: Doubted) -> Int:
+def tell(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Int:
     """Write what the doubted targets are that can be told; returns the rows of those that are left.
 
     What stands alone is in the batch already, but for what misses a little; of two branches that meet the first is
     listed, as the target has it alone.
     """
-    there = at.miss <= tol.SOLUTION**2
-    moved = there & (at.miss >= tol.CLOSED**2)
+    arm, task, target, near = goals
+    solving = doubted.miss <= tol.SOLUTION**2
+    moved = solving & (doubted.miss >= tol.CLOSED**2)
     # what misses a little more may be a branch
-    far = at.miss > np.where(at.edge, tol.SEED**2, tol.NEARBY**2)
-    told: Bool = np.asarray(at.plain & there.any(axis=1) & (there | far).all(axis=1))
-    k, b = np.nonzero(moved & told[:, None])
+    far = doubted.miss > np.where(doubted.edge, tol.SEED**2, tol.NEARBY**2)
+    decided: Bool = np.asarray(doubted.plain & solving.any(axis=1) & (solving | far).all(axis=1))
+    k, b = np.nonzero(moved & decided[:, None])
     if len(k):
-        at.q[k, b], size = newton.correct(goals.arm, goals.task, at.q[k, b], goals.target[at.rows[k]], steps=3)
-        told[k[size >= tol.CLOSED]] = False
-    second = _pairs(goals, at, there & (at.edge | (at.miss > tol.ACCEPTED**2)), told)
+        doubted.q[k, b], size = newton.correct(arm, task, doubted.q[k, b], target[doubted.rows[k]], steps=3)
+        decided[k[size >= tol.CLOSED]] = False
+    second = _pairs(goals, doubted, solving & (doubted.edge | (doubted.miss > tol.ACCEPTED**2)), decided)
     meets: Bool = np.asarray(second.any(axis=1))
-    some = np.flatnonzero(told & (meets | (there & (at.miss > tol.ACCEPTED**2)).any(axis=1)))
-    if len(some):
-        rows, meets, there = at.rows[some], meets[some], there[some] & ~second[some]
+    listed = np.flatnonzero(decided & (meets | (solving & (doubted.miss > tol.ACCEPTED**2)).any(axis=1)))
+    if len(listed):
+        rows, meets, solving = doubted.rows[listed], meets[listed], solving[listed] & ~second[listed]
         if meets.any():
-            at.q[some[meets]] = as_rows(runner.in_numbers(goals.target[rows[meets]]), meets.sum())[:, :, : goals.arm.n]
-        order = np.argsort(~there, axis=1, kind="stable")
-        valid = np.take_along_axis(there, order, axis=1)
-        q = np.where(valid[:, :, None], np.take_along_axis(at.q[some], order[:, :, None], axis=1), np.nan)
-        write(goals.arm, out, rows, q, valid, order, goals.near[rows])
-        out.status[rows] = np.where(meets, Status.BOUNDARY, Status.EXACT)
-    return at.rows[~told]
+            doubted.q[listed[meets]] = as_rows(runner.in_numbers(target[rows[meets]]), meets.sum())[:, :, : arm.n]
+        order = np.argsort(~solving, axis=1, kind="stable")
+        valid = np.take_along_axis(solving, order, axis=1)
+        q = np.where(valid[:, :, None], np.take_along_axis(doubted.q[listed], order[:, :, None], axis=1), np.nan)
+        write(arm, batch, rows, q, valid, order, near[rows])
+        batch.status[rows] = np.where(meets, Status.BOUNDARY, Status.EXACT)
+    return doubted.rows[~decided]
 
 
-def _pairs(goals: Goals, at: Doubted, asked: Bool, told: Bool) -> Bool:
-    """Which of the branches that are asked (K, B) are the second ones of two that meet; takes those targets from told
+def _pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: Bool) -> Bool:
+    """Which of the near roots (K, B) are the second ones of two that meet; takes those targets from decided
     (K,) that the curvature does not tell."""
-    second, asked = np.zeros(asked.shape, bool), asked & told[:, None]
-    k, b = np.nonzero(asked)
+    second, near_roots = np.zeros(near_roots.shape, bool), near_roots & decided[:, None]
+    k, b = np.nonzero(near_roots)
     if not len(k):
         return second
-    q, number = at.q[k, b], np.empty(asked.shape, int)
+    q, number = doubted.q[k, b], np.empty(near_roots.shape, int)
     number[k, b] = np.arange(len(k))
-    row, i, j = np.nonzero(np.triu(asked[:, :, None] & asked[:, None], 1))
+    row, i, j = np.nonzero(np.triu(near_roots[:, :, None] & near_roots[:, None], 1))
     i, j = number[row, i], number[row, j]
     way = newton.difference(goals.arm, q[j], q[i])
     size = np.abs(way).max(axis=1)
     close = size < tol.CLOSE_BY
-    many = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
-    told[k[many > 1]] = told[k[i[size < APART]]] = False
-    if not told[k].all():  # no Jacobians of those
-        return _pairs(goals, at, asked, told)
+    partners = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
+    decided[k[partners > 1]] = decided[k[i[size < APART]]] = False
+    if not decided[k].all():  # no Jacobians of those
+        return _pairs(goals, doubted, near_roots, decided)
     i, j, way = i[close], j[close], way[close]
     inverse, beside = _inverses(goals, q)
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
-    lone = np.flatnonzero(weak & (many == 0) & told[k])
+    lone = np.flatnonzero(weak & (partners == 0) & decided[k])
     if len(lone):
-        told[k[lone[~_isolated(goals, q[lone], inverse[lone], beside[lone])]]] = False
+        decided[k[lone[~_isolated(goals, q[lone], inverse[lone], beside[lone])]]] = False
     if len(i):
         ends = inverse[j] if not beside.shape[2] else _inverses(goals, q[j], beside[i])[0]
         alone, meet = _cubic(way, inverse[i], ends)
-        told[k[i[~(alone | meet)]]] = False
+        decided[k[i[~(alone | meet)]]] = False
         j = j[meet]
         second[k[j], b[j]] = True
     return second
@@ -118,8 +119,8 @@ def _inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Arra
     if rows == n:
         return newton.nudged(np.linalg.inv, J), np.empty((M, rows, 0))
     if beside is None:
-        any_ = np.broadcast_to(np.sqrt(np.arange(1.0, rows + 1))[:, None], (M, rows, 1))
-        beside = _unit(newton.nudged(np.linalg.inv, np.concatenate([J, any_], axis=2))[:, n:]).swapaxes(1, 2)
+        any_direction = np.broadcast_to(np.sqrt(np.arange(1.0, rows + 1))[:, None], (M, rows, 1))
+        beside = _unit(newton.nudged(np.linalg.inv, np.concatenate([J, any_direction], axis=2))[:, n:]).swapaxes(1, 2)
     return newton.nudged(np.linalg.inv, np.concatenate([J, beside], axis=2)), beside
 
 
@@ -132,8 +133,8 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
     v = _tangents(way / np.maximum(far, APART)[:, None], first)
     u = _unit(v @ first)
     with np.errstate(divide="ignore", invalid="ignore"):
-        lost, other = first @ u.swapaxes(1, 2), second @ u.swapaxes(1, 2)
-        rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ other)[:, 0, 0]
+        lost, lost_second = first @ u.swapaxes(1, 2), second @ u.swapaxes(1, 2)
+        rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ lost_second)[:, 0, 0]
         size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / far, np.abs(rise + fall)
         # the fourth derivative is taken for as large as that of the sharpest fold
         plain = _one_direction_lost(first, lost) & (far > APART) & (uneven < SYMMETRIC * size)
@@ -142,7 +143,7 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
         end = far + 2.0 * np.sqrt(tol.SOLUTION / bend)
         straight = 6.0 * uneven / far**2 * end + 0.5 * tol.CURVATURE * end**2 < SYMMETRIC * bend
         # and the direction that no joint moves the tool in
-        across = np.abs(other[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
+        across = np.abs(lost_second[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
         meet = plain & straight & (0.125 * far * (size + across) < tol.SOLUTION / SURELY)
     return np.asarray(alone), np.asarray(meet)
 
@@ -171,9 +172,9 @@ def _isolated(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
 
 def _tangents(v: Array, inverse: Array) -> Array:
     """Directions of joints (M, n) as rows (M, 1, rows): what stands beside the joints does not move."""
-    out = np.zeros((len(v), 1, inverse.shape[1]))
-    out[:, 0, : v.shape[1]] = v
-    return out
+    rows = np.zeros((len(v), 1, inverse.shape[1]))
+    rows[:, 0, : v.shape[1]] = v
+    return rows
 
 
 def _unit(rows: Array) -> Array:
@@ -183,5 +184,5 @@ def _unit(rows: Array) -> Array:
 
 def _one_direction_lost(inverse: Array, lost: Array) -> Bool:
     """Whether one direction alone is lost, by an upper bound of what the others make of inverses; lost: J^-1 u."""
-    rest = (inverse * inverse).sum(axis=(1, 2)) - (lost * lost).sum(axis=(1, 2))
-    return np.asarray(rest * tol.HIGH**2 < 1.0)
+    remaining = (inverse * inverse).sum(axis=(1, 2)) - (lost * lost).sum(axis=(1, 2))
+    return np.asarray(remaining * tol.HIGH**2 < 1.0)

@@ -53,11 +53,11 @@ class OneTarget:
         self._coarse = COARSE * arm.reach if self.orientation == "full" else 0.0
         self._home_tip = self._point(*arm.home.tolist())
         self._close = [tol.THERE * unit for unit in radian_or_reach(arm).tolist()]
-        own, axes = runner.code.axes(), runner.axes
+        output_axes, axes = runner.code.axes(), runner.axes
         self.count = math.prod(axes)
-        self._plain = [not a for a in own]  # outputs that are a number, not a tuple
-        places = [np.broadcast_to(np.arange(math.prod(a)).reshape(a), axes).ravel() for a in own[: arm.n + 1]]
-        first = np.cumsum([0, *(math.prod(a) for a in own[: arm.n - 1])])
+        self._plain = [not a for a in output_axes]  # outputs that are a number, not a tuple
+        places = [np.broadcast_to(np.arange(math.prod(a)).reshape(a), axes).ravel() for a in output_axes[: arm.n + 1]]
+        first = np.cumsum([0, *(math.prod(a) for a in output_axes[: arm.n - 1])])
         # of all joints' values one after the other, those of every branch
         index = np.stack(places[: arm.n], axis=1) + first
         self._rows = [itemgetter(*row, row[0]) for row in index.tolist()]  # one more: of one alone it makes no tuple
@@ -68,23 +68,23 @@ class OneTarget:
         self._same = {"arm": arm, "task": definition, "method": geometry.name, "why": geometry.why}
         self._same["names"] = branch_names(arm, definition, geometry, self.count)
 
-    def solve(self, target: Array, given: ArrayLike | None) -> Solutions | None:  # noqa: C901 - as nearest_number
-        """The branches of a single target; None if it is a batch, or if there is more to it. given: `near`."""
+    def solve(self, target: Array, given_near: ArrayLike | None) -> Solutions | None:  # noqa: C901 - as nearest_number
+        """The branches of a single target; None if it is a batch, or if there is more to it. given_near: `near`."""
         if target.shape != self.shape:
             return None
         near = self._home
-        if given is not None:
-            near = arrays.real(given, "near")
+        if given_near is not None:
+            near = arrays.real(given_near, "near")
             if near.shape != (self._n,) or not np.isfinite(near).all():
                 return None
-        goal, off = target.ravel().tolist(), 0.0
+        goal, defect = target.ravel().tolist(), 0.0
         if not math.isfinite(sum(goal)) or max(goal) > LARGEST or min(goal) < -LARGEST:
             return None
-        kept = target.copy()
+        own_target = target.copy()
         if self.orientation == "full":
             goal = [*goal[0:11:4], *goal[1:11:4], *goal[2:11:4], *goal[3:12:4]]
-            off = self._off(*goal)[0]
-            if off > ROUNDED:
+            defect = self._off(*goal)[0]
+            if defect > ROUNDED:
                 return None
             point = goal[9:]
         else:
@@ -93,34 +93,34 @@ class OneTarget:
                 length = math.sqrt(goal[3] * goal[3] + goal[4] * goal[4] + goal[5] * goal[5])
                 if length < tol.NO_SIZE:
                     return None
-                kept[3:] /= length
-                goal = kept.tolist()
+                own_target[3:] /= length
+                goal = own_target.tolist()
         if self._slides and math.dist(point, self._base) > tol.FAR * self._reach:
             return None
         *values, miss, doubt, _ = self._run(*goal)
         if doubt if self._plain[-2] else any(doubt):
             return None
         misses = self._misses((miss,) if self._plain[-3] else miss)[:-1]
-        there = [b for b, m in enumerate(misses) if m <= tol.ACCEPTED**2]
-        if len(there) < self.count and sum(m > tol.NEARBY**2 for m in misses) + len(there) < self.count:
+        solving = [b for b, m in enumerate(misses) if m <= tol.ACCEPTED**2]
+        if len(solving) < self.count and sum(m > tol.NEARBY**2 for m in misses) + len(solving) < self.count:
             return None
         tip = self._home_tip if near is self._home else self._point(*near.tolist())
         away = math.dist(point, tip[: self.position])
         at_near = away <= self._room
         if not at_near and away <= self._coarse and all(abs(x - round(x)) <= ROUNDED for x in goal[:9]):
             return None  # `near` may solve it to within a rounding that its position alone shows
-        return self._found(kept, near, values, there, off, at_near)
+        return self._found(own_target, near, values, solving, defect, at_near)
 
-    def _beside(self, near: list[float], legal: list[float], there: list[int]) -> int | None:
+    def _beside(self, near: list[float], legal: list[float], solving: list[int]) -> int | None:
         """Which of the branches that are there, at their nearest legal copies, is at `near`; None if none is."""
-        for place, b in enumerate(there):
+        for place, b in enumerate(solving):
             ways = zip(self._rows[b](legal), near, self._joints, self._close, strict=False)
             if all(abs(v - c if j[2] else math.remainder(v - c, TURN)) <= most for v, c, j, most in ways):
                 return place
         return None
 
     def _found(
-        self, target: Array, near: Array, values: Sequence[Any], there: list[int], off: float, at_near: bool
+        self, target: Array, near: Array, values: Sequence[Any], solving: list[int], defect: float, at_near: bool
     ) -> Solutions | None:
         """The branches that are there, at their nearest legal copies, nan behind; None where `near` may be another.
 
@@ -128,37 +128,37 @@ class OneTarget:
         """
         legal: list[float] = []
         inside: list[bool] = []
-        where = near.tolist()
-        for value, close, joint, plain in zip(values, where, self._joints, self._plain, strict=False):
+        near_numbers = near.tolist()
+        for value, close, joint, plain in zip(values, near_numbers, self._joints, self._plain, strict=False):
             for v in (value,) if plain else value:
-                copy, ok = nearest_number(v, close, *joint)
+                copy, fits = nearest_number(v, close, *joint)
                 legal.append(copy)
-                inside.append(ok)
-        B, n, count = self.count, self._n, len(there)
+                inside.append(fits)
+        B, n, count = self.count, self._n, len(solving)
         if count == B:
             q = np.array(self._all(legal)[:-1]).reshape(B, n)
         else:
             q = np.full((B, n), np.nan)
-            for place, b in enumerate(there):
+            for place, b in enumerate(solving):
                 q[place] = self._rows[b](legal)[:-1]
-        within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in there]
+        within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in solving]
         if at_near and all(
-            low - SLACK <= v <= high + SLACK for v, (low, high, _) in zip(where, self._joints, strict=True)
+            low - SLACK <= v <= high + SLACK for v, (low, high, _) in zip(near_numbers, self._joints, strict=True)
         ):
-            own = self._beside(where, legal, there)
-            if own is None:
+            near_branch = self._beside(near_numbers, legal, solving)
+            if near_branch is None:
                 return None
-            q[own], within[own] = near, True
+            q[near_branch], within[near_branch] = near, True
         none = B - count
         block = np.array([
             *[True] * count, *[False] * none, *within, *[False] * none,
-            *(there if self._ordered else range(count)), *[-1] * none,
+            *(solving if self._ordered else range(count)), *[-1] * none,
             *[False] * n, Status.EXACT if count else Status.UNREACHABLE, self._complete,
         ], np.int8)  # fmt: skip
         flags = block.view(np.bool_)
         end = 3 * B + n
-        out = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one
-        out.__dict__.update(
+        solutions = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one
+        solutions.__dict__.update(
             self._same,
             target=target,
             near=near.copy(),
@@ -169,6 +169,6 @@ class OneTarget:
             free=flags[3 * B : end],
             status=block[end : end + 1].reshape(()),
             complete=flags[end + 1 :].reshape(()),
-            rounding=np.array(off),
+            rounding=np.array(defect),
         )
-        return out
+        return solutions

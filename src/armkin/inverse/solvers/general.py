@@ -51,16 +51,16 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         n = arm.n
         hit = np.abs(q[:, :, n:]).max(axis=2) < tol.AT_ZERO
         k, b = np.nonzero(hit)
-        own = np.full((*q.shape[:2], n), np.nan)
+        branches = np.full((*q.shape[:2], n), np.nan)
         if len(k):
             better, size = newton.correct(arm, task, q[k, b, :n], T[k])
-            own[k, b] = np.where((size < tol.ANSWERED)[:, None], better, np.nan)
-        missing = np.isnan(own[:, :, 0])
+            branches[k, b] = np.where((size < tol.ANSWERED)[:, None], better, np.nan)
+        missing = np.isnan(branches[:, :, 0])
         count = (~missing).sum(axis=1)
         order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
-        own = np.take_along_axis(own, order[:, :, None], axis=1)
+        branches = np.take_along_axis(branches, order[:, :, None], axis=1)
         doubt = (hit.sum(axis=1) > count) | (doubt & hit.any(axis=1)) | shaken
-        return Rows(own, doubt, settled & prepared.complete & ~shaken, shaken, guesses[:, :, :n])
+        return Rows(branches, doubt, settled & prepared.complete & ~shaken, shaken, guesses[:, :, :n])
 
     why = f"{arm.n} joints for a pose of six: {6 - arm.n} virtual joints added at the tool must stay at zero"
     return Geometry(NAME, why, prepared.complete, rows=rows, ordered=False)
@@ -95,16 +95,16 @@ def _with_wrist(arm: Arm, task: Task) -> Geometry | None:
 
 def _of_five(solve: ClosedForm, first: bool) -> ClosedForm:
     """The closed form of five joints from that of six, of which the first or the last is virtual."""
-    own = slice(1, 6) if first else slice(0, 5)
+    five = slice(1, 6) if first else slice(0, 5)
 
     def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
         virtual = None if prefer[0] is None else Pair(1.0, 0.0)
-        found = solve(goal, [virtual, *prefer] if first else [*prefer, virtual])
-        miss, pair = None, found.pairs[0 if first else 5]
-        if found.miss is not None and not found.angles and pair.s is not None:
+        candidates = solve(goal, [virtual, *prefer] if first else [*prefer, virtual])
+        miss, pair = None, candidates.pairs[0 if first else 5]
+        if candidates.miss is not None and not candidates.angles and pair.s is not None:
             # the five joints miss the target by as much as the virtual one is off zero
-            miss = found.miss + distance2(list(pair), [1.0, 0.0])
-        return found._replace(pairs=found.pairs[own], angles=found.angles[own], miss=miss)
+            miss = candidates.miss + distance2(list(pair), [1.0, 0.0])
+        return candidates._replace(pairs=candidates.pairs[five], angles=candidates.angles[five], miss=miss)
 
     return pairs
 
@@ -118,12 +118,12 @@ def _lengthened(chain: Chain, tolerance: float) -> Chain | None:
     L = chain.link[4]
     if chain.prismatic[3:].any() or is_parallel(L, tol.PARALLEL):
         return None
-    there = (inverse(L) @ [*foot(L), 1.0])[:3]
-    if np.hypot(*there[:2]) > tolerance:
+    meeting = (inverse(L) @ [*foot(L), 1.0])[:3]
+    if np.hypot(*meeting[:2]) > tolerance:
         return None
     axis = np.eye(4)
     axis[:3, :3] = rotation_about(2, PHASE) @ rotation_about(0, np.pi / 2)
-    axis[:3, 3] = there
+    axis[:3, 3] = meeting
     return Chain(np.array([*chain.link[:5], axis, inverse(axis) @ chain.link[5]]), np.append(chain.prismatic, False))
 
 

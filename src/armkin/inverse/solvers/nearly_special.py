@@ -48,8 +48,8 @@ def _nearest_class(arm: Arm, task: Task) -> tuple[float, Geometry] | None:
     wide, narrow = (planar, elbow, three_joints), (spherical, three_parallel)
     limit = tol.NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
     classes = [*((module, limit) for module in wide), *((module, tol.NEAR) for module in narrow)]
-    found = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
-    return min(((_distance(arm, task, alike), alike) for alike in found), key=lambda pair: pair[0], default=None)
+    fitting = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
+    return min(((_distance(arm, task, alike), alike) for alike in fitting), key=lambda pair: pair[0], default=None)
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
@@ -57,25 +57,25 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     # of an axis see `armkin.inverse.solvers.tool_axis`
     if task.orientation == "axis" or (nearest := _nearest_class(arm, task)) is None:
         return None
-    off, alike = nearest
+    gap, alike = nearest
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
     if (
         elimination is not None
-        and off > tol.BLURRED
-        and (straight := _by_elimination(arm, task, alike, off, elimination())) is not None
+        and gap > tol.BLURRED
+        and (straight := _by_elimination(arm, task, alike, gap, elimination())) is not None
     ):
         return straight
 
     def rows(target: Array) -> Rows:
         parts = slices(max(len(target), 1), CHUNK)
-        found = stacked([_solve(source, off, elimination, target[part]) for part in parts])
-        complete = _has_four_roots(arm, found.q) if counted else found.complete
-        return found._replace(doubt=found.doubt & ~complete, complete=complete)  # four roots apart are simple ones
+        solved = stacked([_solve(source, gap, elimination, target[part]) for part in parts])
+        complete = _has_four_roots(arm, solved.q) if counted else solved.complete
+        return solved._replace(doubt=solved.doubt & ~complete, complete=complete)  # four roots apart are simple ones
 
     source = recorded(arm, task, alike)
-    steps = newton_steps.steps(arm, task, off, alike.pairs) if alike.pairs is not None else None
+    steps = newton_steps.steps(arm, task, gap, alike.pairs) if alike.pairs is not None else None
     corrected, counted = steps or (None, False)
-    why = f"{alike.why}, but for {off:.0e} of the reach: closed-form seeds, corrected on the true arm"
+    why = f"{alike.why}, but for {gap:.0e} of the reach: closed-form seeds, corrected on the true arm"
     name, width = f"near {alike.name}", _named_columns(alike)
     slow = replace(alike, name=name, why=why, complete=False, pairs=None, rows=rows, branches=width)
     if corrected is None:
@@ -89,7 +89,7 @@ def _named_columns(alike: Geometry) -> int | None:
     return math.prod(2 if label else 1 for label in alike.labels) if alike.labels else None
 
 
-def _by_elimination(arm: Arm, task: Task, alike: Geometry, off: float, general_: Geometry | None) -> Geometry | None:
+def _by_elimination(arm: Arm, task: Task, alike: Geometry, gap: float, general_: Geometry | None) -> Geometry | None:
     """The elimination, its branches named after those of the similar arm; None if it is not healthy on this arm."""
     if general_ is None or general_.elimination is None or general_.rows is None or not general_.complete:
         return None
@@ -99,9 +99,9 @@ def _by_elimination(arm: Arm, task: Task, alike: Geometry, off: float, general_:
 
     def places(q: Array, target: Array) -> Int:
         parts = slices(max(len(target), 1), NAMED_AT_ONCE)
-        return np.concatenate([_places(source, off, q[part], target[part]) for part in parts])
+        return np.concatenate([_places(source, gap, q[part], target[part]) for part in parts])
 
-    why = f"{alike.why}, but for {off:.0e} of the reach: numeric elimination, up to 16 branches, named after that class"
+    why = f"{alike.why}, but for {gap:.0e} of the reach: numeric elimination, up to 16 branches, named after that class"
     geometry = replace(alike, name=general_.name, why=why, pairs=None, branches=_named_columns(alike), places=places)
     return replace(geometry, rows=named(general_.rows, geometry))
 
@@ -112,33 +112,33 @@ def named(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array
     assert places is not None
 
     def rows(target: Array) -> Rows:
-        found = solve(target)
-        numbers = places(found.q, target)
+        branches = solve(target)
+        numbers = places(branches.q, target)
         row, column = np.nonzero(numbers >= 0)
         width = max(int(numbers.max(initial=-1)) + 1, geometry.branches or 1)
-        q = np.full((len(target), width, found.q.shape[2]), np.nan)
-        q[row, numbers[row, column]] = found.q[row, column]
-        return found._replace(q=q)
+        q = np.full((len(target), width, branches.q.shape[2]), np.nan)
+        q[row, numbers[row, column]] = branches.q[row, column]
+        return branches._replace(q=q)
 
     return rows
 
 
-def _places(source: Recorded, off: float, q: Array, target: Array) -> Int:
+def _places(source: Recorded, gap: float, q: Array, target: Array) -> Int:
     """Indices (N, M) of branches (N, M, n): the similar arm's that each is nearest to, others count on, -1 of none."""
     seed, miss, _ = source.rows(target)
     B = seed.shape[1]
-    there = ~np.isnan(q[:, :, 0])
-    numbers = np.full(there.shape, -1)
+    present = ~np.isnan(q[:, :, 0])
+    numbers = np.full(present.shape, -1)
     if q.size:
         away = newton.distances(source.arm, seed, q)  # (N, B, M)
-        real = miss < 9.0 * off * np.maximum(1.0, distance(source.arm, source.task, target))[:, None]
+        real = miss < 9.0 * gap * np.maximum(1.0, distance(source.arm, source.task, target))[:, None]
         away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
         nearest, back = away.argmin(axis=2), away.argmin(axis=1)
         mutual = np.take_along_axis(back, nearest, axis=1) == np.arange(B)
         row, place = np.nonzero(mutual & (away.min(axis=2, initial=np.inf) < APART))
         numbers[row, nearest[row, place]] = place
-    rest = there & (numbers < 0)
-    return np.where(rest, B - 1 + rest.cumsum(axis=1), numbers)
+    unnamed = present & (numbers < 0)
+    return np.where(unnamed, B - 1 + unnamed.cumsum(axis=1), numbers)
 
 
 def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
@@ -151,98 +151,98 @@ def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
     return float(np.quantile(rough.min(axis=1), 0.8)) + tol.ROUNDED_ANSWER
 
 
-def _solve(source: Recorded, off: float, elimination: Callable[[], Geometry | None] | None, target: Array) -> Rows:
+def _solve(source: Recorded, gap: float, elimination: Callable[[], Geometry | None] | None, target: Array) -> Rows:
     """What is found of some targets, none of them complete; the similar arm's branches keep their places."""
     # the error grows with the slide's extension
-    off_here = off * np.maximum(1.0, distance(source.arm, source.task, target))
+    gaps = gap * np.maximum(1.0, distance(source.arm, source.task, target))
     if elimination is None:
-        known, open_ = pairs.settled(source, off_here, target)
-        if len(rest := np.flatnonzero(open_)):
-            more, known.doubt[rest] = _by_neighbours(source, off, off_here[rest], None, target[rest])
-            known = known._replace(q=widened(known.q, more.shape[1]))
-            known.q[rest] = more
-        return known
-    found = _by_neighbours(source, off, off_here, elimination, target)
-    return Rows(*found, np.zeros(len(target), bool))
+        settled, open_ = pairs.settled(source, gaps, target)
+        if len(rows := np.flatnonzero(open_)):
+            more, settled.doubt[rows] = _by_neighbours(source, gap, gaps[rows], None, target[rows])
+            settled = settled._replace(q=widened(settled.q, more.shape[1]))
+            settled.q[rows] = more
+        return settled
+    branches = _by_neighbours(source, gap, gaps, elimination, target)
+    return Rows(*branches, np.zeros(len(target), bool))
 
 
 def _by_neighbours(
-    source: Recorded, off: float, off_here: Array, elimination: Callable[[], Geometry | None] | None, target: Array
+    source: Recorded, gap: float, gaps: Array, elimination: Callable[[], Geometry | None] | None, target: Array
 ) -> tuple[Array, Bool]:
     """Branches and doubts by the elimination, or by the similar arm's branches at targets around."""
     arm, task = source.arm, source.task
-    seeds, good, doubt = _correct(source, off, off_here, target)
+    seeds, good, doubt = _correct(source, gap, gaps, target)
     q = np.where(good[:, :, None], seeds, np.nan)
-    few = np.flatnonzero(doubt)
-    if not len(few):
+    rows = np.flatnonzero(doubt)
+    if not len(rows):
         return q, doubt
-    goals = target[few]
+    goals = target[rows]
     if elimination is not None:
         solver = elimination()
         assert solver is not None
         assert solver.rows is not None
-        others = [solver.rows(goals).q]
+        seeds_around = [solver.rows(goals).q]
     else:
-        rings = (around(arm, task, goals, size * off_here[few]) for size in RINGS)
-        others = [source.rows(there)[0] for ring in rings for there in ring]
-    more = _corrected_seeds(arm, task, np.concatenate([seeds[few], *others], axis=1), goals, seeds.shape[1])
-    out = widened(q, more.shape[1])
-    out[few] = more
-    return out, doubt
+        rings = (around(arm, task, goals, size * gaps[rows]) for size in RINGS)
+        seeds_around = [source.rows(moved)[0] for ring in rings for moved in ring]
+    more = _corrected_seeds(arm, task, np.concatenate([seeds[rows], *seeds_around], axis=1), goals, seeds.shape[1])
+    filled = widened(q, more.shape[1])
+    filled[rows] = more
+    return filled, doubt
 
 
-def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, own: int) -> Array:
-    """Seeds (N, B, n) moved onto the arm: the first `own` in their places, then what else they lead to, once."""
+def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, places: int) -> Array:
+    """Seeds (N, B, n) moved onto the arm: the first `places` in their places, then what else they lead to, once."""
     N, B, n = q.shape
     flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
-    some = np.flatnonzero(newton.missing(arm, task, flat, goals) < tol.HOPELESS)
+    close = np.flatnonzero(newton.missing(arm, task, flat, goals) < tol.HOPELESS)
     size = np.full(len(flat), np.inf)
-    flat[some], size[some] = newton.correct(arm, task, flat[some], goals[some], steps=20, patience=4)
+    flat[close], size[close] = newton.correct(arm, task, flat[close], goals[close], steps=20, patience=4)
     flat[size > tol.SOLUTION] = np.nan
-    q = _filled_columns(flat.reshape(N, B, n), own)
+    q = _filled_columns(flat.reshape(N, B, n), places)
     for i in range(1, q.shape[1]):
         again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < tol.ALIKE
         q[again.any(axis=1), i] = np.nan
-    return _filled_columns(q, own)
+    return _filled_columns(q, places)
 
 
 def _has_four_roots(arm: Arm, q: Array) -> Bool:
     """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
     near = newton.distances(arm, q, q) < tol.APART_ROOTS
-    there = ~np.isnan(q[:, :, 0])
-    return np.asarray((there.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
+    present = ~np.isnan(q[:, :, 0])
+    return np.asarray((present.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
 
 
-def _filled_columns(q: Array, own: int) -> Array:
-    """Rows (N, B, n) without the columns that are nan, but for the first `own`."""
-    there = ~np.isnan(q[:, own:, 0])
-    order = own + np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]
-    return np.concatenate([q[:, :own], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
+def _filled_columns(q: Array, places: int) -> Array:
+    """Rows (N, B, n) without the columns that are nan, but for the first `places`."""
+    present = ~np.isnan(q[:, places:, 0])
+    order = places + np.argsort(~present, axis=1, kind="stable")[:, : int(present.sum(axis=1).max(initial=0))]
+    return np.concatenate([q[:, :places], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
 
 
-def _correct(source: Recorded, off: float, off_here: Array, target: Array) -> tuple[Array, Bool, Bool]:
+def _correct(source: Recorded, gap: float, gaps: Array, target: Array) -> tuple[Array, Bool, Bool]:
     """Seeds moved onto the arm (N, B, n), which are branches (N, B), and for which poses (N,) that may not be all.
 
-    off_here: `off` at each target (N,). The true arm reaches a target as the similar one, `source`, reaches
+    gaps: `gap` at each target (N,). The true arm reaches a target as the similar one, `source`, reaches
     another, not much more than that away. Hence a pose is sure only if the similar arm's branches hardly move
     all around it: where one comes or goes, it moves with the square root of the distance.
     """
     arm, task = source.arm, source.task
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
-    weak = min(tol.STEADY, 1.5 * np.sqrt(off)) + tol.AT_LEAST
-    limit = 9.0 * off_here[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
+    weak = min(tol.STEADY, 1.5 * np.sqrt(gap)) + tol.AT_LEAST
+    limit = 9.0 * gaps[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
-    for there in around(arm, task, target, AROUND * off_here):
-        q, miss, doubt_there = source.rows(there)
-        steady = newton.wrapped_distance(arm, q, seed) < AROUND * off_here[:, None] / weak
+    for moved in around(arm, task, target, AROUND * gaps):
+        q, miss, doubt_there = source.rows(moved)
+        steady = newton.wrapped_distance(arm, q, seed) < AROUND * gaps[:, None] / weak
         doubt = doubt | doubt_there | (((miss < limit) | real) & ~steady).any(axis=1)
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)
     rough = newton.missing(arm, task, flat, goals)
-    some = np.flatnonzero(rough < tol.HOPELESS)
+    close = np.flatnonzero(rough < tol.HOPELESS)
     q, size = flat.copy(), np.full(N * B, np.inf)
-    q[some], size[some] = newton.correct(arm, task, flat[some], goals[some])
+    q[close], size[close] = newton.correct(arm, task, flat[close], goals[close])
     branch, good = q.reshape(N, B, n), (size <= tol.ANSWERED).reshape(N, B)
     # what is unreachable for the similar arm may yet be reached
     doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)

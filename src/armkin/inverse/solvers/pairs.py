@@ -42,28 +42,28 @@ def around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
     for way in (size, -size):
         if task.orientation == "full":
             for axis in range(3):
-                there = target.copy()
-                there[:, axis, 3] += way * arm.reach
-                yield there
+                moved = target.copy()
+                moved[:, axis, 3] += way * arm.reach
+                yield moved
                 turned = target.copy()
                 turned[:, :3, :3] = rotation_about(axis, way) @ target[:, :3, :3]
                 yield turned
         else:
             for k in range(target.shape[1]):
-                there = target.copy()
-                there[:, k] += way * (arm.reach if k < task.position else 1.0)
-                yield there
+                moved = target.copy()
+                moved[:, k] += way * (arm.reach if k < task.position else 1.0)
+                yield moved
 
 
-def settled(source: Recorded, off: Array, target: Array) -> tuple[Rows, Bool]:
-    """The branches of an arm that is close to a class; off (N,): how close, at each target [reaches].
+def settled(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bool]:
+    """The branches of an arm that is close to a class; gaps (N,): how close, at each target [reaches].
 
     source: the class. Targets in doubt are those of which two roots are one, or nearly; guesses (N, B, n): where these
     are. Also of which targets (N,) not all roots are accounted for: the class's own doubts stay open.
     """
     arm, task = source.arm, source.task
     seed, miss, open_ = source.rows(target)
-    tried = ~(miss >= ABSENT * off[:, None]) | arm.prismatic.any()  # the error grows with the slide's extension
+    tried = ~(miss >= ABSENT * gaps[:, None]) | arm.prismatic.any()  # the error grows with the slide's extension
     row, place = np.nonzero(tried)
     q, guesses = np.full_like(seed, np.nan), np.full_like(seed, np.nan)
     better, size = newton.correct(arm, task, seed[row, place], target[row])
@@ -74,27 +74,27 @@ def settled(source: Recorded, off: Array, target: Array) -> tuple[Rows, Bool]:
     bad = (np.isnan(q[:, :, 0]) & tried) | jumped | _merged(arm, q)
     doubt, complete = np.zeros((2, len(target)), bool)
     left = np.flatnonzero(bad.any(axis=1) & ~open_)
-    others = _partners(source)
-    if not len(left) or task.constraints != arm.n or not len(others):
+    partners = _partners(source)
+    if not len(left) or task.constraints != arm.n or not len(partners):
         open_[left] = True
         return Rows(q, doubt, complete, None, guesses), open_
-    away = newton.wrapped_distance(arm, seed[left][:, others], seed[left][:, None])
-    partner = others[np.where(bad[left][:, None], away, np.inf).min(axis=2).argmin(axis=1)]
-    k, one = np.nonzero(
+    away = newton.wrapped_distance(arm, seed[left][:, partners], seed[left][:, None])
+    partner = partners[np.where(bad[left][:, None], away, np.inf).min(axis=2).argmin(axis=1)]
+    k, first = np.nonzero(
         (bad[left] | np.take_along_axis(bad[left], partner, axis=1)) & (np.arange(q.shape[1]) < partner)
     )
-    two, row = partner[k, one], left[k]
-    apart = newton.difference(arm, seed[row, one], seed[row, two]) * radian_or_reach(arm)
-    middle = seed[row, one] - 0.5 * apart
+    second, row = partner[k, first], left[k]
+    apart = newton.difference(arm, seed[row, first], seed[row, second]) * radian_or_reach(arm)
+    middle = seed[row, first] - 0.5 * apart
     pair = _meet(arm, task, middle, target[row])
-    found = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < MOVED)
-    open_[row[~found]] = True
-    sense = np.where(_keep_sense(source, (row, one, two), off, target, pair.way), 1.0, -1.0)[:, None]
-    for place, side in ((one, sense), (two, -sense)):
+    accepted = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < MOVED)
+    open_[row[~accepted]] = True
+    sense = np.where(_keep_sense(source, (row, first, second), gaps, target, pair.way), 1.0, -1.0)[:, None]
+    for place, side in ((first, sense), (second, -sense)):
         guess = pair.middle + side * pair.way
         guesses[row, place] = np.where((pair.square < -TOUCHING)[:, None], np.nan, guess)
         better, size = newton.correct(arm, task, guess, target[row])
-        q[row, place] = np.where((found & (pair.square > 0.0) & (size <= tol.ANSWERED))[:, None], better, np.nan)
+        q[row, place] = np.where((accepted & (pair.square > 0.0) & (size <= tol.ANSWERED))[:, None], better, np.nan)
         doubt[row] |= np.isnan(q[row, place, 0]) & (pair.square > -TOUCHING)
     doubt |= _merged(arm, q).any(axis=1)
     return Rows(q, doubt & ~open_, complete, None, guesses), open_
@@ -113,16 +113,16 @@ def _partners(source: Recorded) -> Int:
     return np.array(flipped, np.intp).reshape(len(flipped), number.size)
 
 
-def _keep_sense(source: Recorded, where: tuple[Int, ...], off: Array, target: Array, way: Array) -> Bool:
-    """Whether ways (M, n) lead from branch `two` to branch `one` of targets row: as they do where the class's lie
-    farthest apart, among the targets around; where: row, one, two, (M,) each."""
-    arm, (row, one, two) = source.arm, where
+def _keep_sense(source: Recorded, branches: tuple[Int, ...], gaps: Array, target: Array, way: Array) -> Bool:
+    """Whether ways (M, n) lead from branch `second` to `first` of targets row: as they do where the class's lie
+    farthest apart, among the targets around; branches: row, first, second, (M,) each."""
+    arm, (row, first, second) = source.arm, branches
     M = np.arange(len(row))
     way = way / radian_or_reach(arm)
     widest, apart = np.zeros(len(row)), way.copy()
-    for there in around(arm, source.task, target[row], AROUND * off[row]):
-        q = source.rows(there)[0]
-        between = newton.difference(arm, q[M, one], q[M, two])
+    for moved in around(arm, source.task, target[row], AROUND * gaps[row]):
+        q = source.rows(moved)[0]
+        between = newton.difference(arm, q[M, first], q[M, second])
         size = np.nan_to_num(np.abs(between).max(axis=1))
         apart[size > widest] = between[size > widest]
         widest = np.maximum(widest, size)
@@ -153,9 +153,9 @@ def _meet(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
     for _ in range(STEPS):
         goal, m, u, w = target[active], middle[active], way[active], square[active]
         half = np.sqrt(np.maximum(np.abs(w), tol.PAIR_WAY**2))[:, None]
-        ahead, behind, there = (newton.scaled(arm, task, m + side * half * u * unit, goal) for side in (1.0, -1.0, 0.0))
-        bent = (ahead[0] + behind[0] - 2.0 * there[0]) / half**2
-        even, odd = there[0] + 0.5 * w[:, None] * bent, (ahead[0] - behind[0]) / (2.0 * half)
+        ahead, behind, at_m = (newton.scaled(arm, task, m + side * half * u * unit, goal) for side in (1.0, -1.0, 0.0))
+        bent = (ahead[0] + behind[0] - 2.0 * at_m[0]) / half**2
+        even, odd = at_m[0] + 0.5 * w[:, None] * bent, (ahead[0] - behind[0]) / (2.0 * half)
         A, B = 0.5 * (ahead[1] + behind[1]), (ahead[1] - behind[1]) / (2.0 * half[:, :, None])
         curved = (B @ u[:, :, None])[:, :, 0]
         third = ((A @ u[:, :, None])[:, :, 0] + odd) / (2.0 * half**2)

@@ -66,10 +66,10 @@ class Pencil:
     def roots(self, target: Array) -> _Roots:
         """All four roots of targets (N, 3), complex ones by their real parts."""
         p = target @ self.from_base[:3, :3].T + self.from_base[:3, 3]
-        known = np.stack([p[:, 2], 0.5 * (p * p).sum(axis=1)], axis=1) - self.rest
-        main, alone = (np.broadcast_to(one, (len(p), 3)).copy() for one in self.fixed)
-        main[:, 0] += known @ self.weights[0]
-        alone[:, 0] += known @ self.weights[1]
+        right = np.stack([p[:, 2], 0.5 * (p * p).sum(axis=1)], axis=1) - self.rest
+        main, alone = (np.broadcast_to(fixed, (len(p), 3)).copy() for fixed in self.fixed)
+        main[:, 0] += right @ self.weights[0]
+        alone[:, 0] += right @ self.weights[1]
         half, cosine, sine = self._half_tangents(main, alone)
         down = 1.0 / (1.0 + half * half)
         c, s = (1.0 - half * half) * down, 2.0 * half * down
@@ -85,14 +85,14 @@ class Pencil:
         loose = np.abs(across) < tol.NEARBY
         across = np.where(loose, 1.0, across)
         c2, s2 = (x * gx + y * gy) / across, (x * gy - y * gx) / across
-        off = np.maximum(_imaginary(c, s), _imaginary(c2, s2))
+        imaginary = np.maximum(_imaginary(c, s), _imaginary(c2, s2))
         q2, q3 = np.arctan2(s2.real, c2.real), np.arctan2(s.real, c.real)
         c2, s2 = np.cos(q2), np.sin(q2)
-        there = np.stack([c2 * x.real - s2 * y.real, s2 * x.real + c2 * y.real, z.real], axis=2)
-        there = there @ self.arm.link[1][:3, :3].T + self.arm.link[1][:3, 3] / self.scale
-        q1 = np.arctan2(p[:, 1], p[:, 0])[:, None] - np.arctan2(there[..., 1], there[..., 0])
-        free = (np.hypot(there[..., 0], there[..., 1]) < tol.NEARBY) | loose
-        return _Roots(np.stack([q1, q2, q3], axis=2), half.imag == 0.0, off, free.any(axis=1))
+        tip = np.stack([c2 * x.real - s2 * y.real, s2 * x.real + c2 * y.real, z.real], axis=2)
+        tip = tip @ self.arm.link[1][:3, :3].T + self.arm.link[1][:3, 3] / self.scale
+        q1 = np.arctan2(p[:, 1], p[:, 0])[:, None] - np.arctan2(tip[..., 1], tip[..., 0])
+        free = (np.hypot(tip[..., 0], tip[..., 1]) < tol.NEARBY) | loose
+        return _Roots(np.stack([q1, q2, q3], axis=2), half.imag == 0.0, imaginary, free.any(axis=1))
 
     def _half_tangents(self, main: Array, alone: Array) -> tuple[NDArray[Any], Array, Array]:
         """Eigenvalues (N, 4): tan((q3 - psi) / 2); cosine and sine of psi, (N, 1): at ``psi + pi`` e is largest."""
@@ -107,8 +107,8 @@ class Pencil:
         along, across = c * M[:, 1] + s * M[:, 2], c * M[:, 2] - s * M[:, 1]
         companion = np.zeros((N, 4, 4))
         companion[:, 0, 2] = companion[:, 1, 3] = 1.0
-        rest = np.concatenate([M[:, 0] + along, 2.0 * across], axis=2)
-        companion[:, 2:] = -nudged(np.linalg.solve, M[:, 0] - along, rest)
+        right = np.concatenate([M[:, 0] + along, 2.0 * across], axis=2)
+        companion[:, 2:] = -nudged(np.linalg.solve, M[:, 0] - along, right)
         return np.linalg.eigvals(companion), cosine, sine
 
 
@@ -125,26 +125,26 @@ def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | Non
         return None
 
     def rows(target: Array) -> Rows:
-        found = stacked([_solved(pencil, target[part]) for part in slices(max(len(target), 1), CHUNK)])
-        order = _order(newton.distances(arm, seeds.rows(target)[0], found.q))
-        return found._replace(q=np.take_along_axis(found.q, order[:, :, None], axis=1))
+        roots = stacked([_solved(pencil, target[part]) for part in slices(max(len(target), 1), CHUNK)])
+        order = _order(newton.distances(arm, seeds.rows(target)[0], roots.q))
+        return roots._replace(q=np.take_along_axis(roots.q, order[:, :, None], axis=1))
 
     return Geometry(f"near {alike.name}", why, True, rows=rows, labels=alike.labels, ordered=alike.ordered, branches=4)
 
 
 def _solved(pencil: Pencil, target: Array) -> Rows:
     """Branches (N, 4, 3), nan where a root is not real; guesses are complex roots that all but are."""
-    arm, task, found = pencil.arm, pencil.task, pencil.roots(target)
-    row, place = np.nonzero(found.real)
-    better, size = newton.correct(arm, task, found.q[row, place], target[row])
-    q = np.full_like(found.q, np.nan)
+    arm, task, roots = pencil.arm, pencil.task, pencil.roots(target)
+    row, place = np.nonzero(roots.real)
+    better, size = newton.correct(arm, task, roots.q[row, place], target[row])
+    q = np.full_like(roots.q, np.nan)
     q[row, place] = np.where((size <= tol.ANSWERED)[:, None], better, np.nan)
     missing = np.isnan(q[:, :, 0])
-    beside = missing & (found.real | (found.off < pencil.touching))
+    beside = missing & (roots.real | (roots.off < pencil.touching))
     apart = newton.distances(arm, q, q) + 9.0 * np.eye(4)
     merged = (apart < max(tol.APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
-    doubt = beside.any(axis=1) | merged | found.loose
-    return Rows(q, doubt, np.ones(len(target), bool), None, np.where(beside[:, :, None], found.q, np.nan))
+    doubt = beside.any(axis=1) | merged | roots.loose
+    return Rows(q, doubt, np.ones(len(target), bool), None, np.where(beside[:, :, None], roots.q, np.nan))
 
 
 def _order(away: Array) -> Int:

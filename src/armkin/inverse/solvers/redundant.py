@@ -60,17 +60,17 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
         return None
     if task_name is None:
         return redundancy(arm, task.name)  # the same rest, prepared once
-    found = []
+    options = []
     for joint in ([arm.n - 1] if task.orientation == "full" or _turns_about_the_tool(arm, task) else []) + [0]:
         if arm.prismatic[joint]:
             continue
-        rest = lock(arm, {arm.joint_names[joint]: 0.0})
+        others = lock(arm, {arm.joint_names[joint]: 0.0})
         try:
-            found.append(Redundancy(joint, rest, task, solver(rest, task.name)[1]))
+            options.append(Redundancy(joint, others, task, solver(others, task.name)[1]))
         except UsageError:
             continue
-    closed = [one for one in found if one.geometry.pairs is not None]
-    return next(iter(closed or found[:1]), None)
+    closed = [option for option in options if option.geometry.pairs is not None]
+    return next(iter(closed or options[:1]), None)
 
 
 @lru_cache(maxsize=64)
@@ -79,17 +79,17 @@ def nearly_closed(arm: Arm, free: Redundancy) -> Redundancy:
     for joint in (arm.n - 1, 0):
         if free.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
             continue
-        rest = lock(arm, {arm.joint_names[joint]: 0.0})
-        for alike in (module.recognise(rest, free.task, tol.NEAR) for module in (spherical, three_parallel)):
-            if alike is not None and (one := Redundancy(joint, rest, free.task, alike)).by_formula:
-                return one
+        others = lock(arm, {arm.joint_names[joint]: 0.0})
+        for alike in (module.recognise(others, free.task, tol.NEAR) for module in (spherical, three_parallel)):
+            if alike is not None and (option := Redundancy(joint, others, free.task, alike)).by_formula:
+                return option
     return free
 
 
 def _turns_about_the_tool(arm: Arm, task: Task) -> bool:
     """Whether the last joint turns about the tool's z axis, which alone is asked for: it moves no target."""
-    off = np.array([arm.link[-1][:2, 3] / arm.reach, arm.link[-1][:2, 2]])
-    return task.orientation == "axis" and task.position == 3 and bool(np.abs(off).max() <= tol.EXACT)
+    offsets = np.array([arm.link[-1][:2, 3] / arm.reach, arm.link[-1][:2, 2]])
+    return task.orientation == "axis" and task.position == 3 and bool(np.abs(offsets).max() <= tol.EXACT)
 
 
 def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
@@ -102,35 +102,35 @@ def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
     G = arm.link[0] @ Z @ inverse(arm.link[0])
     if free.task.orientation == "full":
         return np.asarray(G @ target)
-    out, p = target.copy(), free.task.position
-    out[:, :p] = np.einsum("mij,mj->mi", G[:, :p, :p], target[:, :p]) + G[:, :p, 3]
-    out[:, p : p + len(free.task.sums)] -= t[:, None] * free.task.sums[:, 0]
+    targets, p = target.copy(), free.task.position
+    targets[:, :p] = np.einsum("mij,mj->mi", G[:, :p, :p], target[:, :p]) + G[:, :p, 3]
+    targets[:, p : p + len(free.task.sums)] -= t[:, None] * free.task.sums[:, 0]
     if free.task.orientation == "axis":
-        out[:, 3:] = np.einsum("mij,mj->mi", G[:, :3, :3], target[:, 3:])
-    return out
+        targets[:, 3:] = np.einsum("mij,mj->mi", G[:, :3, :3], target[:, 3:])
+    return targets
 
 
 def held_by_near(arm: Arm, free: Redundancy) -> Geometry:
     """The class of the rest as one of the whole arm: the redundant joint is where the preferred motion has it."""
-    r, rest = free.joint, free.geometry.pairs
+    r, solve_others = free.joint, free.geometry.pairs
     why = f"{free.geometry.why}; {arm.joint_names[r]} is redundant and held where near has it"
-    if rest is None:
+    if solve_others is None:
         return replace(free.geometry, why=why)
 
     def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
-        own = prefer[r]
-        assert own is not None
-        found = rest(moved_entries(arm, free, goal, own), [*prefer[:r], *prefer[r + 1 :]])
-        angles = [*(found.angles or [None] * len(found.pairs))]
+        pair = prefer[r]
+        assert pair is not None
+        candidates = solve_others(moved_entries(arm, free, goal, pair), [*prefer[:r], *prefer[r + 1 :]])
+        angles = [*(candidates.angles or [None] * len(candidates.pairs))]
         angles.insert(r, None)
-        return found._replace(pairs=[*found.pairs[:r], own, *found.pairs[r:]], angles=angles)
+        return candidates._replace(pairs=[*candidates.pairs[:r], pair, *candidates.pairs[r:]], angles=angles)
 
     return replace(free.geometry, pairs=pairs, why=why, doubts=None)
 
 
-def moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], own: Pair) -> list[Entry]:
+def moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], pair: Pair) -> list[Entry]:
     """`moved` of one target's entries, for the cosine and sine of the redundant joint."""
-    c, s = own
+    c, s = pair
     if free.still:
         return goal
     if free.joint:
@@ -142,11 +142,11 @@ def moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], own: Pair) -> l
     if free.task.orientation == "full":
         return pose.times(G, goal)
     p = free.task.position
-    out = pose.apply(G, [*goal[:p], 0.0][:3])[:p]
+    entries = pose.apply(G, [*goal[:p], 0.0][:3])[:p]
     angle = arrays.arctan2(s, c)
-    for k, by in enumerate(free.task.sums[:, 0].tolist(), p):
-        out.append(arrays.sub(goal[k], arrays.mul(by, angle)))
-    return [*out, *(pose.turn(G, goal[3:6]) if free.task.orientation == "axis" else [])]
+    for k, rate in enumerate(free.task.sums[:, 0].tolist(), p):
+        entries.append(arrays.sub(goal[k], arrays.mul(rate, angle)))
+    return [*entries, *(pose.turn(G, goal[3:6]) if free.task.orientation == "axis" else [])]
 
 
 @lru_cache(maxsize=128)

@@ -32,8 +32,8 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
 
         def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
             # where the virtual joint is free, other values of the others' are other values of its own
-            found = solve(pose_of(goal), [*prefer, prefer[4]])
-            return found._replace(pairs=found.pairs[:5], angles=found.angles[:5])
+            candidates = solve(pose_of(goal), [*prefer, prefer[4]])
+            return candidates._replace(pairs=candidates.pairs[:5], angles=candidates.angles[:5])
 
         ends = tuple(j for j in inner.ends if j < 5)
         return replace(inner, why=why, pairs=pairs, ends=ends, doubts=None)
@@ -43,11 +43,11 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
     def rows(goal: Array) -> Rows:
         T = np.empty((len(goal), 4, 4))
         pose.write(pose_of(list(goal.T)), T)
-        found = solve_rows(T)
-        guesses = None if found.guesses is None else found.guesses[:, :, :5]
-        q = found.q[:, :, :5]
+        branches = solve_rows(T)
+        guesses = None if branches.guesses is None else branches.guesses[:, :, :5]
+        q = branches.q[:, :, :5]
         order = projection(arm.prismatic, q).argsort(axis=1)
-        return found._replace(q=np.take_along_axis(q, order[:, :, None], axis=1), guesses=guesses)
+        return branches._replace(q=np.take_along_axis(q, order[:, :, None], axis=1), guesses=guesses)
 
     return replace(inner, why=why, rows=rows, unmoved=None, places=None)
 

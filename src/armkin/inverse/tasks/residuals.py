@@ -18,22 +18,22 @@ def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -
     T: (M, 4, 4) the tool's poses; q: (M, n); target: (M, m) or (M, 4, 4).
     """
     if task.orientation == "full":
-        out = np.empty((len(T), 6))
-        out[:, :3] = (target[:, :3, 3] - T[:, :3, 3]) / unit
+        missing = np.empty((len(T), 6))
+        missing[:, :3] = (target[:, :3, 3] - T[:, :3, 3]) / unit
         # half the sum of the columns' vector products is the rotation vector to third order
         C = np.ascontiguousarray(T[:, :3, :3]) @ np.ascontiguousarray(
             np.swapaxes(target[:, :3, :3], 1, 2)
         )  # of views it takes three times as long
         for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-            out[:, 3 + k] = 0.5 * (C[:, i, j] - C[:, j, i])
+            missing[:, 3 + k] = 0.5 * (C[:, i, j] - C[:, j, i])
         far = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - SMALL_TURN
         if far.any():
-            out[far, 3:] = _rotation_vector(np.swapaxes(C[far], 1, 2))
-        return out
+            missing[far, 3:] = _rotation_vector(np.swapaxes(C[far], 1, 2))
+        return missing
     parts = [(target[:, : task.position] - T[:, : task.position, 3]) / unit]
     if len(task.sums):
-        wanted = target[:, task.position : task.position + len(task.sums)]
-        angle = wanted - q @ task.sums.T - task.offsets
+        sums = target[:, task.position : task.position + len(task.sums)]
+        angle = sums - q @ task.sums.T - task.offsets
         parts.append(wrapped(angle))
     if task.orientation == "axis":
         z = T[:, :3, 2]

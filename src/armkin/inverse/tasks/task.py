@@ -83,12 +83,12 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
     flat, lead = shaped(task, targets)
     rounding = np.zeros(len(flat))
     if task.orientation == "full":
-        given = flat
+        unread = flat
         for rows in arrays.slices(len(flat), arrays.CHUNK):
-            part = given[rows]
+            part = unread[rows]
             near, rounding[rows], _ = read_poses(part)
             if near is not part:
-                flat = flat.copy() if flat is given else flat
+                flat = flat.copy() if flat is unread else flat
                 flat[rows] = near
     return flat, lead, rounding
 
@@ -125,17 +125,17 @@ def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
     entries = pose.read(T)
     check = rotation_check()
     if len(T) == 1:
-        off = check.one_by_one([pose.read_one(T[0])])[0]
+        defect = check.one_by_one([pose.read_one(T[0])])[0]
     else:
-        off = np.array(check.run(entries, check.workspace(len(T)))[0])
-    if not (off <= ROTATION).all():
+        defect = np.array(check.run(entries, check.workspace(len(T)))[0])
+    if not (defect <= ROTATION).all():
         raise UsageError("a target is no pose: its 3 x 3 part must be a rotation to 5e-6")
-    some = np.flatnonzero(off > ROUNDED)
-    if len(some):
+    rows = np.flatnonzero(defect > ROUNDED)
+    if len(rows):
         T = T.copy()
-        T[some, :3, :3] = nearest_rotation(T[some, :3, :3])
+        T[rows, :3, :3] = nearest_rotation(T[rows, :3, :3])
         entries = pose.read(T)
-    return T, off, entries
+    return T, defect, entries
 
 
 @cache
@@ -144,10 +144,10 @@ def rotation_check() -> StraightLineCode:
 
     def formula(P: pose.Pose) -> list[Entry]:
         x, y, z = P[0:3], P[3:6], P[6:9]
-        off = [arrays.dot(x, x) - 1.0, arrays.dot(z, z) - 1.0, arrays.dot(x, z)]
-        off += [arrays.sub(a, b) for a, b in zip(arrays.cross(z, x), y, strict=True)]
-        worst = arrays.absolute(off[0])
-        for e in off[1:]:
+        defects = [arrays.dot(x, x) - 1.0, arrays.dot(z, z) - 1.0, arrays.dot(x, z)]
+        defects += [arrays.sub(a, b) for a, b in zip(arrays.cross(z, x), y, strict=True)]
+        worst = arrays.absolute(defects[0])
+        for e in defects[1:]:
             worst = arrays.maximum(worst, arrays.absolute(e))
         return [worst]
 
@@ -184,27 +184,27 @@ def targets_of(task: Task, T: Array, q: Array) -> Array:
     return np.concatenate(parts, axis=1)
 
 
-def moved(arm: Arm, task: Task, target: Array, by: Array) -> Array:
-    """Targets (M, m) or (M, 4, 4) moved a little; by: (6,) three [reaches], three [rad]."""
-    out = target.copy()
+def moved(arm: Arm, task: Task, target: Array, way: Array) -> Array:
+    """Targets (M, m) or (M, 4, 4) moved a little; way: (6,) three [reaches], three [rad]."""
+    targets = target.copy()
     if task.orientation == "full":
-        out[:, :3, 3] += by[:3] * arm.reach
-        x, y, z = by[3:]
+        targets[:, :3, 3] += way[:3] * arm.reach
+        x, y, z = way[3:]
         spin = np.array([[1, -z, y], [z, 1, -x], [-y, x, 1]])
-        out[:, :3, :3] = np.linalg.qr(spin)[0] * np.sign(np.diag(np.linalg.qr(spin)[1])) @ target[:, :3, :3]
-        return out
-    out[:, : task.position] += by[: task.position] * arm.reach
-    rest = out.shape[1] - task.position
-    out[:, task.position :] += by[3 : 3 + rest]
+        targets[:, :3, :3] = np.linalg.qr(spin)[0] * np.sign(np.diag(np.linalg.qr(spin)[1])) @ target[:, :3, :3]
+        return targets
+    targets[:, : task.position] += way[: task.position] * arm.reach
+    angles = targets.shape[1] - task.position
+    targets[:, task.position :] += way[3 : 3 + angles]
     if task.orientation == "axis":
-        out[:, 3:] /= np.linalg.norm(out[:, 3:], axis=1, keepdims=True)
-    return out
+        targets[:, 3:] /= np.linalg.norm(targets[:, 3:], axis=1, keepdims=True)
+    return targets
 
 
 def around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = AROUND) -> Array:
     """Targets (M, m) or (M, 4, 4) moved by up to size [reaches, rad], each way also backwards: (M, 2 pairs, ...)."""
     ways = np.random.default_rng(3).uniform(-size, size, (pairs, 6))
-    return np.stack([moved(arm, task, target, sign * by) for by in ways for sign in (1.0, -1.0)], axis=1)
+    return np.stack([moved(arm, task, target, sign * way) for way in ways for sign in (1.0, -1.0)], axis=1)
 
 
 def distance(arm: Arm, task: Task, target: Array) -> Array:
