@@ -55,24 +55,24 @@ def run(*words: object, stdin: bytes = b"", cwd: Path = ROOT) -> Result:
 BUSY = ("no board answers", "does not answer any more", "too slow or too noisy", "half a second")
 
 
-def patiently(*words: object, run: Callable[..., Result] = run) -> Result:
+def run_patiently(*words: object, run: Callable[..., Result] = run) -> Result:
     """Run a command on a board in real time, again where the machine was too busy for it, five times at most.
 
     That the arm then stands on its path and can be sent on is what the command says, and what this takes it at.
     """
     for _ in range(5):
-        done = run(*words)
-        if done.code == 0 or not any(said in done.err for said in BUSY):
+        completed = run(*words)
+        if completed.code == 0 or not any(said in completed.err for said in BUSY):
             break
-        if "position is known" in done.err:
+        if "position is known" in completed.err:
             words = tuple(word for word in words if word != "--assume-home")
-    return done
+    return completed
 
 
-def process(*words: object, **settings: Any) -> Result:
+def run_process(*words: object, **settings: Any) -> Result:
     """Run `python -m armkin` as a process."""
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-m", "armkin", *map(str, words)],
         **{"cwd": ROOT, "capture_output": True, "timeout": 180, **settings},
     )
-    return Result(done.returncode, (done.stdout or b"").decode(), (done.stderr or b"").decode())
+    return Result(completed.returncode, (completed.stdout or b"").decode(), (completed.stderr or b"").decode())

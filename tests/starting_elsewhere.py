@@ -72,18 +72,18 @@ class Kind:
 
 def _text(board: str, axes: Sequence[str] = "XYZ", drives: Sequence[str] = (), gripper: bool = True) -> str:
     """three_dof's file with another board, other axes or drives."""
-    data = yaml.safe_load((ROOT / "robots/three_dof.yaml").read_text())
-    data["board"] = yaml.safe_load(board)
-    for joint, axis in zip(data["joints"], axes, strict=True):
+    document = yaml.safe_load((ROOT / "robots/three_dof.yaml").read_text())
+    document["board"] = yaml.safe_load(board)
+    for joint, axis in zip(document["joints"], axes, strict=True):
         joint["drive"]["axis"] = axis
-    for joint, drive in zip(data["joints"], drives, strict=False):
+    for joint, drive in zip(document["joints"], drives, strict=False):
         joint["drive"] = yaml.safe_load(drive)
     if "uno_servos" in board:
-        data["joints"][0]["limits"], data["joints"][2]["limits"] = [-85, 85], [-120, 30]
-        data["gripper"]["axis"] = "S3"
+        document["joints"][0]["limits"], document["joints"][2]["limits"] = [-85, 85], [-120, 30]
+        document["gripper"]["axis"] = "S3"
     if not gripper:
-        del data["gripper"]
-    return str(yaml.safe_dump(data))
+        del document["gripper"]
+    return str(yaml.safe_dump(document))
 
 
 SERVOS = [f"{{kind: servo, axis: S{k}, travel: [0, 180], pulse_us: [500, 2500], zero: {zero}}}"

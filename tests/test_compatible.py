@@ -31,9 +31,9 @@ def test_every_option(command: str) -> None:
 
 @pytest.mark.parametrize("words", BEFORE["json"])
 def test_every_key(words: str) -> None:
-    done = run(*words.split(), "--json")
-    assert done.code == BEFORE["json"][words]["exit_code"]
-    assert set(BEFORE["json"][words]["keys"]) <= _keys(done.json)
+    completed = run(*words.split(), "--json")
+    assert completed.code == BEFORE["json"][words]["exit_code"]
+    assert set(BEFORE["json"][words]["keys"]) <= _keys(completed.json)
 
 
 def _keys(value: Any, place: str = "") -> set[str]:

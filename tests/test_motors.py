@@ -170,35 +170,35 @@ def test_servo_outside_its_travel_is_told_and_not_clamped() -> None:
 def test_best_pulses_is_the_best_of_all_neighbours() -> None:
     rng = np.random.default_rng(2)
     q = rng.uniform(THREE_DOF.lower * 0.9, THREE_DOF.upper * 0.9, (20, 3))
-    found = best_pulses(THREE_DOF, q)
-    assert np.all(found.gain >= 0)
-    assert np.any(found.gain > 1e-3)
+    best = best_pulses(THREE_DOF, q)
+    assert np.all(best.gain >= 0)
+    assert np.any(best.gain > 1e-3)
     for i in range(len(q)):
         exact = (q[i] - THREE_DOF.home) @ THREE_DOF.motor_gain.T
         around = np.floor(exact) + np.array(list(product((-1, 0, 1, 2), repeat=3)))
         tips = position(THREE_DOF, THREE_DOF.home + around / np.diag(THREE_DOF.motor_gain))
         least = np.linalg.norm(tips - position(THREE_DOF, q[i]), axis=1).min()
-        assert found.chosen.error[i] == pytest.approx(least, abs=1e-9)
+        assert best.chosen.error[i] == pytest.approx(least, abs=1e-9)
 
 
 def test_best_pulses_of_the_published_pose() -> None:
-    found = best_pulses(THREE_DOF, degrees(-30, 5, -5))
-    assert found.rounded.pulses.tolist() == [-1067, -10144, 5667]
-    assert found.chosen.pulses.tolist() == [-1067, -10142, 5665]
-    assert float(found.gain) == pytest.approx(0.000225829, abs=1e-9)
-    assert found.tried == 65
+    best = best_pulses(THREE_DOF, degrees(-30, 5, -5))
+    assert best.rounded.pulses.tolist() == [-1067, -10144, 5667]
+    assert best.chosen.pulses.tolist() == [-1067, -10142, 5665]
+    assert float(best.gain) == pytest.approx(0.000225829, abs=1e-9)
+    assert best.tried == 65
 
 
 def test_best_pulses_keeps_limits_and_does_not_strain_the_shoulder() -> None:
     q = np.random.default_rng(3).uniform(WRIST.lower, WRIST.upper, (30, 6))
     q[:10] = np.where(q[:10] > 0, WRIST.upper, WRIST.lower)  # into the corners
-    found = best_pulses(WRIST, q)
-    p = found.chosen.pulses
+    best = best_pulses(WRIST, q)
+    p = best.chosen.pulses
     assert np.all(p[:, 1] == p[:, 2])
-    over = np.maximum(WRIST.lower - found.chosen.actual_joints, found.chosen.actual_joints - WRIST.upper)
-    rounded_over = np.maximum(WRIST.lower - found.rounded.actual_joints, found.rounded.actual_joints - WRIST.upper)
+    over = np.maximum(WRIST.lower - best.chosen.actual_joints, best.chosen.actual_joints - WRIST.upper)
+    rounded_over = np.maximum(WRIST.lower - best.rounded.actual_joints, best.rounded.actual_joints - WRIST.upper)
     assert np.all(over.max(axis=1) <= np.maximum(rounded_over.max(axis=1), 0) + 1e-9)
-    assert np.all(found.gain >= 0)
+    assert np.all(best.gain >= 0)
 
 
 @STEPPER_ARMS

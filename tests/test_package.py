@@ -104,9 +104,9 @@ def test_commands_work_in_a_clean_environment_from_any_folder(
     words: str, code: int, shown: str, programs: Path, tmp_path: Path
 ) -> None:
     command = [str(programs / "armkin"), *words.split()]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False)
-    assert done.returncode == code, done.stderr
-    assert shown in (done.stdout if code == 0 else done.stderr)
+    completed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=180, check=False)
+    assert completed.returncode == code, completed.stderr
+    assert shown in (completed.stdout if code == 0 else completed.stderr)
 
 
 def test_the_package_is_imported_from_where_it_was_installed(programs: Path, tmp_path: Path) -> None:

@@ -87,9 +87,9 @@ for name in armkin.__all__:
 print(called)
 """
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout) > 20
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert completed.returncode == 0, completed.stderr
+    assert int(completed.stdout) > 20
 
 
 @pytest.mark.parametrize(
@@ -102,8 +102,8 @@ print(called)
 )
 def test_start_up_imports_nothing_heavy(code: str) -> None:
     report = f"{code}\nimport sys; print('LOADED', *sorted({{m.partition('.')[0] for m in sys.modules}}))"
-    done = subprocess.run([sys.executable, "-c", report], capture_output=True, text=True, check=True, cwd=ROOT)
-    loaded = done.stdout.rpartition("LOADED")[2].split()
+    completed = subprocess.run([sys.executable, "-c", report], capture_output=True, text=True, check=True, cwd=ROOT)
+    loaded = completed.stdout.rpartition("LOADED")[2].split()
     assert not set(HEAVY) & set(loaded)
 
 

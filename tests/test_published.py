@@ -310,9 +310,9 @@ def test_pan_tilt(how: str) -> None:
 
 
 def test_pan_tilt_has_no_inverse_task() -> None:
-    result = run("ik", "robots/pan_tilt.yaml", 270, 1432, -1060)
-    assert (result.code, result.out) == (2, "")
-    assert "no task fits" in result.err
+    completed = run("ik", "robots/pan_tilt.yaml", 270, 1432, -1060)
+    assert (completed.code, completed.out) == (2, "")
+    assert "no task fits" in completed.err
     with pytest.raises(armkin.UsageError, match="no task fits"):
         armkin.ik(load("pan_tilt"), [270, 1432, -1060])
 

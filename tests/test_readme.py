@@ -53,10 +53,10 @@ def commands(text: str) -> list[tuple[str, str]]:
 def printed(command: str, folder: Path) -> str:
     words = shlex.split(command)
     assert words[0] == "armkin", command
-    done = run(*words[1:], cwd=folder)
-    assert done.code in (0, 3), done.err
-    refused = f"{done.err.rstrip()}\n" if done.code == 3 and not done.out else ""
-    return f"{done.out}{refused}".rstrip("\n")
+    completed = run(*words[1:], cwd=folder)
+    assert completed.code in (0, 3), completed.err
+    refused = f"{completed.err.rstrip()}\n" if completed.code == 3 and not completed.out else ""
+    return f"{completed.out}{refused}".rstrip("\n")
 
 
 def written_anew(text: str, outputs: dict[str, str]) -> str:

@@ -23,8 +23,10 @@ def test_a_port_is_locked_for_programs_with_other_temporary_folders(tmp_path: Pa
     try:
         (tmp_path / "tmp").mkdir()
         env = os.environ | {"TMPDIR": str(tmp_path / "tmp")}
-        done = subprocess.run([sys.executable, "-c", HOLDER, name], env=env, capture_output=True, text=True, check=True)
-        assert done.stdout == f"{os.getpid()}\n"
+        completed = subprocess.run(
+            [sys.executable, "-c", HOLDER, name], env=env, capture_output=True, text=True, check=True
+        )
+        assert completed.stdout == f"{os.getpid()}\n"
     finally:
         lock.release()
 

@@ -38,9 +38,9 @@ def test_copies_of_a_branch_are_counted_before_they_are_made(tmp_path: Path) -> 
     lines = (ROOT / "robots/ur5e.yaml").read_text().splitlines()
     wide = [line.split("limits:")[0] + "limits: [-3600, 3600]" if "limits:" in line else line for line in lines]
     robot.write_text("\n".join(wide) + "\n")
-    done = run("ik", robot, 300, -200, 400, 180, 0, 0, "--turns")
-    assert (done.code, done.out) == (2, "")
-    assert "64,000,000 copies of one branch are within the limits; at most 50,000 are listed" in done.err
+    completed = run("ik", robot, 300, -200, 400, 180, 0, 0, "--turns")
+    assert (completed.code, completed.out) == (2, "")
+    assert "64,000,000 copies of one branch are within the limits; at most 50,000 are listed" in completed.err
 
 
 def test_counts_beyond_a_boards_registers_are_refused(tmp_path: Path) -> None:
@@ -49,15 +49,15 @@ def test_counts_beyond_a_boards_registers_are_refused(tmp_path: Path) -> None:
         (ROOT / "robots/three_dof.yaml").read_text().partition("gripper:")[0].replace("max_speed: 60", "max_speed: 400")
     )
     robot.write_text("\n".join(line for line in text.splitlines() if "limits:" not in line) + "\n")
-    done = run("send", robot, "3.1e7", 0, 0, "--dry-run")
-    assert (done.code, done.out) == (2, "")
-    assert "motor q1 would stand at 1,102,222,222 counts; a board counts to 1,073,741,824" in done.err
+    completed = run("send", robot, "3.1e7", 0, 0, "--dry-run")
+    assert (completed.code, completed.out) == (2, "")
+    assert "motor q1 would stand at 1,102,222,222 counts; a board counts to 1,073,741,824" in completed.err
 
 
 def test_standard_input_without_end_is_refused() -> None:
-    done = run("send", "--port", "sim", stdin=b"{}\n" * 11_000_000)
-    assert (done.code, done.out) == (2, "")
-    assert "more than 32 MB on standard input" in done.err
+    completed = run("send", "--port", "sim", stdin=b"{}\n" * 11_000_000)
+    assert (completed.code, completed.out) == (2, "")
+    assert "more than 32 MB on standard input" in completed.err
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="a POSIX device")
@@ -74,10 +74,10 @@ def test_standard_input_without_end_is_refused() -> None:
     ],
 )
 def test_a_file_without_end_is_refused(words: str, message: str) -> None:
-    done = run(*words.split())
-    assert done.code in (1, 2, 4)
-    assert done.out == ""
-    assert message in done.err
+    completed = run(*words.split())
+    assert completed.code in (1, 2, 4)
+    assert completed.out == ""
+    assert message in completed.err
 
 
 def test_plans_that_were_sent_are_not_kept() -> None:

@@ -41,10 +41,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_robot_file_stays(words: tuple[str, ...], out: str, folder: Path) -> None:
     before = {path: (folder / path).read_bytes() for path in ("r/three_dof.yaml", "other.yaml")}
     full = [str(folder / word) if (folder / word).exists() else word for word in (*words, out)]
-    done = run(*full)
-    assert done.code == 2, done
-    assert done.out == ""
-    assert "give" in done.err or "end the file's name" in done.err
+    completed = run(*full)
+    assert completed.code == 2, completed
+    assert completed.out == ""
+    assert "give" in completed.err or "end the file's name" in completed.err
     assert {path: (folder / path).read_bytes() for path in before} == before
     assert sorted(path.name for path in folder.iterdir()) == ["hard.yaml", "other.yaml", "r", "rows.csv", "soft.yaml"]
 
@@ -52,9 +52,9 @@ def test_a_robot_file_stays(words: tuple[str, ...], out: str, folder: Path) -> N
 def test_an_input_stays(folder: Path) -> None:
     (folder / "same.csv").hardlink_to(folder / "rows.csv")
     for out in ("rows.csv", "same.csv"):
-        done = run("fk", folder / "r/three_dof.yaml", "--batch", folder / "rows.csv", "--out", folder / out)
-        assert (done.code, done.out) == (2, "")
-        assert "is what this command reads; give the output another name" in done.err
+        completed = run("fk", folder / "r/three_dof.yaml", "--batch", folder / "rows.csv", "--out", folder / out)
+        assert (completed.code, completed.out) == (2, "")
+        assert "is what this command reads; give the output another name" in completed.err
     assert (folder / "rows.csv").read_text() == ROW
 
 
@@ -62,9 +62,9 @@ def test_a_read_only_file_stays(folder: Path) -> None:
     kept = folder / "kept.csv"
     kept.write_text("mine\n")
     kept.chmod(0o444)
-    done = run("fk", THREE_DOF, "--batch", folder / "rows.csv", "--out", kept)
-    assert (done.code, done.out) == (1, "")
-    assert "it is read-only; give another name" in done.err
+    completed = run("fk", THREE_DOF, "--batch", folder / "rows.csv", "--out", kept)
+    assert (completed.code, completed.out) == (1, "")
+    assert "it is read-only; give another name" in completed.err
     assert kept.read_text() == "mine\n"
 
 

@@ -71,10 +71,10 @@ def test_signals_while_rows_are_read_are_not_lost() -> None:
     ],
 )
 def test_streams_that_are_not_there_are_named(words: str, code: int, message: str) -> None:
-    done = subprocess.run(["sh", "-c", f"exec {sys.executable} -m armkin {words}"], capture_output=True, text=True)
-    assert done.returncode == code
-    assert message in done.stderr
-    assert "internal error" not in done.stderr
+    completed = subprocess.run(["sh", "-c", f"exec {sys.executable} -m armkin {words}"], capture_output=True, text=True)
+    assert completed.returncode == code
+    assert message in completed.stderr
+    assert "internal error" not in completed.stderr
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
@@ -93,10 +93,10 @@ def test_streams_that_are_not_there_are_named(words: str, code: int, message: st
 def test_standard_input_that_cannot_be_read_is_named(words: str, tmp_path: Path) -> None:
     """Opened for writing only: every read fails. A thread that reads must not leave its command waiting."""
     command = f"exec {sys.executable} -m armkin {words} 0>unreadable"
-    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=180, cwd=tmp_path)
-    assert done.returncode == 1
-    assert "standard input: cannot read: " in done.stderr
-    assert "Traceback" not in done.stderr
+    completed = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=180, cwd=tmp_path)
+    assert completed.returncode == 1
+    assert "standard input: cannot read: " in completed.stderr
+    assert "Traceback" not in completed.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["unreadable"]
 
 
@@ -156,16 +156,18 @@ class Half: late = Late()
     program = "import time; from armkin.board.stop_signals import planning, stoppable\n"
     program += "with stoppable(), planning():\n    import half\n    time.sleep(60)"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, env=environment)
-    assert (done.returncode, done.stderr) == (130, "")
+    completed = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, env=environment
+    )
+    assert (completed.returncode, completed.stderr) == (130, "")
 
 
 def test_the_command_line_imports_next_to_nothing_before_it_takes_signals() -> None:
     program = "import sys; before = set(sys.modules); import armkin.cli; print(*sorted(set(sys.modules) - before))"
     program = f"import sys; sys.path.insert(0, {str(ROOT / 'src')!r}); {program}"
-    done = subprocess.run([sys.executable, "-S", "-c", program], capture_output=True, text=True, check=True)
-    assert "typing" not in done.stdout.split()
-    assert len(done.stdout.split()) < 20
+    completed = subprocess.run([sys.executable, "-S", "-c", program], capture_output=True, text=True, check=True)
+    assert "typing" not in completed.stdout.split()
+    assert len(completed.stdout.split()) < 20
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")

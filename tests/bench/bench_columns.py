@@ -164,8 +164,8 @@ def memory(folder: Path, count: int) -> bool:
             file.writelines(lines for _ in range(size // block))
         words = [sys.executable, "-m", "armkin", *map(str, batch(given, folder))]
         # by way of a small process: what a process had before it became the command counts as the command's
-        said = subprocess.run([sys.executable, "-c", _LARGEST, *words], capture_output=True, text=True, check=True)
-        found[name] = int(said.stdout) / 1024
+        completed = subprocess.run([sys.executable, "-c", _LARGEST, *words], capture_output=True, text=True, check=True)
+        found[name] = int(completed.stdout) / 1024
         print(f"memory       {size:,} rows: {found[name]:.0f} MB (bar {MEMORY})", flush=True)
     return found["many"] <= MEMORY
 

@@ -134,8 +134,8 @@ def memory(count: int, only: str | None) -> None:
             continue
         for way in ("compiled", "numpy"):
             words = [sys.executable, "-c", _PEAK, str(ROBOTS / f"{name}.yaml"), str(int(count * share)), way]
-            told = subprocess.run([*words, str(Path(__file__).parent)], capture_output=True, text=True, check=True)
-            results, beyond = map(float, told.stdout.split())
+            completed = subprocess.run([*words, str(Path(__file__).parent)], capture_output=True, text=True, check=True)
+            results, beyond = map(float, completed.stdout.split())
             print(f"| {name} | {way} | {results:.0f} | {beyond:.0f} |", flush=True)
 
 

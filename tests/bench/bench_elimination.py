@@ -47,15 +47,15 @@ def measure(name: str, arm: Arm, count: int) -> None:
     plan = method.prepare(*arm)
     prepare = seconds(lambda: method.prepare(*arm), 3)
     begin = time.perf_counter()
-    found, doubtful, *_ = method.solve(plan, T)
+    solutions, doubtful, *_ = method.solve(plan, T)
     batch = (time.perf_counter() - begin) / count
     alone = np.median([seconds(partial(method.solve, plan, T[i : i + 1]), 1) for i in range(15)])
-    branches = (~np.isnan(found[..., 0])).sum(axis=1)
+    branches = (~np.isnan(solutions[..., 0])).sum(axis=1)
     size = plan.plans[0].size if plan.plans else 0
     print(
         f"{name:9} {size:4} {1e3 * prepare:8.1f} {1e6 * batch:9.1f} {1e3 * alone:8.2f} "
-        f"{100 * np.mean(miss(arm, q, found) < 1e-6):8.3f} {branches.mean():6.2f} {branches.max():4} "
-        f"{pose_residual(arm, found, T):9.1e} {100 * doubtful.mean():9.2f}",
+        f"{100 * np.mean(miss(arm, q, solutions) < 1e-6):8.3f} {branches.mean():6.2f} {branches.max():4} "
+        f"{pose_residual(arm, solutions, T):9.1e} {100 * doubtful.mean():9.2f}",
         flush=True,
     )
 

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 from emulator import EmulatedBoard
 from pins import at_rest, net, on_the_line
 
-from command_line import COUNTS, POSE, ROOT, THREE_DOF, process
+from command_line import COUNTS, POSE, ROOT, THREE_DOF, run_process
 
 START = [0, 0, 0]
 SECONDS = 2.3  # from the first step to the last
@@ -113,10 +113,10 @@ def one(fault: str, seed: int) -> Struck:
         if not on_the_line(stopped, START, COUNTS):
             wrong.append("not on the line")
         board.control("restore")
-        told = process("status", THREE_DOF, "--port", board.port, "--json")
-        if told.code:
-            return Struck([*wrong, f"{fault} {seed}: status: {told.err}"], "", "")
-        position, counts = told.json["position"], told.json["pulses"]
+        completed = run_process("status", THREE_DOF, "--port", board.port, "--json")
+        if completed.code:
+            return Struck([*wrong, f"{fault} {seed}: status: {completed.err}"], "", "")
+        position, counts = completed.json["position"], completed.json["pulses"]
         if position != "lost" and counts != stopped:
             wrong.append(f"{position} at {counts}")
         if position == "lost" and moving and fault not in RESETS:
@@ -129,16 +129,16 @@ def _go_on(board: EmulatedBoard, position: str, wrong: list[str]) -> str:
     """The next commands, and what they show to be wrong. What a busy computer holds is resumed, five times at most."""
     before = net(board)
     if position == "lost":
-        if process(*send(board)).code != 5 or at_rest(board) != before:
+        if run_process(*send(board)).code != 5 or at_rest(board) != before:
             wrong.append("a lost position was gone on from")
         return "refused"
     how = "resumed"
-    done = process(*send(board, "--resume"))
+    done = run_process(*send(board, "--resume"))
     if done.code == 2:
-        how, done = "sent again", process(*send(board))
+        how, done = "sent again", run_process(*send(board))
     for _ in range(5):
         if done.code == 5:
-            how, done = "resumed twice", process(*send(board, "--resume"))
+            how, done = "resumed twice", run_process(*send(board, "--resume"))
     if done.code or at_rest(board) != COUNTS:
         wrong.append(f"it does not go on: {done.code} {done.err}")
     return how
@@ -149,11 +149,11 @@ def main() -> None:
     options.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(FAULTS)}")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--jobs", type=int, default=2)
-    given = options.parse_args()
-    for kind in given.kinds or FAULTS:
+    arguments = options.parse_args()
+    for kind in arguments.kinds or FAULTS:
         faults = FAULTS[kind]
-        seeds = range(1000 * given.seed, 1000 * given.seed + len(faults))
-        with ThreadPoolExecutor(given.jobs) as pool:
+        seeds = range(1000 * arguments.seed, 1000 * arguments.seed + len(faults))
+        with ThreadPoolExecutor(arguments.jobs) as pool:
             struck = list(pool.map(one, faults, seeds))
         good = sum(not s.wrong for s in struck)
         told = ", ".join(f"{n} {what}" for what, n in Counter(s.position for s in struck).most_common())

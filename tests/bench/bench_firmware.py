@@ -162,17 +162,17 @@ def main() -> None:
     options.add_argument("--noise", type=int, default=20, metavar="SEEDS")
     options.add_argument("--curves", type=int, default=20, metavar="PLACES")
     rows: dict[str, Callable[[], None]] = {
-        "curves": lambda: curves(given.curves),
+        "curves": lambda: curves(arguments.curves),
         "waypoints": waypoint_rows,
         "chip": chip_rows,
         "smooth": smooth_rows,
         "pico": pico_rows,
-        "noise": lambda: noise_rows(given.noise),
+        "noise": lambda: noise_rows(arguments.noise),
     }
     options.add_argument("--only", choices=rows, action="append", metavar="ROWS", help=", ".join(rows))
-    given = options.parse_args()
+    arguments = options.parse_args()
     row("", "armkin", "GRBL 1.1h")
-    for name in given.only or rows:
+    for name in arguments.only or rows:
         rows[name]()
 
 

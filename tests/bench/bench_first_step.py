@@ -102,20 +102,18 @@ def main() -> None:
     options.add_argument("--moves", type=int, default=1000)
     options.add_argument("--load", type=int, default=6)
     options.add_argument("--idle", action="store_true", help="lead as on an idle computer, whatever the load is")
-    given = options.parse_args()
-    if given.idle:
+    args = options.parse_args()
+    if args.idle:
         streaming._processor_load = lambda session: 0.0
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
-    if given.runs:
-        got, own = first_steps(given.runs)
+    if args.runs:
+        got, own = first_steps(args.runs)
         figures = " / ".join(f"{np.quantile(got, q):.1f}" for q in (0.0, 0.5, 0.9, 1.0))
-        print(f"first step after the first byte of MOTION, {given.runs} runs: {figures} ms (least, median, 90 %, most)")
+        print(f"first step after the first byte of MOTION, {args.runs} runs: {figures} ms (least, median, 90 %, most)")
         print(f"  of these the law's own {own:.1f} ms")
-    if given.moves:
-        arrived, held, seconds = short_moves(given.moves, given.load)
-        print(
-            f"{given.moves} short moves beside {given.load} busy ones: {arrived} arrived, {held} held, {seconds:.0f} s"
-        )
+    if args.moves:
+        arrived, held, seconds = short_moves(args.moves, args.load)
+        print(f"{args.moves} short moves beside {args.load} busy ones: {arrived} arrived, {held} held, {seconds:.0f} s")
 
 
 if __name__ == "__main__":

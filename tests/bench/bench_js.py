@@ -111,8 +111,8 @@ def speed(arm: armkin.Arm, folder: Path) -> str:
         subprocess.run(["gcc", "-std=c99", "-O2", "arm.c", "main.c", "-o", "ask", "-lm"], cwd=folder, check=True)
 
     def once(*command: str) -> float:
-        done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
-        return float(done.stdout.split()[0]) / len(goals) * 1e6
+        completed = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+        return float(completed.stdout.split()[0]) / len(goals) * 1e6
 
     prepare(1)
     once("./ask")
@@ -147,8 +147,8 @@ def _held(arm: armkin.Arm, folder: Path, q: np.ndarray, joint: int) -> list[str]
         mine = told[k :: len(values)]
         for row in (row for answer in mine for row in answer["branches"]):
             del row["joints"][joint]
-        rest = armkin.lock(arm, {arm.joint_names[joint]: value})
-        found = differences(rest, mine, armkin.ik(rest, targets[k :: len(values)]))
+        locked_arm = armkin.lock(arm, {arm.joint_names[joint]: value})
+        found = differences(locked_arm, mine, armkin.ik(locked_arm, targets[k :: len(values)]))
         different += [f"held at {value:.4f}: {line}" for line in found]
     return different
 

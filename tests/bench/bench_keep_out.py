@@ -243,12 +243,12 @@ def motions(count: int, rng: np.random.Generator) -> None:
             q = q[held.least_clearances(q)[0] >= 0]
             for a, b in zip(q[0::2][:125], q[1::2][:125], strict=False):
                 b = b if rng.random() < 0.5 else np.clip(a + rng.uniform(0.02, 0.5) * (b - a), arm.lower, arm.upper)
-                found = prove_trajectory(plan_joint_moves(arm, a, b))
-                assert found is not None
+                proof = prove_trajectory(plan_joint_moves(arm, a, b))
+                assert proof is not None
                 least = float(held.least_clearances(a + share * (b - a))[0].min())
-                done, free = done + 1, free + found.free
-                looked.append(found.postures)
-                if found.free:
+                done, free = done + 1, free + proof.free
+                looked.append(proof.postures)
+                if proof.free:
                     deepest = min(deepest, least)
                     wrong += least < -DEEP
                 else:
@@ -267,10 +267,10 @@ def targets(count: int, rng: np.random.Generator) -> None:
         done = some = missed = hit = 0
         for arm in scenes(name, rng):
             q = random_joints(arm, rng, 250)
-            found = armkin.ik(arm, goals(arm, q))
-            rows = exact_distances(guard(arm), np.nan_to_num(found.q.reshape(-1, arm.n)))
-            free = ((rows.min(axis=1) >= 0).reshape(found.valid.shape)) & found.within_limits & found.valid
-            best = found.best
+            solutions = armkin.ik(arm, goals(arm, q))
+            rows = exact_distances(guard(arm), np.nan_to_num(solutions.q.reshape(-1, arm.n)))
+            free = ((rows.min(axis=1) >= 0).reshape(solutions.valid.shape)) & solutions.within_limits & solutions.valid
+            best = solutions.best
             taken = np.take_along_axis(free, np.maximum(best, 0)[:, None], axis=1)[:, 0]
             done, some = done + len(q), some + int(free.any(axis=1).sum())
             missed += int((free.any(axis=1) & (best < 0)).sum())
@@ -343,12 +343,12 @@ def _path() -> None:
             if len(q) < 13:
                 continue
             way = _curve(arm, np.concatenate([q[:1], q[:1] + 0.25 * (q[1:13] - q[:1])]))
-            found = prove_trajectory(way, tight=True)
-            if found is not None and found.free:
+            proof = prove_trajectory(way, tight=True)
+            if proof is not None and proof.free:
                 break
-        assert found is not None
+        assert proof is not None
         took = best_time(lambda: prove_trajectory(way, tight=True))
-        print(f"{name}: a path of 10,000 samples proved in {took * 1e3:.1f} ms, {found.postures} postures")
+        print(f"{name}: a path of 10,000 samples proved in {took * 1e3:.1f} ms, {proof.postures} postures")
 
 
 def _curve(arm: Arm, corners: Array) -> Trajectory:
@@ -373,14 +373,14 @@ def main() -> None:
     parser.add_argument("--no-coal", action="store_true")
     parser.add_argument("--speed", action="store_true")
     parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    if given.pairs:
-        pairs(given.pairs, np.random.default_rng(given.seed), not given.no_coal)
-    if given.motions:
-        motions(given.motions, np.random.default_rng(given.seed))
-    if given.targets:
-        targets(given.targets, np.random.default_rng(given.seed))
-    if given.speed:
+    arguments = parser.parse_args()
+    if arguments.pairs:
+        pairs(arguments.pairs, np.random.default_rng(arguments.seed), not arguments.no_coal)
+    if arguments.motions:
+        motions(arguments.motions, np.random.default_rng(arguments.seed))
+    if arguments.targets:
+        targets(arguments.targets, np.random.default_rng(arguments.seed))
+    if arguments.speed:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
         speed()
 

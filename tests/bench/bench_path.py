@@ -244,17 +244,17 @@ def main() -> None:
     parser.add_argument("--splines", type=int, default=20)
     parser.add_argument("--tips", type=int, default=0, help="lines on six arms, 20 points a step, and nothing else")
     parser.add_argument("--laws", action="store_true", help="the law of time against toppra, and nothing else")
-    given = parser.parse_args()
-    if given.laws:
-        laws(given.splines)
+    arguments = parser.parse_args()
+    if arguments.laws:
+        laws(arguments.splines)
         return
-    if given.tips:
-        tips(given.tips)
+    if arguments.tips:
+        tips(arguments.tips)
         return
     straight(2000)
-    laws(given.splines)
-    chosen(given.lines)
-    branches(given.lines)
+    laws(arguments.splines)
+    chosen(arguments.lines)
+    branches(arguments.lines)
 
 
 if __name__ == "__main__":

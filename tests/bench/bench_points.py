@@ -177,18 +177,18 @@ def main() -> None:
     parser.add_argument("--homes", nargs="*", metavar="ROBOT")
     for name in ("slicer", "saw", "lines"):
         parser.add_argument(f"--{name}", type=int, default=0)
-    given = parser.parse_args()
-    every = given.homes is None and not any(vars(given).values())
-    if given.shapes or every:
+    arguments = parser.parse_args()
+    every = arguments.homes is None and not any(vars(arguments).values())
+    if arguments.shapes or every:
         shapes()
-    if given.slicer or every:
-        slicer(given.slicer or 10_000)
-    if given.saw or every:
-        saw(given.saw or 1000)
-    if given.lines or every:
-        lines(given.lines or 14)
-    if given.homes is not None or every:
-        homes(given.homes or [])
+    if arguments.slicer or every:
+        slicer(arguments.slicer or 10_000)
+    if arguments.saw or every:
+        saw(arguments.saw or 1000)
+    if arguments.lines or every:
+        lines(arguments.lines or 14)
+    if arguments.homes is not None or every:
+        homes(arguments.homes or [])
 
 
 if __name__ == "__main__":

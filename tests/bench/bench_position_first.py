@@ -45,10 +45,10 @@ def judged(arm: armkin.Arm, q: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, n
     for turn in (2 * np.pi, -2 * np.pi):
         beyond = (wrapped < arm.lower) if turn > 0 else (wrapped > arm.upper)
         wrapped = np.where(beyond & ~arm.prismatic, wrapped + turn, wrapped)
-    there = armkin.fk(arm, q)
+    pose = armkin.fk(arm, q)
     legal = ((wrapped >= arm.lower - 1e-12) & (wrapped <= arm.upper + 1e-12)).all(axis=1)
-    legal &= np.abs(there[:, :3, 3] - T[:3, 3]).max(axis=1) < 1e-8 * arm.reach
-    chord = np.sqrt(((there[:, :3, :3] - T[:3, :3]) ** 2).sum(axis=(1, 2)) / 8.0)
+    legal &= np.abs(pose[:, :3, 3] - T[:3, 3]).max(axis=1) < 1e-8 * arm.reach
+    chord = np.sqrt(((pose[:, :3, :3] - T[:3, :3]) ** 2).sum(axis=(1, 2)) / 8.0)
     return np.where(legal, 2.0 * np.arcsin(np.minimum(1.0, chord)), np.inf), wrapped
 
 

@@ -33,11 +33,13 @@ def speed() -> bool:
         best = 1e9
         for _ in range(3):
             began = time.process_time()
-            found = armkin.reach(arm, grid=grid, azimuths=90, directions=100 * 15, rolls=72, measures=False)
+            reach_map = armkin.reach(arm, grid=grid, azimuths=90, directions=100 * 15, rolls=72, measures=False)
             best = min(best, time.process_time() - began)
-        per = best * 1e9 / found.answers
+        per = best * 1e9 / reach_map.answers
         good &= per <= BAR
-        print(f"{name:10}{found.answers:.3g} poses, {found.solves:,} solves in {best:.2f} s: {per:.2f} s for 10^9")
+        print(
+            f"{name:10}{reach_map.answers:.3g} poses, {reach_map.solves:,} solves in {best:.2f} s: {per:.2f} s for 10^9"
+        )
     return good
 
 
@@ -113,7 +115,7 @@ def unseen(seed: int = 1, poses: int = 10**6) -> bool:
             M, N, L = (int(rng.integers(*limits)) for limits in ((3, 60), (2, 40), (2, 30)))
             grid = Grid(arm, arm.reach / rng.uniform(3.0, 15.0), M, N, L, bool(rng.integers(2)) and arm.n > 3)
             ring = grid.rings[rng.integers(0, len(grid.rings), 1)]
-            found = cell_columns(Question(grid), ring)
+            columns = cell_columns(Question(grid), ring)
             D, L = grid.directions_count, grid.rolls_count
             k, each = np.divmod(np.arange(M * D * L), D * L)
             goals = grid.targets(np.repeat(ring, len(k), 0), k * TURN / M, each // L, (each % L) * TURN / L)
@@ -123,7 +125,7 @@ def unseen(seed: int = 1, poses: int = 10**6) -> bool:
                 mean = legal.sum(axis=1) / (legal > 0).sum(axis=1)
             any_ = s.valid.any(axis=1).reshape(M, -1).mean(axis=1)
             asked = np.array([(legal > 0).mean(axis=1), any_, mean, (legal == 1).mean(axis=1)])
-            said = np.array([found[column] for column in ("share", "share_any", "branches", "single")])
+            said = np.array([columns[column] for column in ("share", "share_any", "branches", "single")])
             off = ~np.isclose(said, asked, rtol=0, atol=1e-12, equal_nan=True).all(axis=0)
             if off.any():
                 print(f"{name}: {off.sum()} cells of ring {ring.tolist()}, grid {grid.step}, {M} x {N} x {L}")

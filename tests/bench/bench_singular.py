@@ -41,22 +41,22 @@ def main() -> None:
     parser.add_argument("robots", nargs="*", default=["ur5e", "puma560"])
     parser.add_argument("--poses", type=int, default=1000)
     parser.add_argument("--alone", type=int, default=100)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     print("robot | poses | us a pose | own pose | singular, boundary | worst alone [ms] of")
-    for name in given.robots:
+    for name in arguments.robots:
         arm = armkin.load(name)
         for kind in ("45", "15", "straight wrist"):
-            q = postures(arm, kind, given.poses)
+            q = postures(arm, kind, arguments.poses)
             T = armkin.fk(arm, q)
             armkin.ik(arm, T[:64])  # recorded once
-            found = armkin.ik(arm, T)
-            mean = 1e6 * seconds(lambda T=T: armkin.ik(arm, T)) / given.poses  # type: ignore[misc]
-            own = 1e6 * seconds(lambda T=T, q=q: armkin.ik(arm, T, near=q)) / given.poses  # type: ignore[misc]
-            edge = np.flatnonzero(found.status != armkin.Status.EXACT)[: given.alone]
+            solutions = armkin.ik(arm, T)
+            mean = 1e6 * seconds(lambda T=T: armkin.ik(arm, T)) / arguments.poses  # type: ignore[misc]
+            own = 1e6 * seconds(lambda T=T, q=q: armkin.ik(arm, T, near=q)) / arguments.poses  # type: ignore[misc]
+            edge = np.flatnonzero(solutions.status != armkin.Status.EXACT)[: arguments.alone]
             worst = max((seconds(lambda T=T, k=k: armkin.ik(arm, T[k])) for k in edge), default=0.0)  # type: ignore[misc]
-            counts = np.bincount(found.status, minlength=3)
+            counts = np.bincount(solutions.status, minlength=3)
             print(
-                f"{name} | {given.poses} at {kind} | {mean:.0f} | {own:.0f} | {counts[2]}, {counts[1]} "
+                f"{name} | {arguments.poses} at {kind} | {mean:.0f} | {own:.0f} | {counts[2]}, {counts[1]} "
                 f"| {1e3 * worst:.1f} of {len(edge)}",
                 flush=True,
             )

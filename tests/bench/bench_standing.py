@@ -87,13 +87,13 @@ def main() -> None:
     parser.add_argument("robots", nargs="*", default=ARMS)
     parser.add_argument("--poses", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
-    rng = np.random.default_rng(given.seed)
+    arguments = parser.parse_args()
+    rng = np.random.default_rng(arguments.seed)
     print("robot | asked of | poses x digits | moved | most [rad]")
-    for name in given.robots:
+    for name in arguments.robots:
         arm = armkin.load(name)
         fast = armkin.compile(armkin.load(name))
-        q = postures(arm, given.poses, rng)
+        q = postures(arm, arguments.poses, rng)
         with tempfile.TemporaryDirectory() as folder:
             ways: dict[str, Best] = {"numpy": chosen(lambda T, near, arm=arm: armkin.ik(arm, T, near=near)),
                                      "compiled": chosen(fast.ik)}  # fmt: skip
@@ -112,7 +112,7 @@ def main() -> None:
                     moved[digits] = int((~(off <= MOVES)).sum())
                     worst = max(worst, float(np.nan_to_num(off, nan=np.inf).max()))
                 some = ", ".join(f"{count} at {digits}" for digits, count in moved.items() if count)
-                print(f"{name} | {words} | {given.poses} x {len(DIGITS)} | {some or 0} | {worst:.1e}", flush=True)
+                print(f"{name} | {words} | {arguments.poses} x {len(DIGITS)} | {some or 0} | {worst:.1e}", flush=True)
 
 
 if __name__ == "__main__":

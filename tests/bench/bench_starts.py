@@ -37,19 +37,19 @@ def main() -> int:
     parser.add_argument("kinds", nargs="*", default=[], metavar="KIND", help=f"of {', '.join(KINDS)}")
     parser.add_argument("--pins", action="store_true")
     parser.add_argument("--place", type=int, nargs="+", choices=NUMBERS, default=NUMBERS, metavar="NUMBER")
-    given = parser.parse_args()
-    if unknown := set(given.kinds) - set(KINDS):
+    arguments = parser.parse_args()
+    if unknown := set(arguments.kinds) - set(KINDS):
         parser.error(f"no kind {', '.join(sorted(unknown))}: there are {', '.join(KINDS)}")
-    places = [ELSEWHERE[number - 1] for number in given.place]
+    places = [ELSEWHERE[number - 1] for number in arguments.place]
     paths = {path.name: yaml.safe_load(path.read_text()) for path in EXAMPLES}
     paths |= {f"PATHS[{k}]": moves for k, moves in enumerate(PATHS)}
     for moves in paths.values():
         moves.pop("robot", None)
     good = True
-    for kind in given.kinds or ([] if given.pins else KINDS):
+    for kind in arguments.kinds or ([] if arguments.pins else KINDS):
         one = on(kind)
         good &= driven(kind, partial(carried_out, one), paths, places, one.tolerance, one.rest)
-    if given.pins:
+    if arguments.pins:
         from emulator import EmulatedBoard
         from starts_on_pins import sent
 

@@ -93,13 +93,13 @@ def caught(mutant: Mutant, tree: Path, options: list[str]) -> str | None:
     command += [f"tests/{name}" for name in mutant.tests.split()]
     finds = {**os.environ, "PYTHONPATH": str(tree / "src")}
     try:
-        done = subprocess.run(command, cwd=tree, env=finds, capture_output=True, text=True, check=False)
+        completed = subprocess.run(command, cwd=tree, env=finds, capture_output=True, text=True, check=False)
     finally:
         path.write_text(text, encoding="utf-8")
-    if done.returncode in (0, 5):  # 5: the room has no such tests
+    if completed.returncode in (0, 5):  # 5: the room has no such tests
         return None
-    failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-    return failed[0][:110] if failed else done.stdout[-200:]
+    failed = [line for line in completed.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return failed[0][:110] if failed else completed.stdout[-200:]
 
 
 def main() -> None:

@@ -19,7 +19,7 @@ from armkin.board import conformance, path_run
 from armkin.board.backend.board import Board
 from armkin.board.kinds import board_of
 from armkin.errors import NoSolutionError, RobotFileError
-from command_line import ROOT, process, run
+from command_line import ROOT, run, run_process
 from emulated_kinds import sample
 
 WIDOW_X = {"waist": 1, "shoulder": 2, "elbow": 4, "forearm_roll": 6, "wrist_angle": 7, "wrist_rotate": 8}
@@ -46,10 +46,10 @@ def installed(packages: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
 def robots(folder: Path) -> list[Path]:
     """The WidowX 250 and the OpenMANIPULATOR with their servos' drives."""
     arm = folder / "open_manipulator.yaml"
-    found = run("import", "docs/open_manipulator.urdf", "--tip", "end_effector_link")
-    assert found.code == 0, found.err
+    completed = run("import", "docs/open_manipulator.urdf", "--tip", "end_effector_link")
+    assert completed.code == 0, completed.err
     files = []
-    for text, ids in ((found.out, {}), ((ROOT / "robots/wx250s.yaml").read_text(), WIDOW_X)):
+    for text, ids in ((completed.out, {}), ((ROOT / "robots/wx250s.yaml").read_text(), WIDOW_X)):
         data: dict[str, Any] = yaml.safe_load(text)
         for k, joint in enumerate(data["joints"], 11):
             low, high = joint.get("limits", (-180, 180))  # a turn has no count for 180 degrees
@@ -150,6 +150,6 @@ def test_it_conforms(case: Callable[..., None]) -> None:
 def test_the_command_line_knows_the_kind(packages: Path, tmp_path: Path) -> None:
     robot = robots(tmp_path)[1]
     there = {**os.environ, "PYTHONPATH": str(packages)}
-    done = process("send", robot, 10, -10, 10, 5, 5, 5, "--port", "sim", "--json", env=there)
-    assert done.code == 0, done.err
-    assert done.json["joints"] == pytest.approx([10, -10, 10, 5, 5, 5], abs=0.1)
+    completed = run_process("send", robot, 10, -10, 10, 5, 5, 5, "--port", "sim", "--json", env=there)
+    assert completed.code == 0, completed.err
+    assert completed.json["joints"] == pytest.approx([10, -10, 10, 5, 5, 5], abs=0.1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_feetech_machine import ARM, bus, machine
+from test_feetech_machine import ARM, bus, connect_servos
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
@@ -42,9 +42,9 @@ def prepared() -> tuple[Suspended, FirmwareMachine]:
     arm = arms.load(ROOT / "robots/three_dof.yaml")
     configuration = configure(arm)
     port = Suspended(SimBoard(configuration.board))
-    one = FirmwareMachine(port, arm, configuration)
-    one.prepare(assume=arm.home)
-    return port, one
+    machine = FirmwareMachine(port, arm, configuration)
+    machine.prepare(assume=arm.home)
+    return port, machine
 
 
 def test_a_program_that_was_suspended_does_not_take_the_board_for_gone() -> None:
@@ -78,7 +78,7 @@ class SuspendedBus(ServoBus):
 
 def test_servos_go_on_where_they_were() -> None:
     port = SuspendedBus(bus().servos.values())
-    one = machine(port)
+    one = connect_servos(port)
     start, began = np.array(one.counts()), port.now()
     plan = one.plan(one.counts(), np.array([2.0, -1.5, 1.0]))
     port.due = port.now() + plan.duration / 2

@@ -140,13 +140,13 @@ def test_lies_to_a_moving_command_end_it_in_bounded_time(switched: Arm, command:
     for lie in LIES if LONG else LIES[:: 5 if command == "send" else 8]:
         configuration = configure(switched)
         port = LyingPort(homing.switch_levels(switched, configuration), **lie)
-        one = FirmwareMachine(port, switched, configuration)
-        one.prepare(assume=switched.home)
-        gripping.prepare_gripper(one, gripping.gripper_of("arm", configuration), 833)
+        machine = FirmwareMachine(port, switched, configuration)
+        machine.prepare(assume=switched.home)
+        gripping.prepare_gripper(machine, gripping.gripper_of("arm", configuration), 833)
         port.lying = True
         begin = port.now()
         try:
-            COMMANDS[command](one)
+            COMMANDS[command](machine)
             believed.append(lie)
         except LinkError:
             pass
@@ -156,12 +156,12 @@ def test_lies_to_a_moving_command_end_it_in_bounded_time(switched: Arm, command:
 
 def test_a_sender_whose_session_was_replaced_ends(three_dof: Arm) -> None:
     port = SimPort(SimBoard(BOARDS["uno_cnc_shield"]))
-    one = FirmwareMachine(port, three_dof, configure(three_dof))
-    one.prepare()
+    machine = FirmwareMachine(port, three_dof, configure(three_dof))
+    machine.prepare()
     port.board.receive(protocol.encode_frame(protocol.hello(0, 0x12345678)))  # another program
     port.board.take()
     with pytest.raises(ReplacedError, match="another program has taken over"):
-        one.run([plan_moves(three_dof, one.counts(), np.deg2rad([30, 60, -60]))])
+        machine.run([plan_moves(three_dof, machine.counts(), np.deg2rad([30, 60, -60]))])
 
 
 def test_another_version_is_named_with_what_to_flash(three_dof: Arm) -> None:

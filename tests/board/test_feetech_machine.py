@@ -33,10 +33,10 @@ def bus(noise: Noise | None = None) -> ServoBus:
     return ServoBus((Servo(k + 1, at) for k, at in enumerate(HOME)), noise=noise)
 
 
-def machine(port: ServoBus, stop: Callable[[], bool] = lambda: False) -> ServoMachine:
-    one = ServoMachine(port, ARM, stop)
-    one.prepare()
-    return one
+def connect_servos(port: ServoBus, stop: Callable[[], bool] = lambda: False) -> ServoMachine:
+    machine = ServoMachine(port, ARM, stop)
+    machine.prepare()
+    return machine
 
 
 def test_zero_and_invert_are_the_robot_files() -> None:
@@ -47,14 +47,14 @@ def test_zero_and_invert_are_the_robot_files() -> None:
 @pytest.mark.parametrize("noise", [None, Noise(0.01, 0.01, 5)])
 def test_random_moves_arrive_and_stay_near_their_line(noise: Noise | None) -> None:
     port = bus(noise)
-    one = machine(port)
+    machine = connect_servos(port)
     rng = np.random.default_rng(1)
     for _ in range(8 if noise else 20):
-        start, goal = np.array(one.counts()), rng.uniform(-2.4, 2.4, 3)
+        start, goal = np.array(machine.counts()), rng.uniform(-2.4, 2.4, 3)
         port.log.clear()
-        plan = one.plan(one.counts(), goal)
-        one.run([plan])
-        assert np.abs(np.array(one.counts()) - armkin.pulses(ARM, goal)).max() <= SETTLED
+        plan = machine.plan(machine.counts(), goal)
+        machine.run([plan])
+        assert np.abs(np.array(machine.counts()) - armkin.pulses(ARM, goal)).max() <= SETTLED
         places = np.array([[at[k] for k in (1, 2, 3)] for _, at in port.log])
         way = plan.end - start
         share = ((places - start) @ way) / (way @ way)
@@ -66,7 +66,7 @@ def test_nothing_moves_when_the_motors_go_on() -> None:
     port = bus()
     for servo in port.servos.values():
         servo.set(registers.GOAL_POSITION, 100)  # an old goal
-    machine(port)
+    connect_servos(port)
     port.advance(0.5)
     assert [round(servo.position) for servo in port.servos.values()] == HOME
 
@@ -74,35 +74,35 @@ def test_nothing_moves_when_the_motors_go_on() -> None:
 def test_a_stop_slows_down_on_the_line() -> None:
     port = bus()
     asked = iter(range(10_000))
-    one = machine(port, lambda: next(asked) > 40)
+    machine = connect_servos(port, lambda: next(asked) > 40)
     goal = np.deg2rad([120, 60, -90])
-    plan = one.plan(one.counts(), goal)
+    plan = machine.plan(machine.counts(), goal)
     with pytest.raises(StoppedError):
-        one.run([plan])
-    gone = (np.array(one.counts()) - HOME) / (plan.end - HOME)
+        machine.run([plan])
+    gone = (np.array(machine.counts()) - HOME) / (plan.end - HOME)
     assert 0.05 < gone.mean() < 0.95
     assert np.ptp(gone) < 0.03
     port.advance(0.5)
-    assert np.abs(np.array([servo.position for servo in port.servos.values()]) - one.counts()).max() <= 1
+    assert np.abs(np.array([servo.position for servo in port.servos.values()]) - machine.counts()).max() <= 1
 
 
 def test_a_blocked_servo_holds_the_arm() -> None:
     port = bus()
-    one = machine(port)
+    machine = connect_servos(port)
     port.servos[2].write = lambda address, values: None  # type: ignore[method-assign]
     with pytest.raises(LinkError, match=r"servo 2 \(j2\) is \d+ counts behind: blocked or overloaded"):
-        one.run([one.plan(one.counts(), np.deg2rad([0, 120, 0]))])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([0, 120, 0]))])
     assert abs(port.servos[2].position - HOME[1]) < 1
     assert LAG < 1024
 
 
 def test_a_servos_errors_are_told() -> None:
     port = bus()
-    one = machine(port)
+    machine = connect_servos(port)
     port.servos[3].errors = 36
     with pytest.raises(LinkError, match=r"servo 3 \(j3\) reports overheating, overload"):
-        one.run([one.plan(one.counts(), np.deg2rad([20, 20, 20]))])
-    found = one.report()["servos"][2]
+        machine.run([machine.plan(machine.counts(), np.deg2rad([20, 20, 20]))])
+    found = machine.report()["servos"][2]
     assert found["errors"] == ["overheating", "overload"]
     assert (found["voltage"], found["temperature"], found["torque"]) == (7.4, 31, True)
 
@@ -121,20 +121,20 @@ def test_a_cable_that_is_pulled_in_motion_is_told() -> None:
             port.servos.clear()
         return False
 
-    one = machine(port, pull)
+    machine = connect_servos(port, pull)
     with pytest.raises(LinkError, match="does not answer"):
-        one.run([one.plan(one.counts(), np.deg2rad([60, 60, 60]))])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([60, 60, 60]))])
 
 
 def test_relaxed_motors_can_be_moved_by_hand_and_read() -> None:
     port = bus()
-    one = machine(port)
-    one.relax()
+    machine = connect_servos(port)
+    machine.relax()
     for k, servo in port.servos.items():
         servo.position += 100 * k
         servo.advance(0.0)
     assert all(servo.get(registers.TORQUE) == 0 for servo in port.servos.values())
-    np.testing.assert_allclose(np.rad2deg(one.read()), np.array([100, -200, 300]) * 360 / 4096, atol=1e-9)
+    np.testing.assert_allclose(np.rad2deg(machine.read()), np.array([100, -200, 300]) * 360 / 4096, atol=1e-9)
 
 
 class Stuck(Servo):
@@ -152,9 +152,9 @@ def stuck(number: int, after: float) -> tuple[ServoBus, ServoMachine]:
     """An arm one of whose servos stops so many counts from home."""
     port = bus()
     port.servos[number] = Stuck(number, HOME[number - 1])
-    one = machine(port)
+    machine = connect_servos(port)
     port.servos[number].stop = HOME[number - 1] + after  # type: ignore[attr-defined]
-    return port, one
+    return port, machine
 
 
 @pytest.mark.parametrize("number", [1, 3])
@@ -181,14 +181,14 @@ def test_a_goal_outside_a_servo_s_own_limits_is_refused_before_anything_moves() 
     port = bus()
     port.servos[2].set(registers.LEAST, 1500)
     port.servos[2].set(registers.MOST, 2300)
-    one = machine(port)
+    machine = connect_servos(port)
     goal = np.deg2rad([10, -30, 10])  # servo 2 is inverted: 2068 + 341
     with pytest.raises(NoSolutionError, match=r"servo 2 \(j2\): 2409 counts is outside its own limits 1500 to 2300"):
-        one.run([one.plan(one.counts(), goal)])
+        machine.run([machine.plan(machine.counts(), goal)])
     assert [round(servo.position) for servo in port.servos.values()] == HOME
-    one.run([one.plan(one.counts(), np.deg2rad([10, -20, 10]))])
+    machine.run([machine.plan(machine.counts(), np.deg2rad([10, -20, 10]))])
     port.servos[2].set(registers.MOST, 2000)  # what it stands at is outside: it may come back, not go farther
-    two = machine(port)
+    two = connect_servos(port)
     with pytest.raises(NoSolutionError, match="outside its own limits 1500 to 2000"):
         two.run([two.plan(two.counts(), np.deg2rad([10, -21, 10]))])
     two.run([two.plan(two.counts(), np.deg2rad([10, 20, 10]))])

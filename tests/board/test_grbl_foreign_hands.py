@@ -36,16 +36,16 @@ def port(request: pytest.FixtureRequest) -> Iterator[Grbl]:
         os.unlink(record_path(found.name))
 
 
-def machine(port: Grbl, stop: Callable[[], bool] = lambda: False) -> GrblMachine:
+def connect_grbl(port: Grbl, stop: Callable[[], bool] = lambda: False) -> GrblMachine:
     return GrblMachine(port, ARM, stop)
 
 
 def stands_elsewhere(port: Grbl) -> GrblMachine:
     """An arm that was told where it stands, and was moved from there."""
-    one = machine(port)
-    one.prepare(assume=ARM.home)
-    one.run([one.plan(one.counts(), GOAL)])
-    return one
+    machine = connect_grbl(port)
+    machine.prepare(assume=ARM.home)
+    machine.run([machine.plan(machine.counts(), GOAL)])
+    return machine
 
 
 def other(port: Grbl, *lines: str) -> None:
@@ -80,7 +80,7 @@ def test_what_another_program_sets_between_two_commands_is_lost_in_words(
     before = list(port.steps)
     other(port, *lines)
     after = list(port.steps)
-    again = machine(port)
+    again = connect_grbl(port)
     assert again.position() == "lost"
     with pytest.raises(PositionLostError, match=says):
         again.prepare()
@@ -90,33 +90,33 @@ def test_what_another_program_sets_between_two_commands_is_lost_in_words(
 
 def test_offsets_that_somebody_set_long_ago_are_recorded_as_found(port: Grbl) -> None:
     other(port, "G10 L2 P1 X10 Y-20 Z30", "G10 L2 P3 X1 Y1 Z1", "G43.1 Z5", "G91", "G20", "G55")
-    one = stands_elsewhere(port)
+    machine = stands_elsewhere(port)
     for _ in range(2):
-        assert (one.position(), list(one.counts())) == ("known", port.steps[:3])
+        assert (machine.position(), list(machine.counts())) == ("known", port.steps[:3])
         assert port.steps[:3] == armkin.pulses(ARM, GOAL).tolist()
-        one = machine(port)
+        machine = connect_grbl(port)
 
 
 @pytest.mark.parametrize("line", ["G20", "G91", "G93", "G18", "G21G1F5", "G0", "G80"])
 def test_modes_that_another_program_left_change_no_motion(port: Grbl, line: str) -> None:
-    one = stands_elsewhere(port)
+    machine = stands_elsewhere(port)
     other(port, line)
-    again = machine(port)
+    again = connect_grbl(port)
     assert again.position() == "known"
     again.prepare()
     plan, began = again.plan(again.counts(), np.deg2rad([22, 80, -70])), port.now()
     again.run([plan])
     assert port.steps[:3] == plan.end.tolist() == list(again.counts())
     assert port.now() - began < plan.duration + 2.0
-    assert one.counts() != again.counts()
+    assert machine.counts() != again.counts()
 
 
 def test_feeds_that_another_program_overrides_are_as_planned_again(port: Grbl) -> None:
-    one = stands_elsewhere(port)
+    machine = stands_elsewhere(port)
     port.write(b"\x91" * 5)
     port.advance(0.1)
     assert port.override == 150
-    one.run([one.plan(one.counts(), np.deg2rad([40, 80, -70]), speed=0.2)])
+    machine.run([machine.plan(machine.counts(), np.deg2rad([40, 80, -70]), speed=0.2)])
     assert port.override == 100
 
     def faster() -> bool:
@@ -124,7 +124,7 @@ def test_feeds_that_another_program_overrides_are_as_planned_again(port: Grbl) -
             port.write(b"\x91")
         return False
 
-    two = machine(port, faster)
+    two = connect_grbl(port, faster)
     with pytest.raises(LinkError, match=r"another program has set feeds to 1?\d\d0? %; the arm was stopped"):
         two.run([two.plan(two.counts(), np.deg2rad([0, 80, -70]), speed=0.2)])
     assert list(two.counts()) == port.steps[:3]
@@ -134,7 +134,7 @@ OPEN = ["G1X5F500", "G1X5", "g0 x-4", "$J=G91X5F500", "$H", "$100=77", "$N0=G20"
 
 
 def test_a_line_that_another_program_left_open_is_never_ended(port: Grbl) -> None:
-    one = stands_elsewhere(port)
+    machine = stands_elsewhere(port)
     before, settings = list(port.steps), dict(port.settings)
     other(port, "F600")
     for line, end in itertools.product(OPEN, ["", " ", "(", "(half a comment"]):
@@ -144,7 +144,7 @@ def test_a_line_that_another_program_left_open_is_never_ended(port: Grbl) -> Non
         for _ in range(20):
             port.advance(0.02)
         assert (port.steps, port.settings) == (before, settings)
-        assert (again.position(), again.counts()) == ("known", one.counts())
+        assert (again.position(), again.counts()) == ("known", machine.counts())
 
 
 def test_a_line_that_was_left_open_in_a_comment_without_an_end_is_stopped_and_told(port: Grbl) -> None:
@@ -154,11 +154,11 @@ def test_a_line_that_was_left_open_in_a_comment_without_an_end_is_stopped_and_to
     port.advance(0.2)
     before = port.steps[0]
     if port.hal:
-        assert machine(port).position() == "known"
+        assert connect_grbl(port).position() == "known"
     else:
         with pytest.raises(LinkError, match="another program had left a line open"):
-            machine(port)
-        assert machine(port).position() == "lost"
+            connect_grbl(port)
+        assert connect_grbl(port).position() == "lost"
     assert abs(port.steps[0] - before) < 60
 
 
@@ -167,7 +167,7 @@ def test_another_program_s_motion_is_told_and_left_alone(port: Grbl) -> None:
     port.write(b"G91G1X20F300\n")
     port.advance(0.5)
     with pytest.raises(LinkError, match="another program drives it"):
-        machine(port)
+        connect_grbl(port)
     other(port, "")
     assert port.steps[0] == armkin.pulses(ARM, GOAL)[0] + round(20 * FITS[100])
 
@@ -183,29 +183,29 @@ def test_a_line_that_another_program_feeds_into_a_motion_is_told_or_harmless(por
         return False
 
     stands_elsewhere(port)
-    one = machine(port, stop)
+    machine = connect_grbl(port, stop)
     path = armkin.path(
         ARM,
         {"start": {"joints": [10, 80, -70]}, "blend": 8, "moves": [{"joint": [40, 60, -50]}, {"joint": [0, 90, -90]}]},
     )
-    plan = one.lay(path.motion, np.array(one.counts()))
+    plan = machine.lay(path.motion, np.array(machine.counts()))
     said = "another program"
     try:
-        one.run([plan])
+        machine.run([plan])
     except LinkError as error:
         said = str(error)
     assert "another program" in said
-    assert port.steps[:3] == plan.end.tolist() or one.position() == "lost" or said != "another program"
+    assert port.steps[:3] == plan.end.tolist() or machine.position() == "lost" or said != "another program"
     for _ in range(300):
         port.advance(0.02)
-    assert one.position() == "lost" or list(one.counts()) == port.steps[:3]
+    assert machine.position() == "lost" or list(machine.counts()) == port.steps[:3]
 
 
 @pytest.mark.parametrize("line", ["G92X0Y0Z0", "G10L2P1X10Y10Z10", "G55", "G43.1Z7"])
 def test_an_offset_that_is_set_in_a_motion_is_found_at_its_end_and_at_its_stop(port: Grbl, line: str) -> None:
     for stopped in (False, True):
-        one = stands_elsewhere(port)
-        count, origin = itertools.count(), np.array(port.steps[:3]) - one.counts()
+        machine = stands_elsewhere(port)
+        count, origin = itertools.count(), np.array(port.steps[:3]) - machine.counts()
 
         def stop(count: Iterator[int] = count, stopped: bool = stopped) -> bool:
             now = next(count)
@@ -213,10 +213,10 @@ def test_an_offset_that_is_set_in_a_motion_is_found_at_its_end_and_at_its_stop(p
                 port.write(line.encode() + b"\n")
             return stopped and now > 40
 
-        two = machine(port, stop)
+        two = connect_grbl(port, stop)
         with pytest.raises((LinkError, StoppedError)):
             two.run([two.plan(two.counts(), np.deg2rad([30, 60, -60]), speed=0.5)])
-        again = machine(port)
+        again = connect_grbl(port)
         assert again.position() == "lost" or (origin + again.counts()).tolist() == port.steps[:3]
         port.boot()
         other(port, "G10L2P1X0Y0Z0", "G54", "G49", "G92.1")
@@ -236,12 +236,12 @@ def test_a_reset_in_the_motion_of_a_killed_sender_is_lost(port: Grbl) -> None:
         return False
 
     stands_elsewhere(port)
-    one = machine(port, die)
+    machine = connect_grbl(port, die)
     with pytest.raises(Killed):
-        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]), speed=0.3)])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([60, 20, -60]), speed=0.3)])
     port.write(b"\x18")
     other(port, "$X")
-    assert machine(port).position() == "lost"
+    assert connect_grbl(port).position() == "lost"
 
 
 def test_no_record_a_damaged_one_or_another_arm_s_is_lost(port: Grbl) -> None:
@@ -252,13 +252,13 @@ def test_no_record_a_damaged_one_or_another_arm_s_is_lost(port: Grbl) -> None:
     for wrong in ("", "{}", text[:-9], text.replace('"offset": [', '"offset": ["x", '), "[" * 100_000, "null"):
         with open(path, "w", encoding="ascii") as file:
             file.write(wrong)
-        assert machine(port).position() == "lost"
+        assert connect_grbl(port).position() == "lost"
     os.unlink(path)
     with pytest.raises(PositionLostError, match="nobody has told armkin on this computer where it stands"):
-        machine(port).prepare()
+        connect_grbl(port).prepare()
     with open(path, "w", encoding="ascii") as file:
         file.write(text)
-    assert machine(port).position() == "known"
+    assert connect_grbl(port).position() == "known"
     from dataclasses import replace
 
     others = replace(ARM, home=ARM.home + 0.1)
@@ -267,23 +267,23 @@ def test_no_record_a_damaged_one_or_another_arm_s_is_lost(port: Grbl) -> None:
 
 
 def test_more_than_a_turn_outside_a_limit_is_lost(port: Grbl) -> None:
-    one = machine(port)
-    one.vouch([round(steps * FITS[100 + k]) for k, steps in enumerate((0, 1000, 0))])
+    machine = connect_grbl(port)
+    machine.vouch([round(steps * FITS[100 + k]) for k, steps in enumerate((0, 1000, 0))])
     with pytest.raises(PositionLostError, match=r"q2 = 1090.* is outside -20 to 120 deg by more than a whole turn"):
-        machine(port).prepare()
+        connect_grbl(port).prepare()
 
 
 def test_grblhal_forgets_g92_with_its_power_or_moves_nothing() -> None:
     port = Grbl(4, f"foreign-hal-{os.getpid()}", FITS, hal=True)
     port.simulated = False
     port.settings |= {1: 25.0, 3: 8.0, 10: 511.0, 22: 9.0}
-    one = machine(port)
+    machine = connect_grbl(port)
     with pytest.raises(LinkError, match=r"\$384 .* is 0: the robot file wants \$384=1"):
-        one.prepare(assume=ARM.home)
-    assert {difference.number for difference in one.setup()} >= {1, 384}
+        machine.prepare(assume=ARM.home)
+    assert {difference.number for difference in machine.setup()} >= {1, 384}
     assert (port.settings[1], port.settings[384]) == (255, 1)
     assert (port.settings[3], port.settings[10], port.settings[22]) == (8, 511, 9)  # bits that are not armkin's
-    assert one.prepare(assume=ARM.home)
+    assert machine.prepare(assume=ARM.home)
     port.boot()
-    assert machine(port).position() == "lost"
+    assert connect_grbl(port).position() == "lost"
     os.unlink(record_path(port.name)) if os.path.exists(record_path(port.name)) else None

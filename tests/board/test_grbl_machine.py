@@ -35,7 +35,7 @@ def board(**more: Any) -> Grbl:
     return found
 
 
-def machine(port: Grbl, stop: Callable[[], bool] = lambda: False) -> GrblMachine:
+def connect_grbl(port: Grbl, stop: Callable[[], bool] = lambda: False) -> GrblMachine:
     return GrblMachine(port, ARM, stop)
 
 
@@ -46,36 +46,36 @@ def pins(port: Grbl) -> list[int]:
 
 def test_200_random_moves_are_read_back_exact() -> None:
     port = board()
-    one = machine(port)
-    assert one.prepare(assume=one.arm.home)
+    machine = connect_grbl(port)
+    assert machine.prepare(assume=machine.arm.home)
     rng = np.random.default_rng(3)
     for _ in range(200):
         goal = rng.uniform(ARM.lower, ARM.upper)
-        one.run([one.plan(one.counts(), goal)])
-        assert list(one.counts()) == pins(port) == armkin.pulses(ARM, goal).tolist()
+        machine.run([machine.plan(machine.counts(), goal)])
+        assert list(machine.counts()) == pins(port) == armkin.pulses(ARM, goal).tolist()
 
 
 def test_the_published_pose_puts_the_published_steps_on_the_pins() -> None:
     port = board()
-    one = machine(port)
-    one.prepare(assume=one.arm.home)
-    one.run([one.plan(one.counts(), np.deg2rad([-30, 5, -5]))])
+    machine = connect_grbl(port)
+    machine.prepare(assume=machine.arm.home)
+    machine.run([machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))])
     assert pins(port) == [-1067, -10144, 5667]
 
 
 def test_the_position_outlives_the_command_but_no_reset() -> None:
     port = board()
-    one = machine(port)
-    one.prepare(assume=one.arm.home)
-    one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
-    there = one.counts()
-    again = machine(port)
+    machine = connect_grbl(port)
+    machine.prepare(assume=machine.arm.home)
+    machine.run([machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))])
+    there = machine.counts()
+    again = connect_grbl(port)
     assert (again.position(), again.counts()) == ("known", there)
     assert not again.prepare()
     with pytest.raises(LinkError, match="position is known"):
         again.prepare(assume=again.arm.home)
     port.boot()
-    lost = machine(port)
+    lost = connect_grbl(port)
     assert lost.position() == "lost"
     with pytest.raises(LinkError, match="position is lost"):
         lost.prepare()
@@ -84,14 +84,14 @@ def test_the_position_outlives_the_command_but_no_reset() -> None:
 def test_settings_that_do_not_fit_are_refused_and_setup_writes_them() -> None:
     port = Grbl(4, f"machine-{os.getpid()}")
     port.simulated = False
-    one = machine(port)
+    machine = connect_grbl(port)
     with pytest.raises(LinkError, match=r"GRBL's settings do not fit three_dof: \$100 .* is 250.*, and 2 more"):
-        one.prepare(assume=one.arm.home)
+        machine.prepare(assume=machine.arm.home)
     assert not port.history
-    written = {difference.number for difference in one.setup()}
+    written = {difference.number for difference in machine.setup()}
     assert {100, 101, 102, 110, 111, 112} <= written
-    assert one.setup() == []
-    assert one.prepare(assume=one.arm.home)
+    assert machine.setup() == []
+    assert machine.prepare(assume=machine.arm.home)
 
 
 def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
@@ -100,15 +100,15 @@ def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
     for after in (5, 30, 60, 90):
         asked = iter(range(10_000))
         port.boot()
-        one = machine(port, lambda asked=asked, after=after: next(asked) > after)  # type: ignore[misc]
-        one.prepare(assume=one.arm.home)
-        plan = one.plan(one.counts(), goal)
+        machine = connect_grbl(port, lambda asked=asked, after=after: next(asked) > after)  # type: ignore[misc]
+        machine.prepare(assume=machine.arm.home)
+        plan = machine.plan(machine.counts(), goal)
         with pytest.raises(StoppedError):
-            one.run([plan])
-        assert list(one.counts()) == pins(port)
+            machine.run([plan])
+        assert list(machine.counts()) == pins(port)
         share = [at / end for at, end in zip(pins(port), plan.end.tolist(), strict=True) if end]
         assert max(share) - min(share) < 2e-3
-        again = machine(port)
+        again = connect_grbl(port)
         assert again.position() == "known"
         again.prepare()
         again.run([again.plan(again.counts(), goal)])
@@ -136,12 +136,12 @@ def during(port: Grbl, what: Callable[[], None]) -> Callable[[], bool]:
 )
 def test_what_loses_the_position_is_told(fault: Callable[[Grbl], None], message: str) -> None:
     port = board()
-    one = machine(port, during(port, lambda: fault(port)))
-    one.prepare(assume=one.arm.home)
+    machine = connect_grbl(port, during(port, lambda: fault(port)))
+    machine.prepare(assume=machine.arm.home)
     with pytest.raises(LinkError, match=message):
-        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]))])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([60, 20, -60]))])
     if not port.dead:
-        assert machine(port).position() == "lost"
+        assert connect_grbl(port).position() == "lost"
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -162,14 +162,16 @@ def test_a_noisy_line_never_gives_a_false_position(seed: int) -> None:
     right = 0
     for _ in range(12):
         try:
-            one = machine(port)
-            one.prepare(assume=one.arm.home if one.position() == "lost" else None)
-            origin = np.array(pins(port)) - one.counts()
-            plan = one.plan(one.counts(), np.radians([rng.uniform(-90, 90), rng.uniform(0, 90), rng.uniform(-90, 0)]))
-            one.run([plan])
+            machine = connect_grbl(port)
+            machine.prepare(assume=machine.arm.home if machine.position() == "lost" else None)
+            origin = np.array(pins(port)) - machine.counts()
+            plan = machine.plan(
+                machine.counts(), np.radians([rng.uniform(-90, 90), rng.uniform(0, 90), rng.uniform(-90, 0)])
+            )
+            machine.run([plan])
         except (LinkError, armkin.UsageError, armkin.NoSolutionError):
             continue
-        assert (np.array(pins(port)) - origin).tolist() == plan.end.tolist() == list(one.counts())
+        assert (np.array(pins(port)) - origin).tolist() == plan.end.tolist() == list(machine.counts())
         right += 1
     assert right > 0
 
@@ -202,17 +204,17 @@ def test_damaged_answers_never_give_a_false_position(seed: int) -> None:
 
     port = Mumbling(axes=4, settings=FITS)
     port.simulated = False
-    one = machine(port)
-    one.prepare(assume=one.arm.home)
-    one.run([one.plan(one.counts(), np.deg2rad([-30, 5, -5]))])
+    machine = connect_grbl(port)
+    machine.prepare(assume=machine.arm.home)
+    machine.run([machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))])
     port.mumbles, told = True, 0
     for _ in range(120):
         try:
-            one.refresh()
+            machine.refresh()
         except LinkError:
             continue
-        assert one.position() == "known"
-        assert list(one.counts()) == pins(port)
+        assert machine.position() == "known"
+        assert list(machine.counts()) == pins(port)
         told += 1
     assert told > 10
 
@@ -231,48 +233,48 @@ def test_a_lost_answer_ends_the_wait_and_tells_where_the_arm_stands() -> None:
 
     port = Deaf(axes=4, settings=FITS)
     port.simulated = False
-    one = machine(port)
-    one.prepare(assume=one.arm.home)
+    machine = connect_grbl(port)
+    machine.prepare(assume=machine.arm.home)
     port.lose = 1
-    plan = one.plan(one.counts(), np.deg2rad([30, 60, -60]))
+    plan = machine.plan(machine.counts(), np.deg2rad([30, 60, -60]))
     began = port.now()
     with pytest.raises(LinkError, match="without an answer; the arm was stopped\nthe arm stands at q1 = 30"):
-        one.run([plan])
+        machine.run([plan])
     assert port.now() - began < plan.duration + 5
-    assert machine(port).counts() == one.counts() == tuple(pins(port)) == tuple(plan.end.tolist())
+    assert connect_grbl(port).counts() == machine.counts() == tuple(pins(port)) == tuple(plan.end.tolist())
 
 
 def test_what_the_gripper_holds_is_gripped_again_after_a_stop() -> None:
     """A stop clears GRBL's queue by a reset, which switches M3 off."""
     port = board()
     asked = iter(range(10_000))
-    one = machine(port, lambda: next(asked) > 30)
-    one.prepare(assume=one.arm.home)
-    one.grip(Gripper.model_validate({"kind": "spindle", "open": 0, "closed": 120}), 120)
+    machine = connect_grbl(port, lambda: next(asked) > 30)
+    machine.prepare(assume=machine.arm.home)
+    machine.grip(Gripper.model_validate({"kind": "spindle", "open": 0, "closed": 120}), 120)
     assert port.spindle == 120
     with pytest.raises(StoppedError):
-        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]))])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([60, 20, -60]))])
     assert port.spindle == 120
-    again = machine(port)
+    again = connect_grbl(port)
     assert again.position() == "known"
     again.hold()
     assert port.spindle == 120
     port.alarm(1)
     with pytest.raises(LinkError, match="a limit switch closed"):
         again.hold()
-    assert machine(port).position() == "lost"
+    assert connect_grbl(port).position() == "lost"
 
 
 def test_a_pause_of_a_path_is_a_dwell() -> None:
     port = board()
-    one = machine(port)
-    one.prepare(assume=one.arm.home)
+    machine = connect_grbl(port)
+    machine.prepare(assume=machine.arm.home)
     plan = armkin.path(
         ARM, {"start": "home", "moves": [{"joint": [0, 80, -80]}, {"wait": 1.5}, {"joint": [0, 90, -90]}]}
     )
     before = port.now()
-    for part in path_run.lay_parts(plan, one.counts(), one.lay):
+    for part in path_run.lay_parts(plan, machine.counts(), machine.lay):
         assert isinstance(part, Job)
-        one.run([part])
+        machine.run([part])
     assert port.now() - before > 1.5
     assert pins(port) == [0, 0, 0]

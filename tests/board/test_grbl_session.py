@@ -16,7 +16,7 @@ QUICK = {110 + k: 6000.0 for k in range(4)} | {120 + k: 1000.0 for k in range(4)
 AXES = [Axis("X", "q1", 35.556, False, 60, 120), Axis("Z", "q3", 66.667, True, 60, 120)]
 
 
-def opened(board: Grbl) -> Session:
+def open_session(board: Grbl) -> Session:
     session = Session(board)
     session.open()
     return session
@@ -28,7 +28,7 @@ def never() -> bool:
 
 def test_lines_arrive_at_their_steps_and_the_buffer_never_overflows() -> None:
     board = Grbl(axes=4, settings=QUICK)
-    session = opened(board)
+    session = open_session(board)
     rng = random.Random(1)
     targets = [[rng.randrange(-9000, 9000) / 250 for _ in range(4)] for _ in range(60)]
     work = [f"G53G1{''.join(f'{letter}{v:.5f}' for letter, v in zip('XYZA', t, strict=True))}F6000" for t in targets]
@@ -39,7 +39,7 @@ def test_lines_arrive_at_their_steps_and_the_buffer_never_overflows() -> None:
 
 def test_a_hold_stands_on_the_line_and_a_reset_there_keeps_the_position() -> None:
     board = Grbl(axes=2, settings=QUICK)
-    session = opened(board)
+    session = open_session(board)
     asked = iter(range(1000))
     assert not session.stream(["G53G1X40Y20F6000", "G4P0"], lambda: next(asked) > 20)
     session.realtime(replies.HOLD)
@@ -56,7 +56,7 @@ def test_a_hold_stands_on_the_line_and_a_reset_there_keeps_the_position() -> Non
 def test_a_hold_that_nobody_asked_for_ends_in_words() -> None:
     """A byte damaged into `!` holds GRBL, which then reports Hold ten times a second: it was waited for without end."""
     board = Grbl(axes=2, settings=QUICK)
-    session = opened(board)
+    session = open_session(board)
     ticks = iter(range(10_000))  # the old host took them all
 
     def tick() -> bool:
@@ -71,7 +71,7 @@ def test_a_hold_that_nobody_asked_for_ends_in_words() -> None:
 
 def test_a_reset_in_motion_is_an_alarm() -> None:
     board = Grbl(axes=2, settings=QUICK)
-    session = opened(board)
+    session = open_session(board)
     asked = iter(range(1000))
     session.stream(["G53G1X40Y20F6000"], lambda: next(asked) > 20)
     session.realtime(b"G4P1\n")
@@ -87,14 +87,14 @@ def test_a_reset_in_motion_is_an_alarm() -> None:
 )
 def test_what_grbl_refuses_is_told_with_its_line(line: str, number: int) -> None:
     with pytest.raises(GrblError, match=rf"GRBL refused '{line.replace('$', '.')}'.*error {number}\)"):
-        opened(Grbl()).ask(line)
+        open_session(Grbl()).ask(line)
 
 
 def test_a_port_without_grbl_is_named() -> None:
     board = Grbl(name="/dev/ttyX")
     board.dead = True
     with pytest.raises(LinkError, match="/dev/ttyX does not answer as GRBL does"):
-        opened(board)
+        open_session(board)
 
 
 def test_errors_that_nobody_asked_for_keep_no_board_from_answering() -> None:
@@ -102,12 +102,12 @@ def test_errors_that_nobody_asked_for_keep_no_board_from_answering() -> None:
     board = Grbl(hal=True)
     board._send("error:7")
     board.write(b"G999\n")
-    assert opened(board).hal
+    assert open_session(board).hal
 
 
 def test_a_cable_that_is_pulled_is_told() -> None:
     board = Grbl()
-    session = opened(board)
+    session = open_session(board)
     board.dead = True
     with pytest.raises(LinkError, match="does not answer any more"):
         session.status()
@@ -117,7 +117,7 @@ def test_a_cable_that_is_pulled_is_told() -> None:
 
 def test_settings_are_compared_and_only_what_is_wrong_is_serious() -> None:
     board = Grbl(axes=4)
-    session = opened(board)
+    session = open_session(board)
     found = dict(pair for line in session.ask("$$") if (pair := replies.parse_setting(line)))
     odd = {difference.number: difference.serious for difference in settings.differences(AXES, found)}
     assert odd == {1: False, 3: True, 100: True, 102: True, 110: False, 112: False, 120: False, 122: False}

@@ -34,13 +34,13 @@ class Spoilt(Grbl):
         super().write((self.spoil(text) if self.spoil and "G53" in text else text).encode("latin1"))
 
 
-def opened(spoil: Spoil | None = None) -> tuple[Spoilt, GrblMachine]:
+def open_grbl(spoil: Spoil | None = None) -> tuple[Spoilt, GrblMachine]:
     port = Spoilt(axes=4, settings=FITS)
     port.simulated = False
-    one = GrblMachine(port, ARM)
-    one.prepare(assume=ARM.home)
+    machine = GrblMachine(port, ARM)
+    machine.prepare(assume=ARM.home)
     port.spoil = spoil
-    return port, one
+    return port, machine
 
 
 def feed(value: float) -> Spoil:
@@ -61,29 +61,29 @@ def target(old: str, new: str) -> Spoil:
     ],
 )
 def test_a_damaged_line_is_held_in_motion(spoil: Spoil, message: str, seconds: float) -> None:
-    port, one = opened(spoil)
-    plan = one.plan(one.counts(), np.deg2rad([-60, 60, -60]), speed=0.2)
+    port, machine = open_grbl(spoil)
+    plan = machine.plan(machine.counts(), np.deg2rad([-60, 60, -60]), speed=0.2)
     began = port.now()
     with pytest.raises(
         LinkError,
         match=f"{message}; a line was damaged on its way, or another program has sent one; the arm was stopped",
     ):
-        one.run([plan])
+        machine.run([plan])
     assert port.now() - began < seconds
-    assert one.position() == "known"
-    assert list(one.counts()) == port.steps[:3]
+    assert machine.position() == "known"
+    assert list(machine.counts()) == port.steps[:3]
     port.spoil = None
-    one.prepare()
-    one.run([one.plan(one.counts(), ARM.home[None])])
+    machine.prepare()
+    machine.run([machine.plan(machine.counts(), ARM.home[None])])
     assert port.steps[:3] == [0, 0, 0]
 
 
 def test_a_feed_lost_of_a_slow_move_is_caught_before_it_comes_far() -> None:
     """At 5 % of the speed a lost decimal point asks for 1,000 times as much; GRBL's own limits allow 20 times."""
-    port, one = opened(lambda line: line[: line.index("F")] + line[line.index("F") :].replace(".", ""))
-    plan = one.plan(one.counts(), np.deg2rad([-60, 60, -60]), speed=0.05)
+    port, machine = open_grbl(lambda line: line[: line.index("F")] + line[line.index("F") :].replace(".", ""))
+    plan = machine.plan(machine.counts(), np.deg2rad([-60, 60, -60]), speed=0.05)
     with pytest.raises(LinkError, match="faster than planned"):
-        one.run([plan])
+        machine.run([plan])
     share = np.abs(port.steps[:3]).max() / np.abs(plan.end).max()
     assert share < 0.6
 
@@ -91,24 +91,24 @@ def test_a_feed_lost_of_a_slow_move_is_caught_before_it_comes_far() -> None:
 def test_what_is_as_planned_is_left_alone() -> None:
     """A curve, a pause, a slow board: all of them arrive."""
     for accel in (1.0, 0.2):
-        port, one = opened()
+        port, machine = open_grbl()
         port.settings.update({120 + k: FITS[120 + k] * accel for k in range(3)})
-        one.prepare()
+        machine.prepare()
         moves = [{"joint": [0, 80, -80]}, {"wait": 5}, {"joint": [20, 70, -90]}, {"joint": [0, 90, -90]}]
         plan = armkin.path(ARM, {"start": "home", "blend": 5, "moves": moves})
-        for part in path_run.lay_parts(plan, one.counts(), one.lay):
+        for part in path_run.lay_parts(plan, machine.counts(), machine.lay):
             assert isinstance(part, Job)
-            one.run([part])
+            machine.run([part])
         assert port.steps[:3] == [0, 0, 0]
 
 
 def test_one_damaged_report_is_not_believed() -> None:
-    _, one = opened()
-    job = one.plan(one.counts(), np.deg2rad([-60, 60, -60]))
+    _, machine = open_grbl()
+    job = machine.plan(machine.counts(), np.deg2rad([-60, 60, -60]))
     assert isinstance(job, Job)
-    watch = Watch(job, one.axes, np.zeros(3, dtype=np.int64))
-    one.refresh()
-    report = one.session.report
+    watch = Watch(job, machine.axes, np.zeros(3, dtype=np.int64))
+    machine.refresh()
+    report = machine.session.report
     assert report is not None
     away = report.__class__("Run", 0, (99.0, 0.0, 0.0, 0.0), None, "")
     assert watch.fault(away, 0.1) is None
@@ -117,14 +117,14 @@ def test_one_damaged_report_is_not_believed() -> None:
 
 def test_settings_are_read_again_before_a_motion() -> None:
     """A long session (a page) outlives resets, and whoever else turns a board's screws."""
-    port, one = opened()
+    port, machine = open_grbl()
     port.settings[100] = 250.0
     port.advance(6.0)
     with pytest.raises(LinkError, match=r"settings do not fit three_dof: \$100"):
-        one.prepare()
+        machine.prepare()
     port.settings[100] = FITS[100]
     port.boot()
     port.advance(0.1)
-    assert one.prepare(assume=ARM.home)
-    one.run([one.plan(one.counts(), np.deg2rad([-3, 85, -85]))])
-    assert list(one.counts()) == port.steps[:3]
+    assert machine.prepare(assume=ARM.home)
+    machine.run([machine.plan(machine.counts(), np.deg2rad([-3, 85, -85]))])
+    assert list(machine.counts()) == port.steps[:3]

@@ -32,13 +32,13 @@ AXES = axes_of(ARM)
 _numbers = itertools.count()  # of ports: each has a name of its own, and so has its record
 
 
-def opened(stop: Callable[[], bool] = lambda: False) -> tuple[Klipper, KlipperMachine]:
+def open_klipper(stop: Callable[[], bool] = lambda: False) -> tuple[Klipper, KlipperMachine]:
     """The arm at home, as somebody has said."""
     port = Klipper(settings_of(AXES), f"klipper-{os.getpid()}-{next(_numbers)}")
     port.simulated = False  # so that nobody vouches for the position by itself
-    one = KlipperMachine(port, ARM, stop)
-    assert one.prepare(assume=ARM.home)
-    return port, one
+    machine = KlipperMachine(port, ARM, stop)
+    assert machine.prepare(assume=ARM.home)
+    return port, machine
 
 
 def pins(port: Klipper) -> list[int]:
@@ -47,26 +47,26 @@ def pins(port: Klipper) -> list[int]:
 
 
 def test_200_random_moves_are_read_back_exact_and_keep_their_time() -> None:
-    port, one = opened()
+    port, machine = open_klipper()
     rng = np.random.default_rng(3)
     for _ in range(200):
         goal = rng.uniform(ARM.lower, ARM.upper)
-        plan, began = one.plan(one.counts(), goal), port.now()
-        one.run([plan])
-        assert list(one.counts()) == pins(port) == armkin.pulses(ARM, goal).tolist()
+        plan, began = machine.plan(machine.counts(), goal), port.now()
+        machine.run([plan])
+        assert list(machine.counts()) == pins(port) == armkin.pulses(ARM, goal).tolist()
         assert plan.duration <= port.now() - began < plan.duration + 0.3
     assert port.jumps == 0  # no corner for which Klipper would slow down
 
 
 def test_a_curve_goes_on_without_a_stop() -> None:
     """All lines move X, which carries the time: else Klipper would stop between them."""
-    port, one = opened()
+    port, machine = open_klipper()
     moves = [{"joint": [0, 80, -80]}, {"wait": 0.5}, {"joint": [20, 70, -90]}, {"joint": [0, 90, -90]}]
     plan = armkin.path(ARM, {"start": "home", "blend": 5, "moves": moves})
     began = port.now()
-    for part in path_run.lay_parts(plan, one.counts(), one.lay):
+    for part in path_run.lay_parts(plan, machine.counts(), machine.lay):
         assert isinstance(part, Job)
-        one.run([part])
+        machine.run([part])
         x = [float(line.split()[1][1:]) for line in Lines(part, AXES)]
         assert (np.diff([0, *x]) > 0).all()
         assert x[-1] == pytest.approx(10 * part.duration, abs=1e-4)
@@ -105,11 +105,11 @@ def looked_ahead(lines: list[str]) -> tuple[float, int]:
 
 
 def test_klipper_s_look_ahead_makes_the_plan_s_own_time_of_the_lines() -> None:
-    _, one = opened()
+    _, machine = open_klipper()
     moves = [{"joint": [0, 80, -80]}, {"joint": [20, 70, -90]}, {"line": [390, 80, 300]}, {"line": [390, -60, 300]}]
     path = armkin.path(ARM, {"start": "home", "blend": 5, "tolerance": 0.1, "moves": moves})
-    jobs = [one.plan(one.counts(), np.deg2rad(goal)) for goal in ([60, 20, -60], [-100, 0, 20], [0.5, 89, -89])]
-    for job in [*jobs, *path_run.lay_parts(path, one.counts(), one.lay)]:
+    jobs = [machine.plan(machine.counts(), np.deg2rad(goal)) for goal in ([60, 20, -60], [-100, 0, 20], [0.5, 89, -89])]
+    for job in [*jobs, *path_run.lay_parts(path, machine.counts(), machine.lay)]:
         assert isinstance(job, Job)
         seconds, rests = looked_ahead(list(Lines(job, AXES)))
         assert job.duration <= seconds < job.duration + 0.03
@@ -119,17 +119,17 @@ def test_klipper_s_look_ahead_makes_the_plan_s_own_time_of_the_lines() -> None:
 @pytest.mark.parametrize("after", [3, 40, 90, 140])
 def test_a_stop_brakes_on_the_way_and_the_next_command_goes_on(after: int) -> None:
     asked = iter(range(100_000))
-    port, one = opened(lambda: next(asked) > after)
-    plan = one.plan(one.counts(), np.deg2rad([60, 20, -60]), speed=0.4)
+    port, machine = open_klipper(lambda: next(asked) > after)
+    plan = machine.plan(machine.counts(), np.deg2rad([60, 20, -60]), speed=0.4)
     with pytest.raises(StoppedError):
-        one.run([plan])
-    assert one.position() == "known"
-    assert list(one.counts()) == pins(port)
+        machine.run([plan])
+    assert machine.position() == "known"
+    assert list(machine.counts()) == pins(port)
     share = [at / end for at, end in zip(pins(port), plan.end.tolist(), strict=True)]
     assert max(share) - min(share) < 2e-3
     assert port.jumps == 0
     again = KlipperMachine(port, ARM)
-    assert (again.position(), again.counts()) == ("known", one.counts())
+    assert (again.position(), again.counts()) == ("known", machine.counts())
     assert not again.prepare()
     again.run([again.plan(again.counts(), np.deg2rad([60, 20, -60]))])
     assert pins(port) == plan.end.tolist()
@@ -151,36 +151,36 @@ def test_what_loses_the_position_is_told(fault: Callable[[Klipper], None], messa
             fault(port)
         return False
 
-    port, one = opened(stop)
+    port, machine = open_klipper(stop)
     with pytest.raises(LinkError, match=message):
-        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]), speed=0.2)])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([60, 20, -60]), speed=0.2)])
     if not port.dead:
         assert KlipperMachine(port, ARM).position() == "lost"
 
 
 def test_motors_that_are_switched_off_lose_the_position() -> None:
-    _, one = opened()
-    one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
-    one.api.run("M84")
-    one.refresh()
-    assert one.position() == "lost"
+    _, machine = open_klipper()
+    machine.run([machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))])
+    machine.api.run("M84")
+    machine.refresh()
+    assert machine.position() == "lost"
     with pytest.raises(PositionLostError):
-        one.prepare()
-    assert one.prepare(assume=ARM.home)
-    assert one.counts() == (0, 0, 0)
+        machine.prepare()
+    assert machine.prepare(assume=ARM.home)
+    assert machine.counts() == (0, 0, 0)
 
 
 def test_another_program_s_move_is_found() -> None:
-    port, one = opened()
-    one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+    port, machine = open_klipper()
+    machine.run([machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))])
     for line in ("G1 A3 F600", "G91\nG1 B-2 F600"):
-        there = one.counts()
-        one.api.run(f"{line}\nM400")
+        there = machine.counts()
+        machine.api.run(f"{line}\nM400")
         with pytest.raises(PositionLostError, match="another program has moved it"):
-            one.prepare()
-        assert one.position() == KlipperMachine(port, ARM).position() == "lost"
-        assert one.prepare(assume=armkin.joints(ARM, there))
-        one.run([one.plan(one.counts(), np.deg2rad([12, 80, -70]))])
+            machine.prepare()
+        assert machine.position() == KlipperMachine(port, ARM).position() == "lost"
+        assert machine.prepare(assume=armkin.joints(ARM, there))
+        machine.run([machine.plan(machine.counts(), np.deg2rad([12, 80, -70]))])
 
     class Meddled(Klipper):
         def _obey(self, line: str) -> None:
@@ -189,20 +189,20 @@ def test_another_program_s_move_is_found() -> None:
                 self.steppers["axis_a"].place += 1.0
 
     port = Meddled(settings_of(AXES))
-    one = KlipperMachine(port, ARM)
-    one.prepare()
+    machine = KlipperMachine(port, ARM)
+    machine.prepare()
     with pytest.raises(LinkError, match="another program has moved it"):
-        one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))])
 
 
 def test_a_program_that_moves_the_arm_between_plan_and_motion_is_told() -> None:
-    _, one = opened()
-    plan = one.plan(one.counts(), np.deg2rad([10, 80, -70]))
-    one.api.run("G1 A3 F600\nM400")
+    _, machine = open_klipper()
+    plan = machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))
+    machine.api.run("G1 A3 F600\nM400")
     with pytest.raises(LinkError, match="another program has moved it"):
-        one.run([plan])
-    one.refresh()
-    assert one.position() == "lost"
+        machine.run([plan])
+    machine.refresh()
+    assert machine.position() == "lost"
 
 
 @pytest.mark.parametrize("asks", [3, 40, 120])
@@ -214,11 +214,11 @@ def test_a_shutdown_in_motion_is_told_as_such(asks: int) -> None:
             port.shutdown()
         return False
 
-    port, one = opened(stop)
+    port, machine = open_klipper(stop)
     with pytest.raises(
         LinkError, match="Klipper went into state shutdown in the motion: Printer is shutdown"
     ) as caught:
-        one.run([one.plan(one.counts(), np.deg2rad([60, 20, -60]), speed=0.3)])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([60, 20, -60]), speed=0.3)])
     assert "another program" not in str(caught.value)
 
 
@@ -230,10 +230,10 @@ def test_a_shutdown_after_the_last_line_is_told_as_such() -> None:
                 self.state = "shutdown"
 
     port = Late(settings_of(AXES))
-    one = KlipperMachine(port, ARM)
-    one.prepare()
+    machine = KlipperMachine(port, ARM)
+    machine.prepare()
     with pytest.raises(LinkError, match="Klipper is in state shutdown: Printer is shutdown") as caught:
-        one.run([one.plan(one.counts(), np.deg2rad([10, 80, -70]))])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))])
     assert "another program" not in str(caught.value)
 
 
@@ -290,8 +290,8 @@ def test_an_api_that_lies_is_believed_in_nothing_that_cannot_be(seed: int) -> No
 
     port = Liar(settings_of(AXES))
     port.simulated = False
-    one = KlipperMachine(port, ARM)
-    one.prepare(assume=ARM.home)
+    machine = KlipperMachine(port, ARM)
+    machine.prepare(assume=ARM.home)
     port.lies, errors = True, list[LinkError]()
     for _ in range(8):
         try:

@@ -88,7 +88,7 @@ class NoisyPort(SimPort):
         return bytes(out)
 
 
-def machine(arm: Arm, port: SimPort | None = None) -> FirmwareMachine:
+def connect_board(arm: Arm, port: SimPort | None = None) -> FirmwareMachine:
     configuration = configure(arm)
     return FirmwareMachine(port or SimPort(SimBoard(configuration.board)), arm, configuration)
 
@@ -98,15 +98,15 @@ def test_a_noisy_line_ends_at_exact_counts(three_dof: Arm, seed: int) -> None:
     """About 300 segments on a line that damages 2 % of the bytes in each direction."""
     board = SimBoard(BOARDS["uno_cnc_shield"])
     port = NoisyPort(board, 0.01, seed)
-    one = machine(three_dof, port)
-    one.prepare(assume=one.arm.home)
+    machine = connect_board(three_dof, port)
+    machine.prepare(assume=machine.arm.home)
     rng = np.random.default_rng(seed)
-    plans, at = [], list(one.counts())
+    plans, at = [], list(machine.counts())
     for _ in range(5):
         plans.append(plan_moves(three_dof, at, rng.uniform(np.deg2rad([-60, 20, -100]), np.deg2rad([60, 110, -10]))))
         at = plans[-1].end.tolist()
-    status = one.run(plans)
-    assert list(one.counts()) == at
+    status = machine.run(plans)
+    assert list(machine.counts()) == at
     assert board.net[:3] == at
     assert status.state == State.IDLE
     assert port.damaged > 100
@@ -115,11 +115,11 @@ def test_a_noisy_line_ends_at_exact_counts(three_dof: Arm, seed: int) -> None:
 def test_a_stop_holds_on_the_path(three_dof: Arm) -> None:
     configuration = configure(three_dof)
     port = SimPort(SimBoard(configuration.board))
-    one = FirmwareMachine(port, three_dof, configuration, lambda: port.board.net[1] < -4000)
-    one.prepare()
-    plan = plan_moves(three_dof, one.counts(), np.deg2rad([-30, 5, -5]))
+    machine = FirmwareMachine(port, three_dof, configuration, lambda: port.board.net[1] < -4000)
+    machine.prepare()
+    plan = plan_moves(three_dof, machine.counts(), np.deg2rad([-30, 5, -5]))
     with pytest.raises(StoppedError) as stopped:
-        one.run([plan])
+        machine.run([plan])
     status = stopped.value.status
     assert status is not None
     assert status.state == State.IDLE
@@ -132,28 +132,28 @@ def test_lost_known_and_changed(three_dof: Arm) -> None:
     board = SimBoard(BOARDS["uno_cnc_shield"])
     port = NoisyPort(board, 0.0, 1)
     with pytest.raises(LinkError, match="position is lost"):
-        machine(three_dof, port).prepare()
-    assert machine(three_dof, port).prepare(assume=three_dof.home)
+        connect_board(three_dof, port).prepare()
+    assert connect_board(three_dof, port).prepare(assume=three_dof.home)
     with pytest.raises(LinkError, match="position is known"):
-        machine(three_dof, port).prepare(assume=three_dof.home)
-    assert machine(three_dof, port).position() == "known"
+        connect_board(three_dof, port).prepare(assume=three_dof.home)
+    assert connect_board(three_dof, port).position() == "known"
     board.reset()
-    assert machine(three_dof, port).position() == "retained"
+    assert connect_board(three_dof, port).position() == "retained"
     other = arms.build(parse_robot_file(Path(ROBOT).read_text().replace("pulley: 4", "pulley: 5")))
-    changed = machine(other, port)
+    changed = connect_board(other, port)
     assert changed.position() == "lost"
     with pytest.raises(LinkError, match="configured for another arm"):
         changed.prepare()
-    assert machine(three_dof, port).position() == "retained"  # nothing was changed by asking
+    assert connect_board(three_dof, port).position() == "retained"  # nothing was changed by asking
     with pytest.raises(ReplacedError, match="another program has taken over the board"):
         changed.prepare(assume=changed.arm.home)
-    assert machine(other, port).prepare(assume=other.home)
-    assert machine(three_dof, port).position() == "lost"
+    assert connect_board(other, port).prepare(assume=other.home)
+    assert connect_board(three_dof, port).position() == "lost"
 
 
 def test_another_board_is_refused(three_dof: Arm, wrist: Arm) -> None:
     with pytest.raises(LinkError, match="sim is mega_ramps14, three_dof's board is uno_cnc_shield"):
-        machine(three_dof, SimPort(SimBoard(BOARDS["mega_ramps14"])))
+        connect_board(three_dof, SimPort(SimBoard(BOARDS["mega_ramps14"])))
 
 
 def test_the_image_of_the_published_arm(three_dof: Arm) -> None:
@@ -204,12 +204,12 @@ def test_the_boards_rows_are_the_joint_limits(wrist: Arm, degrees: Sequence[floa
 
 
 def test_coupled_joints_move_together_to_exact_counts(wrist: Arm) -> None:
-    one = machine(wrist)
-    one.prepare()
-    plan = plan_moves(wrist, one.counts(), np.deg2rad([[80, 40, 70], [0, -40, -50], [0, 0, 0]]))
+    machine = connect_board(wrist)
+    machine.prepare()
+    plan = plan_moves(wrist, machine.counts(), np.deg2rad([[80, 40, 70], [0, -40, -50], [0, 0, 0]]))
     assert np.all(plan.trajectory.top_speed <= wrist.max_speed * (1 + 1e-9))
-    one.run([plan])
-    assert one.counts() == (0, 0, 0)
+    machine.run([plan])
+    assert machine.counts() == (0, 0, 0)
 
 
 def test_coupled_joints_home_one_after_another(wrist: Arm) -> None:
@@ -226,17 +226,17 @@ def test_coupled_joints_home_one_after_another(wrist: Arm) -> None:
         return bool(pressed) if number == 3 else not pressed
 
     board = SimBoard(configuration.board, switch)
-    one = FirmwareMachine(NoisyPort(board, 0.0, 1), wrist, configuration)
+    machine = FirmwareMachine(NoisyPort(board, 0.0, 1), wrist, configuration)
     names: list[str] = []
-    homing.home_joints(one, announce=names.append)
+    homing.home_joints(machine, announce=names.append)
     assert names == ["J1", "J2", "J3"]
-    assert one.position() == "known"
+    assert machine.position() == "known"
     true = joints(wrist, pulses(wrist, start) + np.array([board.net[axis] for axis in axes]))
-    assert np.rad2deg(one.joints()) == pytest.approx(np.rad2deg(true), abs=0.15)
+    assert np.rad2deg(machine.joints()) == pytest.approx(np.rad2deg(true), abs=0.15)
     # From behind its switches, outside the limits, the arm comes back.
-    one.prepare()
-    one.run([plan_moves(wrist, one.counts(), np.zeros(3))])
-    assert one.counts() == (0, 0, 0)
+    machine.prepare()
+    machine.run([plan_moves(wrist, machine.counts(), np.zeros(3))])
+    assert machine.counts() == (0, 0, 0)
 
 
 def test_a_joint_without_homing_is_named(three_dof: Arm) -> None:
@@ -249,6 +249,6 @@ def test_moves_behind_a_long_ramp_do_not_pass_for_a_dry_queue() -> None:
     rows = [[10, 80, -80], [-30, 5, -5], [40, 100, -100], [0, 90, -90]]
     for count in (2, 4):
         data = "\n".join(",".join(map(str, row)) for row in rows[:count]).encode()
-        done = run("send", THREE_DOF, "--batch", "-", "--port", "sim", "--json", stdin=data)
-        assert done.code == 0, done.err
-        assert done.json["waypoints"] == count
+        completed = run("send", THREE_DOF, "--batch", "-", "--port", "sim", "--json", stdin=data)
+        assert completed.code == 0, completed.err
+        assert completed.json["waypoints"] == count

@@ -47,8 +47,8 @@ class Arm:
         monkeypatch.setattr("armkin.board.kinds.firmware.open_port", lambda name, **_: Wire(self))
 
     def send(self, *words: object) -> tuple[int, str]:
-        done = run("send", THREE_DOF, *words, "--port", self.name)
-        return done.code, done.err
+        completed = run("send", THREE_DOF, *words, "--port", self.name)
+        return completed.code, completed.err
 
     @property
     def counts(self) -> list[int]:
@@ -233,8 +233,8 @@ def _moves(way: Cut) -> list[int]:
 @pytest.mark.parametrize("goal", [(-30, 5, -5), (10, 80, -80), (25, 85, -60)])
 def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, ...]) -> None:
     """ACCEL was answered within the last two steps: whole steps are another direction there than the line's."""
-    one = armkin.load(ROOT / THREE_DOF)
-    whole = plan_moves(one, [0, 0, 0], np.deg2rad(goal), min_interval=448)
+    arm = armkin.load(ROOT / THREE_DOF)
+    whole = plan_moves(arm, [0, 0, 0], np.deg2rad(goal), min_interval=448)
     at, stands = np.array(whole.start) * STEP + HALF, list[list[int]]()
     for s in next(whole.moves()).segments:
         stands += ((at + np.arange(1, s.ticks + 1)[:, None] * np.array(s.rates)) // STEP).tolist()
@@ -242,18 +242,18 @@ def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, .
     last = list(dict.fromkeys(map(tuple, stands)))[-14:-1]
     for counts in map(np.array, last):
         place = next(places_on([whole], counts))
-        left = cut_trajectory(remaining_trajectory(whole, place, joints(one, counts)), counts, min_interval=448)
+        left = cut_trajectory(remaining_trajectory(whole, place, joints(arm, counts)), counts, min_interval=448)
         assert _moves(left) == whole.end.tolist(), counts
 
 
 def test_a_way_of_less_than_a_step_is_taken() -> None:
     """An arm 0.55 steps before a path's start has a whole one to make: ACCEL was answered."""
-    one = armkin.load(ROOT / THREE_DOF)
-    here = joints(one, [128, -1193, 1333])
+    arm = armkin.load(ROOT / THREE_DOF)
+    here = joints(arm, [128, -1193, 1333])
     for steps in ([0.55, -0.55, 0], [0, 0, 0.7], [-0.6, 0, 0.6], [1.51, -0.55, 2.6]):
-        goal = here + joints(one, steps) - one.home
+        goal = here + joints(arm, steps) - arm.home
         way = cut_trajectory(
-            Trajectory(one, here, (straight_move(one, here, goal),)), [128, -1193, 1333], min_interval=448
+            Trajectory(arm, here, (straight_move(arm, here, goal),)), [128, -1193, 1333], min_interval=448
         )
         assert _moves(way) == way.end.tolist() != way.start.tolist()
 
@@ -262,18 +262,18 @@ def test_a_way_of_less_than_a_step_is_taken() -> None:
 def test_what_is_left_of_a_curve_keeps_to_the_joints_limits(begin: float) -> None:
     from armkin.motion.remaining_stretch import remainder
 
-    one = armkin.load(ROOT / THREE_DOF)
+    arm = armkin.load(ROOT / THREE_DOF)
     corners = np.array([[390, 80, 300], [390, 160, 300], [340, 160, 280], [340, 20, 300]])
-    plan = armkin.path(one, corners, blend=15.0)
+    plan = armkin.path(arm, corners, blend=15.0)
     stretch = max(plan.motion.stretches, key=lambda s: s.duration)
     t0 = begin * stretch.duration
-    left = remainder(one, stretch, t0, stretch.evaluate(np.array([t0]))[0])
+    left = remainder(arm, stretch, t0, stretch.evaluate(np.array([t0]))[0])
     t = np.linspace(0, left.duration, 4000)
-    assert np.abs(left.evaluate(t, 1) / one.max_speed).max() <= 1.001
-    assert np.abs(left.evaluate(t, 2) / one.max_accel).max() <= 1.02
+    assert np.abs(left.evaluate(t, 1) / arm.max_speed).max() <= 1.001
+    assert np.abs(left.evaluate(t, 2) / arm.max_accel).max() <= 1.02
     assert np.abs(left.evaluate(t, 1)[[0, -1]]).max() < 1e-6  # from rest to rest
     assert left.end == pytest.approx(stretch.end)
     assert left.duration < stretch.duration - t0 + 1.5
-    way = places(one, stretch.evaluate(np.linspace(t0, stretch.duration, 20_000)))
-    track = [tuple(row) for row in places(one, left.evaluate(t[::40]))]
+    way = places(arm, stretch.evaluate(np.linspace(t0, stretch.duration, 20_000)))
+    track = [tuple(row) for row in places(arm, left.evaluate(t[::40]))]
     assert distance(track, way) < 0.01

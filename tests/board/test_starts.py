@@ -71,11 +71,11 @@ def test_an_approach_is_told_and_counted_nowhere_else(tmp_path: Path) -> None:
     off = run("path", "three_dof", file, "--start", "8,84,-80", "--json").json
     assert off["approach"] == {"from_joints": [8, 84, -80], "duration_s": pytest.approx(0.5833, abs=1e-3)}
     assert {key: value for key, value in off.items() if key != "approach"} == there
-    done = run("path", "three_dof", file, "--port", "sim", "--assume", "8,84,-80", "--json")
-    assert "first a joint move to where the path starts: 0.58" in done.err
-    assert done.json["approach"]["duration_s"] == pytest.approx(0.5833, abs=1e-3)
+    completed = run("path", "three_dof", file, "--port", "sim", "--assume", "8,84,-80", "--json")
+    assert "first a joint move to where the path starts: 0.58" in completed.err
+    assert completed.json["approach"]["duration_s"] == pytest.approx(0.5833, abs=1e-3)
     for key in ("length_mm", "samples", "segments", "deviation_mm", "duration_s"):
-        assert done.json[key] == pytest.approx(there[key])
+        assert completed.json[key] == pytest.approx(there[key])
     dry = run("send", "three_dof", "--path", file, "--from", "8,84,-80", "--dry-run")
     assert "before it 0.583 s from where the arm stands to its start" in dry.out
 
@@ -83,10 +83,10 @@ def test_an_approach_is_told_and_counted_nowhere_else(tmp_path: Path) -> None:
 def test_a_start_that_cannot_be_reached_is_said_of_its_key(tmp_path: Path) -> None:
     file = tmp_path / "far.yaml"
     file.write_text("start: {point: [900, 0, 300]}\nmoves: [{line: [390, 60, 300]}]\n")
-    done = run("path", "three_dof", file)
-    assert done.code == 3
-    assert "far.yaml:1" in done.err
-    assert "out of reach" in done.err
+    completed = run("path", "three_dof", file)
+    assert completed.code == 3
+    assert "far.yaml:1" in completed.err
+    assert "out of reach" in completed.err
 
 
 def test_joints_named_behind_lines_leave_the_others_where_the_lines_ended() -> None:

@@ -18,9 +18,9 @@ def test_the_command_writes_a_file_that_the_others_take(tmp_path: Path) -> None:
     csv, out = tmp_path / "rows.csv", tmp_path / "mine.yaml"
     rows = np.concatenate([np.degrees(c), measured(built(arm, 13), c, rng)], axis=1)
     np.savetxt(csv, rows, delimiter=",", header="q1,q2,q3,x,y,z", comments="")
-    done = run("calibrate", "three_dof", csv, "--out", out, "--json")
-    assert done.code == 0, done.err
-    answer = done.json
+    completed = run("calibrate", "three_dof", csv, "--out", out, "--json")
+    assert completed.code == 0, completed.err
+    answer = completed.json
     assert answer["after"]["rms_mm"] < 0.05 * answer["before"]["rms_mm"]
     assert answer["out"] == str(out)
     assert {row["row"] for row in answer["flagged"]} <= set(range(2, 42))

@@ -79,12 +79,12 @@ def test_a_built_arm_is_found(name: str, noise: float, figure: float) -> None:
         rng = np.random.default_rng(100 + seed)
         true = built(arm, seed)
         c = commands(arm, 60, rng)
-        found = armkin.calibrate(arm, c, measured(true, c, rng, noise=noise))
+        calibration = armkin.calibrate(arm, c, measured(true, c, rng, noise=noise))
         unseen = commands(arm, 1000, rng)
-        errors.append(rms(armkin.fk(found.arm, unseen)[:, :3, 3], true.tips(unseen)))
+        errors.append(rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], true.tips(unseen)))
         ratios.append(errors[-1] / rms(armkin.fk(arm, unseen)[:, :3, 3], true.tips(unseen)))
-        assert len(found.flagged) == 3  # 5 % of 60
-        assert found.noise == pytest.approx(noise, rel=0.3)
+        assert len(calibration.flagged) == 3  # 5 % of 60
+        assert calibration.noise == pytest.approx(noise, rel=0.3)
     assert np.median(errors) <= 1.5 * figure
     assert max(ratios) < 0.1
 
@@ -94,9 +94,9 @@ def test_a_file_that_is_right_stays() -> None:
     for seed in range(3):
         rng = np.random.default_rng(seed)
         c = commands(arm, 30, rng)
-        found = armkin.calibrate(arm, c, armkin.fk(arm, c)[:, :3, 3] + rng.normal(size=(30, 3)) * 0.5)
+        calibration = armkin.calibrate(arm, c, armkin.fk(arm, c)[:, :3, 3] + rng.normal(size=(30, 3)) * 0.5)
         unseen = commands(arm, 500, rng)
-        assert rms(armkin.fk(found.arm, unseen)[:, :3, 3], armkin.fk(arm, unseen)[:, :3, 3]) < 0.5
+        assert rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], armkin.fk(arm, unseen)[:, :3, 3]) < 0.5
 
 
 def test_four_rows_do_no_harm() -> None:
@@ -107,9 +107,9 @@ def test_four_rows_do_no_harm() -> None:
         rng = np.random.default_rng(seed)
         true = built(arm, seed, base=False)
         c, unseen = commands(arm, 4, rng), commands(arm, 300, rng)
-        found = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
+        calibration = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
         tips = measured(true, unseen, rng, wrong=0.0)
-        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (found.arm, arm))
+        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibration.arm, arm))
         worse += after > 1.05 * before
     assert worse <= 1  # of 12; tests/bench/bench_calibration.py counts 200
 
@@ -125,8 +125,8 @@ def test_few_rows_show_that_the_base_stands_elsewhere(
         rng = np.random.default_rng(500 + seed)
         true = built(arm, seed)
         c, unseen = commands(arm, rows, rng), commands(arm, 300, rng)
-        found = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
-        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], true.tips(unseen)) for a in (found.arm, arm))
+        calibration = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
+        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], true.tips(unseen)) for a in (calibration.arm, arm))
         shares.append(after / before)
     assert np.sum(np.array(shares) < 0.75) >= moved * seeds // 12
     assert max(shares) < 1.05
@@ -139,9 +139,9 @@ def test_four_rough_rows_that_fit_by_chance_are_seen_through(seed: int) -> None:
     rng = np.random.default_rng(1000 + seed)
     true = built(arm, seed, base=False)
     c, unseen = commands(arm, 4, rng), commands(arm, 300, rng)
-    found = armkin.calibrate(arm, c, measured(true, c, rng, noise=1.0, wrong=0.0))
+    calibration = armkin.calibrate(arm, c, measured(true, c, rng, noise=1.0, wrong=0.0))
     tips = measured(true, unseen, rng, noise=1.0, wrong=0.0)
-    after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (found.arm, arm))
+    after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibration.arm, arm))
     assert after <= 1.05 * before
 
 
@@ -150,10 +150,10 @@ def test_one_row_in_five_may_be_wrong() -> None:
     rng = np.random.default_rng(9)
     true = built(arm, 9)
     c = commands(arm, 60, rng)
-    found = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.2))
+    calibration = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.2))
     unseen = commands(arm, 500, rng)
-    assert len(found.flagged) == 12
-    assert rms(armkin.fk(found.arm, unseen)[:, :3, 3], true.tips(unseen)) < 0.25
+    assert len(calibration.flagged) == 12
+    assert rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], true.tips(unseen)) < 0.25
 
 
 def test_poses_show_how_the_tool_is_turned() -> None:
@@ -163,9 +163,9 @@ def test_poses_show_how_the_tool_is_turned() -> None:
     c = commands(arm, 40, rng)
     T = true.poses(c)
     T[:, :3, 3] += rng.normal(size=(40, 3)) * 0.1
-    found = armkin.calibrate(arm, c, T)
+    calibration = armkin.calibrate(arm, c, T)
     unseen = commands(arm, 300, rng)
-    got, want = armkin.fk(found.arm, unseen), true.poses(unseen)
+    got, want = armkin.fk(calibration.arm, unseen), true.poses(unseen)
     assert rms(got[:, :3, 3], want[:, :3, 3]) < 0.15
     assert np.abs(np.swapaxes(got[:, :3, :3], 1, 2) @ want[:, :3, :3] - np.eye(3)).max() < 3e-4
 
@@ -176,11 +176,11 @@ def test_fixed_kinds_stay_and_zeros_alone_are_one_command() -> None:
     c = commands(arm, 30, rng)
     off = np.array([0.01, -0.02, 0.015])
     tips = armkin.fk(arm, c + off)[:, :3, 3]
-    found = armkin.calibrate(arm, c, tips, fix=[kind for kind in KINDS if kind != "zeros"])
-    assert found.kinds == ["zeros"]
-    assert [value for _, value, _, _ in found.corrections] == pytest.approx(off, abs=1e-6)
-    assert np.array_equal(found.arm.base, arm.base)
-    assert np.array_equal(found.arm.ratio, arm.ratio)
+    calibration = armkin.calibrate(arm, c, tips, fix=[kind for kind in KINDS if kind != "zeros"])
+    assert calibration.kinds == ["zeros"]
+    assert [value for _, value, _, _ in calibration.corrections] == pytest.approx(off, abs=1e-6)
+    assert np.array_equal(calibration.arm.base, arm.base)
+    assert np.array_equal(calibration.arm.ratio, arm.ratio)
     with pytest.raises(UsageError, match="no kind zero of corrections; there are base, tool, zeros"):
         armkin.calibrate(arm, c, tips, fix=["zero"])
     with pytest.raises(UsageError, match="nothing is left to find"):
@@ -191,13 +191,13 @@ def test_what_rows_cannot_show_is_named_and_stays() -> None:
     arm = armkin.load("ar4")
     rng = np.random.default_rng(6)
     c = commands(arm, 40, rng)
-    found = armkin.calibrate(arm, c, measured(built(arm, 6), c, rng))
-    told = "; ".join(found.unseen)
+    calibration = armkin.calibrate(arm, c, measured(built(arm, 6), c, rng))
+    told = "; ".join(calibration.unseen)
     assert "J6 zero" in told  # the tip is on the last axis
     assert "base z" in told
     assert "J1 d" in told
     assert "(only their sum)" in told
-    last = next(value for name, value, _, _ in found.corrections if name == "J6 zero")
+    last = next(value for name, value, _, _ in calibration.corrections if name == "J6 zero")
     assert abs(last) < 1e-3
 
 
@@ -206,9 +206,9 @@ def test_tasks_that_need_parallel_axes_keep_them() -> None:
     rng = np.random.default_rng(7)
     c = rng.uniform(-1.2, 1.2, (40, 4))
     tips = armkin.fk(arm, c * 1.003 + [0.02, 0.01, -0.01, 0.0])[:, :3, 3] + rng.normal(size=(40, 3)) * 0.05
-    found = armkin.calibrate(arm, c, tips)
-    assert found.held == ["twists: task xyz_pitch needs parallel axes"]
-    again = build(robot_file.parse_robot_file(found.text))
+    calibration = armkin.calibrate(arm, c, tips)
+    assert calibration.held == ["twists: task xyz_pitch needs parallel axes"]
+    again = build(robot_file.parse_robot_file(calibration.text))
     assert armkin.method(again) == armkin.method(arm)
     q = c[0]
     s = armkin.ik(again, [*armkin.fk(again, q)[:3, 3], 1.003 * q[1:].sum()], near=q)
@@ -221,11 +221,11 @@ def test_the_file_says_the_arm_and_is_solved(name: str, tmp_path: Path) -> None:
     arm = armkin.load(name)
     rng = np.random.default_rng(8)
     c = commands(arm, 40, rng)
-    found = armkin.calibrate(arm, c, measured(built(arm, 8), c, rng))
+    calibration = armkin.calibrate(arm, c, measured(built(arm, 8), c, rng))
     path = tmp_path / "calibrated.yaml"
-    path.write_text(found.text)
+    path.write_text(calibration.text)
     again = armkin.load(path)
-    assert np.abs(armkin.fk(again, c) - armkin.fk(found.arm, c)).max() < 1e-9
+    assert np.abs(armkin.fk(again, c) - armkin.fk(calibration.arm, c)).max() < 1e-9
     for field in ("lower", "upper", "home", "motor_gain", "motor_bias"):
         assert np.array_equal(getattr(again, field), getattr(arm, field)), field
     T = armkin.fk(again, c)
@@ -246,8 +246,8 @@ def test_suggested_poses_tell_more_than_random_ones() -> None:
         true = built(arm, seed)
         unseen = commands(arm, 500, rng)
         for how, c in (("suggested", poses), ("random", commands(arm, 15, rng))):
-            found = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
-            errors[how].append(rms(armkin.fk(found.arm, unseen)[:, :3, 3], true.tips(unseen)))
+            calibration = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
+            errors[how].append(rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], true.tips(unseen)))
     assert np.mean(errors["suggested"]) < np.mean(errors["random"])
     with pytest.raises(UsageError, match="ask for 1 to 1000"):
         next_poses(arm, 0)
@@ -275,6 +275,6 @@ def test_few_rows_state_no_deviations() -> None:
     for rows, stated in ((19, False), (20, True)):
         q = np.random.default_rng(4).uniform(-1, 1, (rows, 3))
         tips = armkin.fk(arm, q + np.array([0, 0.02, 0]))[:, :3, 3]
-        found = armkin.calibrate(arm, q, tips, fix=["base", "tool", "ratios", "lengths", "twists"])
-        assert found.corrections
-        assert all(np.isfinite(doubt) == stated for _, _, doubt, _ in found.corrections)
+        calibration = armkin.calibrate(arm, q, tips, fix=["base", "tool", "ratios", "lengths", "twists"])
+        assert calibration.corrections
+        assert all(np.isfinite(doubt) == stated for _, _, doubt, _ in calibration.corrections)

@@ -68,9 +68,9 @@ def test_rows_that_cannot_be_right_are_named(how: str, says: str, tmp_path: Path
         armkin.calibrate(armkin.load("ar4"), c, x)
     csv, out = tmp_path / "rows.csv", tmp_path / "new.yaml"
     np.savetxt(csv, np.concatenate([np.degrees(c), x], axis=1), delimiter=",")
-    done = run("calibrate", "ar4", csv, "--out", out)
-    assert done.code == 2
-    assert done.out == ""
+    completed = run("calibrate", "ar4", csv, "--out", out)
+    assert completed.code == 2
+    assert completed.out == ""
     assert not out.exists()
 
 
@@ -80,5 +80,5 @@ def test_a_measuring_frame_may_stand_anywhere() -> None:
     rng = np.random.default_rng(11)
     c = commands(arm, 40, rng)
     away = armkin.fk(arm, c)[:, :3, 3] @ np.array([[-1, 0, 0], [0, -1, 0], [0, 0, 1]]) + [1000, 0, 0]
-    found = armkin.calibrate(arm, c, away + rng.normal(size=(40, 3)) * 0.1)
-    assert np.median(found.after) < 0.4
+    calibration = armkin.calibrate(arm, c, away + rng.normal(size=(40, 3)) * 0.1)
+    assert np.median(calibration.after) < 0.4

@@ -30,10 +30,10 @@ def test_an_arm_stands_where_it_is_said_to(
     words: tuple[str, ...], stands: list[float], command: str, parked: Path
 ) -> None:
     there = ("home",) if command == "send" else ("--via", "390,80,300", "--via", "390,100,300")
-    done = run(command, parked, *there, "--port", "sim", *words, "--json")
-    assert done.code == 0, done.err
-    began = done.json["start_joints"] if command == "send" else None
-    assert "the board takes the arm to stand" in done.err
+    completed = run(command, parked, *there, "--port", "sim", *words, "--json")
+    assert completed.code == 0, completed.err
+    began = completed.json["start_joints"] if command == "send" else None
+    assert "the board takes the arm to stand" in completed.err
     if began is not None:
         assert began == pytest.approx(stands, abs=0.02)
 
@@ -47,15 +47,15 @@ def test_an_arm_stands_where_it_is_said_to(
     ],
 )
 def test_a_place_that_is_none_is_refused(words: tuple[str, ...], code: int, message: str, parked: Path) -> None:
-    done = run("send", parked, "home", "--port", "sim", *words)
-    assert (done.code, done.out) == (code, "")
-    assert message in done.err
+    completed = run("send", parked, "home", "--port", "sim", *words)
+    assert (completed.code, completed.out) == (code, "")
+    assert message in completed.err
 
 
 def test_assume_home_is_assume_home() -> None:
     """One option, two spellings: the last one counts, as with any option."""
-    done = run("send", THREE_DOF, "home", "--port", "sim", "--assume", "0,80,-80", "--assume-home", "--json")
-    assert done.json["start_joints"] == [0, 90, -90]
+    completed = run("send", THREE_DOF, "home", "--port", "sim", "--assume", "0,80,-80", "--assume-home", "--json")
+    assert completed.json["start_joints"] == [0, 90, -90]
     assert run("fk", THREE_DOF, "home", "--assume-home").code == 2
 
 
@@ -68,8 +68,8 @@ def test_near_chooses_the_branch_that_is_sent(tmp_path: Path) -> None:
     assert len(branches) == 4
     for branch in branches:
         near = ",".join(map(str, branch["joints"]))
-        done = run("send", free, "--target", "300,40,100", "--dry-run", "--json", "--near", near)
-        assert done.json["joints"] == pytest.approx(branch["joints"], abs=0.05)
+        completed = run("send", free, "--target", "300,40,100", "--dry-run", "--json", "--near", near)
+        assert completed.json["joints"] == pytest.approx(branch["joints"], abs=0.05)
     refused = run("send", THREE_DOF, "home", "--near", "0,90,-90", "--dry-run")
     assert refused.code == 2
     assert "--near and --lock belong to --target" in refused.err

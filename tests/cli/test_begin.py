@@ -48,14 +48,14 @@ def begin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., tupl
 def test_the_file_is_corrected_and_its_comments_stay(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
     keys = [*seen("y"), *seen("n"), *seen("y"), "y", "3", "-", "[", ENTER, "y", "y", "y"]
     before = (ROOT / "robots/three_dof.yaml").read_text()
-    done, person, path = begin("three_dof", keys, looks=100)
-    assert done.code == 0, done.err
+    completed, person, path = begin("three_dof", keys, looks=100)
+    assert completed.code == 0, completed.err
     after = path.read_text()
     changed = [(a, b) for a, b in zip(before.splitlines(), after.splitlines(), strict=True) if a != b]
     assert len(changed) == 2
     assert changed[0][1] == changed[0][0].replace("pulley: 1}", "pulley: 1, invert: true}")
     assert re.fullmatch(r" *limits: \[-9[0-9.]+, 120\].*", changed[1][1]), changed
-    assert f"+{changed[1][1]}" in done.out, "the diff comes first"
+    assert f"+{changed[1][1]}" in completed.out, "the diff comes first"
     assert "#" in after
     assert armkin.load(path).motors[1].invert != armkin.load("three_dof").motors[1].invert
     assert any("the tool goes" in text and "towards +y" in text for text in person.heard)
@@ -76,9 +76,9 @@ def test_before_the_first_move_a_joint_jogs_slowly_and_never_by_more_than_two_de
 
     monkeypatch.setattr(FirmwareBoard, "jog", noted)
     first = ["+", "+", "-", "-", ENTER, "a", "+", "-", ENTER, "y"]
-    done, person, _ = begin("three_dof", [*first, *seen("s"), *seen("s"), "y", ENTER, "s"])
-    assert done.code == 0, done.err
-    assert "nothing to correct" in done.err
+    completed, person, _ = begin("three_dof", [*first, *seen("s"), *seen("s"), "y", ENTER, "s"])
+    assert completed.code == 0, completed.err
+    assert "nothing to correct" in completed.err
     assert {round(share, 6) for share, _ in jogs} == {0.1}
     two = 2 * 3.14159265 / 180
     places = np.cumsum([moved for _, moved in jogs[:4]])
@@ -88,20 +88,20 @@ def test_before_the_first_move_a_joint_jogs_slowly_and_never_by_more_than_two_de
 
 def test_no_is_no_and_a_shipped_robot_stays(begin: Callable[..., tuple[Result, Person, Path]], tmp_path: Path) -> None:
     keys = [*seen("n"), *seen("y"), *seen("y"), "y", ENTER, "s", "n"]
-    done, _, path = begin("three_dof", keys)
-    assert done.code == 0, done.err
-    assert "nothing was written" in done.err
+    completed, _, path = begin("three_dof", keys)
+    assert completed.code == 0, completed.err
+    assert "nothing was written" in completed.err
     assert path.read_text() == (ROOT / "robots/three_dof.yaml").read_text()
-    done = run("begin", "three_dof", "--port", "sim")
-    assert (done.code, "--out MINE.yaml" in done.err) == (2, True)
+    completed = run("begin", "three_dof", "--port", "sim")
+    assert (completed.code, "--out MINE.yaml" in completed.err) == (2, True)
     assert run("begin", path, "--port", "sim", "--out", path).code == 1, "it is there already"
 
 
 def test_limits_leave_home_in_and_a_failed_check_is_told(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
     keys = [*seen("y") * 3, "y", "1", "]", "2", "+", "]", "q", ENTER, "y", "n", "y"]
-    done, _, path = begin("three_dof", keys, looks=50)
-    assert done.code == 0, done.err
-    assert "the check was not passed" in done.err
+    completed, _, path = begin("three_dof", keys, looks=50)
+    assert completed.code == 0, completed.err
+    assert "the check was not passed" in completed.err
     assert armkin.load(path).upper[0] == 0.0, "where it stands, at home, is the limit itself"
     assert 0 < armkin.load(path).upper[1] < armkin.load("three_dof").upper[1] or armkin.load(path).upper[1] > 1.5
 
@@ -109,20 +109,20 @@ def test_limits_leave_home_in_and_a_failed_check_is_told(begin: Callable[..., tu
 def test_a_table_without_drives_moves_on_named_assumptions_and_on_no_board(
     begin: Callable[..., tuple[Result, Person, Path]],
 ) -> None:
-    done, _, path = begin("puma560", [*seen("n"), *seen("y") * 5, "y", ENTER, "y", "y"])
-    assert done.code == 0, done.err
-    assert done.err.count("assumed for the simulation alone") == 1
-    assert "nothing to correct" in done.err, "what is assumed is no file's"
+    completed, _, path = begin("puma560", [*seen("n"), *seen("y") * 5, "y", ENTER, "y", "y"])
+    assert completed.code == 0, completed.err
+    assert completed.err.count("assumed for the simulation alone") == 1
+    assert "nothing to correct" in completed.err, "what is assumed is no file's"
     refused = run("begin", path, "--port", "/dev/null")
     assert (refused.code, "have no drive" in refused.err) == (2, True)
 
 
 def test_bus_servos_are_put_to_their_zeros_by_hand(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
     joints = armkin.load("so101").n
-    done, person, _ = begin("so101", [*seen("y") * joints, "y", ENTER, ENTER, "y", "y", "y"], looks=3)
-    assert done.code == 0, done.err
+    completed, person, _ = begin("so101", [*seen("y") * joints, "y", ENTER, ENTER, "y", "y", "y"], looks=3)
+    assert completed.code == 0, completed.err
     assert any("servos will be switched off" in text for text in person.heard)
-    assert "zero" in done.out or "nothing to correct" in done.err
+    assert "zero" in completed.out or "nothing to correct" in completed.err
 
 
 @pytest.mark.parametrize(
@@ -135,9 +135,9 @@ def test_bus_servos_are_put_to_their_zeros_by_hand(begin: Callable[..., tuple[Re
     ],
 )
 def test_refusals(words: Sequence[str], code: int, message: str) -> None:
-    done = run("begin", *words)
-    assert (done.code, done.out) == (code, "")
-    assert message in done.err
+    completed = run("begin", *words)
+    assert (completed.code, completed.out) == (code, "")
+    assert message in completed.err
 
 
 def test_at_a_terminal_a_joint_moves_while_its_key_comes_again_and_again(tmp_path: Path) -> None:

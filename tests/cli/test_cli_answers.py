@@ -107,11 +107,11 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
 )
 def test_an_answer_has_its_keys_and_types(kind: type, words: tuple[object, ...], tmp_path: Path) -> None:
     made = {"CSV": measured, "SWITCHED": switched, "TARGETS": targets}
-    result = run(*(made[str(word)](tmp_path) if word in made else word for word in words), "--json")
-    assert result.code in (0, 3), result.err
-    check(result.json, kind, kind.__name__)
-    if result.code:
-        error = json.loads(result.err)
+    completed = run(*(made[str(word)](tmp_path) if word in made else word for word in words), "--json")
+    assert completed.code in (0, 3), completed.err
+    check(completed.json, kind, kind.__name__)
+    if completed.code:
+        error = json.loads(completed.err)
         check({key: error[key] for key in get_type_hints(answers.Error) if key in error}, answers.Error, "Error")
 
 

@@ -105,7 +105,7 @@ def test_negative_numbers_in_options() -> None:
 
 
 def test_a_mistyped_option_is_an_error_with_a_suggestion() -> None:
-    result = run("fk", THREE_DOF, -30, 5, -5, "--jsn")
-    assert (result.code, result.out) == (2, "")
-    assert "--jsn" in result.err
-    assert "--json" in result.err
+    completed = run("fk", THREE_DOF, -30, 5, -5, "--jsn")
+    assert (completed.code, completed.out) == (2, "")
+    assert "--jsn" in completed.err
+    assert "--json" in completed.err

@@ -28,14 +28,14 @@ def rows_of(text: str) -> list[dict[str, str]]:
 
 def test_fk_in_the_order_of_the_input() -> None:
     q = np.random.default_rng(1).uniform(-100, 100, (10_000, 3)).round(3)
-    result = run("fk", THREE_DOF, "--batch", "-", stdin="\n".join(f"{a},{b},{c}" for a, b, c in q).encode())
-    rows = rows_of(result.out)
-    assert result.code == 0
+    completed = run("fk", THREE_DOF, "--batch", "-", stdin="\n".join(f"{a},{b},{c}" for a, b, c in q).encode())
+    rows = rows_of(completed.out)
+    assert completed.code == 0
     T = armkin.fk(armkin.load(ROOT / THREE_DOF), np.deg2rad(q))
     assert np.array_equal([[float(row[name]) for name in ("q1", "q2", "q3")] for row in rows], q)
     assert np.allclose([[float(row[axis]) for axis in "xyz"] for row in rows], T[:, :3, 3], atol=1e-9)
     outside = sum(row["within_limits"] == "false" for row in rows)
-    assert f"{outside} of 10000 rows are outside the limits" in result.err
+    assert f"{outside} of 10000 rows are outside the limits" in completed.err
 
 
 def test_json_lines_are_what_single_commands_say() -> None:
@@ -52,19 +52,19 @@ def test_workers_change_no_byte_and_belong_to_a_batch() -> None:
     poses = run("fk", "jaco_j2n6s300", "--batch", "-", stdin="\n".join(",".join(map(str, row)) for row in q).encode())
     axes = ("x", "y", "z", "roll", "pitch", "yaw")
     goals = "\n".join([",".join(axes), *(",".join(row[axis] for axis in axes) for row in rows_of(poses.out))]).encode()
-    one = run("ik", "jaco_j2n6s300", "--batch", "-", "--all-branches", stdin=goals)
+    completed = run("ik", "jaco_j2n6s300", "--batch", "-", "--all-branches", stdin=goals)
     two = run("ik", "jaco_j2n6s300", "--batch", "-", "--all-branches", "--workers", 2, stdin=goals)
-    assert one.out == two.out
-    assert one.code == two.code
+    assert completed.out == two.out
+    assert completed.code == two.code
     refused = run("ik", THREE_DOF, 390, 80, 300, "--workers", 2)
     assert (refused.code, refused.err) == (2, "error: --workers belongs to --batch: one row is not shared\n")
 
 
 def test_ik_exits_3_after_all_rows() -> None:
-    result = run("ik", THREE_DOF, "--batch", "-", stdin=b"390,80,300\n900,0,0\n0,400,200\n")
-    assert result.code == 3
-    assert "1 of 3 rows have no branch within limits; the first is row 2" in result.err
-    rows = rows_of(result.out)
+    completed = run("ik", THREE_DOF, "--batch", "-", stdin=b"390,80,300\n900,0,0\n0,400,200\n")
+    assert completed.code == 3
+    assert "1 of 3 rows have no branch within limits; the first is row 2" in completed.err
+    rows = rows_of(completed.out)
     assert [row["row"] for row in rows] == ["1", "2", "3"]
     assert [row["status"] for row in rows] == ["exact", "unreachable", "exact"]
     assert rows[1]["q1"] == rows[1]["branch"] == ""
@@ -104,12 +104,12 @@ def test_pulses() -> None:
     ],
 )
 def test_a_malformed_row_stops_the_run(text: bytes, complaint: str, tmp_path: Path) -> None:
-    result = run("fk", THREE_DOF, "--batch", "-", stdin=text)
-    assert result.code == 2
-    assert complaint in result.err
-    assert len(rows_of(result.out)) == 1  # the complete rows before it stand
+    completed = run("fk", THREE_DOF, "--batch", "-", stdin=text)
+    assert completed.code == 2
+    assert complaint in completed.err
+    assert len(rows_of(completed.out)) == 1  # the complete rows before it stand
     file = run("fk", THREE_DOF, "--batch", "-", "--out", tmp_path / "out.csv", stdin=text)
-    assert file == (2, "", result.err)
+    assert file == (2, "", completed.err)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -141,9 +141,9 @@ def _chunks_of(file: io.BufferedReader) -> Iterator[Chunk]:
 
 def test_a_malformed_row_far_down_is_named_by_its_line() -> None:
     text = b"# poses\n\n" + b"1,2,3\n" * 9000 + b"1,2\n"
-    result = run("fk", THREE_DOF, "--batch", "-", stdin=text)
-    assert "row 9003:" in result.err
-    assert len(rows_of(result.out)) == 9000
+    completed = run("fk", THREE_DOF, "--batch", "-", stdin=text)
+    assert "row 9003:" in completed.err
+    assert len(rows_of(completed.out)) == 9000
 
 
 @pytest.mark.parametrize(
@@ -164,9 +164,9 @@ def test_dialects(text: bytes) -> None:
 
 
 def test_an_empty_batch_is_an_error() -> None:
-    result = run("fk", THREE_DOF, "--batch", "-")
-    assert (result.code, result.out) == (2, "")
-    assert "is empty" in result.err
+    completed = run("fk", THREE_DOF, "--batch", "-")
+    assert (completed.code, completed.out) == (2, "")
+    assert "is empty" in completed.err
 
 
 def test_out_replaces_a_file_only_when_all_is_well(tmp_path: Path) -> None:
@@ -192,9 +192,9 @@ def test_out_spares_the_robot_file(tmp_path: Path, command: list[Any]) -> None:
     robot.write_bytes((ROOT / THREE_DOF).read_bytes())
     link.symlink_to(robot)
     for out in (robot, link):
-        result = run(command[0], robot, *command[1:], "--out", out)
-        assert (result.code, result.out) == (2, "")
-        assert "is a robot file" in result.err
+        completed = run(command[0], robot, *command[1:], "--out", out)
+        assert (completed.code, completed.out) == (2, "")
+        assert "is a robot file" in completed.err
     assert robot.read_bytes() == (ROOT / THREE_DOF).read_bytes()
 
 

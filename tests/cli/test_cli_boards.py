@@ -40,10 +40,10 @@ def bus(tmp_path: Path) -> str:
 
 
 def test_grbl_takes_the_published_pose_to_the_published_steps(grbl: str) -> None:
-    done = run("send", grbl, -30, 5, -5, "--port", "sim", "--json")
-    assert done.code == 0
-    assert done.json["pulses"] == [-1067, -10144, 5667]
-    assert done.json["position"] == "known"
+    completed = run("send", grbl, -30, 5, -5, "--port", "sim", "--json")
+    assert completed.code == 0
+    assert completed.json["pulses"] == [-1067, -10144, 5667]
+    assert completed.json["position"] == "known"
 
 
 def test_a_dry_run_of_grbl_plans_what_ours_plans(grbl: str) -> None:
@@ -59,8 +59,8 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
         refused = run("send", grbl, -30, 5, -5, "--port", pty.name, "--assume-home")
         assert (refused.code, refused.out) == (5, "")
         assert "settings do not fit three_dof_grbl: $100" in refused.err
-        told = run("setup", grbl, "--port", pty.name, "--json")
-        assert {100, 101, 102} <= {row["setting"] for row in told.json["differences"] if row["serious"]}
+        completed = run("setup", grbl, "--port", pty.name, "--json")
+        assert {100, 101, 102} <= {row["setting"] for row in completed.json["differences"] if row["serious"]}
         assert board.settings[100] == 250
         assert run("setup", grbl, "--port", pty.name, "--write").code == 0
         written = {number: value for number, (_, value) in _wanted(grbl).items() if number != 10}
@@ -131,9 +131,9 @@ def test_zero_writes_counts_and_leaves_the_rest_of_the_file(bus: str, tmp_path: 
 def test_what_cannot_be_done_is_refused(
     words: tuple[object, ...], code: int, message: str, grbl: str, bus: str
 ) -> None:
-    done = run(*(str(word).replace("{bus}", bus).replace("{grbl}", grbl) for word in words))
-    assert (done.code, done.out) == (code, "")
-    assert message in done.err
+    completed = run(*(str(word).replace("{bus}", bus).replace("{grbl}", grbl) for word in words))
+    assert (completed.code, completed.out) == (code, "")
+    assert message in completed.err
 
 
 HOMING = "homing: {switch: X, direction: %s, at: %s, speed: 20, backoff: 3, normally: open}"
@@ -188,8 +188,8 @@ def test_home_refuses_a_board_that_would_look_at_the_other_end(homed: str) -> No
 def test_a_gripper_on_m3_is_given_its_word_and_told_to_be_unmeasured(homed: str) -> None:
     board = fitted(homed)
     with PtyPort(board) as pty:
-        done = run("grip", homed, "closed", "--port", pty.name, "--json")
-        assert (board.spindle, done.json["gripper"], done.json["measured"]) == (200, 200, False)
+        completed = run("grip", homed, "closed", "--port", pty.name, "--json")
+        assert (board.spindle, completed.json["gripper"], completed.json["measured"]) == (200, 200, False)
         assert "S, as sent: nothing measures it" in run("grip", homed, "open", "--port", pty.name).out
         assert board.spindle == 40
         assert "outside of the gripper's 40 to 200" in run("grip", homed, 201, "--port", pty.name).err
@@ -215,8 +215,8 @@ def test_a_spindle_is_for_grbl_s_gripper_alone(homed: str, tmp_path: Path) -> No
 def test_zero_records_the_jaw_too(bus: str, tmp_path: Path) -> None:
     new = tmp_path / "new.yaml"
     with PtyPort(ServoBus([Servo(1, 2100), Servo(2, 1600), Servo(6, 1900)])) as pty:
-        done = run("zero", bus, "--port", pty.name, "--pose", "0,45", "--gripper", "open", "--out", new)
-    assert done.code == 0
+        completed = run("zero", bus, "--port", pty.name, "--pose", "0,45", "--gripper", "open", "--out", new)
+    assert completed.code == 0
     assert armkin.load(new).gripper == armkin.load(bus).gripper.model_copy(update={"zero": 1217})  # type: ignore[union-attr]
 
 
@@ -241,9 +241,9 @@ def test_a_path_grips_with_grbl_s_output_between_its_moves(homed: str, tmp_path:
         refused = run("path", homed, wide, "--port", pty.name, "--assume-home")
         assert (refused.code, board.steps[:3]) == (2, [0, 0, 0])
         assert "outside of the gripper's 40 to 200" in refused.err
-        done = run("path", homed, path, "--port", pty.name, "--json")
-        assert done.code == 0, done.err
-        assert (board.spindle, done.json["pulses"]) == (200, [0, 0, 0])
+        completed = run("path", homed, path, "--port", pty.name, "--json")
+        assert completed.code == 0, completed.err
+        assert (board.spindle, completed.json["pulses"]) == (200, [0, 0, 0])
 
 
 def test_a_path_grips_with_a_servo_on_the_bus(tmp_path: Path) -> None:
@@ -256,8 +256,8 @@ def test_a_path_grips_with_a_servo_on_the_bus(tmp_path: Path) -> None:
     jaw = port.servos[arm.gripper.id or 0]
     before = jaw.position
     with PtyPort(port) as pty:
-        done = run("path", "so101", path, "--port", pty.name, "--json")
-        assert done.code == 0, done.err
+        completed = run("path", "so101", path, "--port", pty.name, "--json")
+        assert completed.code == 0, completed.err
     assert abs(jaw.position - before) > 100
 
 
@@ -273,7 +273,7 @@ def test_stop_leaves_a_board_of_others_alone_once_its_own_process_has_stopped_it
             time.sleep(0.02)
         stopped = run("stop", "--port", pty.name)
         assert (stopped.code, "it has stopped the arm first" in stopped.err) == (0, True), stopped.err
-        _, said = mover.communicate(timeout=60)
-        assert (mover.returncode, "its position is known" in said) == (143, True)
+        _, output = mover.communicate(timeout=60)
+        assert (mover.returncode, "its position is known" in output) == (143, True)
         stands = run("status", grbl, "--port", pty.name, "--json").json
         assert (stands["position"], stands["pulses"]) == ("known", board.steps[:3])

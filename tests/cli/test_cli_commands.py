@@ -22,10 +22,10 @@ def test_the_list_of_commands_says_what_the_commands_say(name: str) -> None:
     function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
     assert (inspect.getdoc(function) or "").splitlines()[0] == COMMANDS[name]
     assert name in run("--help").out
-    result = run(name, "--help")
-    assert result.code == 0
-    assert COMMANDS[name] in result.out
-    assert "<" not in result.out.replace("<=", "")  # no names of Python types
+    completed = run(name, "--help")
+    assert completed.code == 0
+    assert COMMANDS[name] in completed.out
+    assert "<" not in completed.out.replace("<=", "")  # no names of Python types
 
 
 def test_help_fits_a_line_each() -> None:
@@ -39,11 +39,11 @@ def test_version() -> None:
 
 
 def test_fk() -> None:
-    result = run("fk", THREE_DOF, -30, 5, -5, "--json")
+    completed = run("fk", THREE_DOF, -30, 5, -5, "--json")
     arm = armkin.load(ROOT / THREE_DOF)
     T = armkin.fk(arm, np.deg2rad([-30, 5, -5]))
-    answer = result.json
-    assert (result.code, result.err) == (0, "")
+    answer = completed.json
+    assert (completed.code, completed.err) == (0, "")
     assert (answer["robot"], answer["robot_file"]) == ("three_dof", THREE_DOF)
     assert answer["robot_sha256"] == arm.sha256
     assert answer["joint_units"] == ["deg"] * 3
@@ -67,10 +67,10 @@ def test_fk_for_people() -> None:
 
 
 def test_fk_outside_limits_warns_and_is_done() -> None:
-    result = run("fk", THREE_DOF, 0, 130, 0, "--json")
-    assert result.code == 0
-    assert result.err == "warning: q2 = 130 deg is outside -20 to 120 deg\n"
-    assert result.json["violations"] == [{"joint": "q2", "value": 130, "lower": -20, "upper": 120}]
+    completed = run("fk", THREE_DOF, 0, 130, 0, "--json")
+    assert completed.code == 0
+    assert completed.err == "warning: q2 = 130 deg is outside -20 to 120 deg\n"
+    assert completed.json["violations"] == [{"joint": "q2", "value": 130, "lower": -20, "upper": 120}]
     on_the_limit = run("fk", THREE_DOF, -120, 120, 120, "--json")
     assert on_the_limit.json["within_limits"] is True
 
@@ -123,10 +123,10 @@ def test_ik_branch_chooses() -> None:
 
 
 def test_ik_without_a_solution_shows_the_closest_pose() -> None:
-    result = run("ik", THREE_DOF, 900, 0, 0, "--json")
-    answer = result.json
-    assert result.code == 3
-    assert "cannot reach" in result.err
+    completed = run("ik", THREE_DOF, 900, 0, 0, "--json")
+    answer = completed.json
+    assert completed.code == 3
+    assert "cannot reach" in completed.err
     assert (answer["status"], answer["best"], answer["branches"]) == ("unreachable", None, [])
     nearest = answer["closest"]
     T = armkin.fk(armkin.load(ROOT / THREE_DOF), np.deg2rad(nearest["joints"]))
@@ -162,9 +162,9 @@ def test_ik_locked_and_swept() -> None:
 @pytest.mark.parametrize("more", [[], ["--all-branches"]])
 def test_a_joint_locked_outside_its_limits_is_refused(more: list[str]) -> None:
     """Else the nearest pose, which holds it as well, would pass for one within limits."""
-    result = run("ik", "iiwa7", 400, 0, 600, 0, 180, 0, "--lock", "J3=171", "--json", *more)
-    assert (result.code, result.out) == (3, "")
-    error = json.loads(result.err)
+    completed = run("ik", "iiwa7", 400, 0, 600, 0, 180, 0, "--lock", "J3=171", "--json", *more)
+    assert (completed.code, completed.out) == (3, "")
+    error = json.loads(completed.err)
     assert "--lock J3=171: J3 = 171 deg is outside -170 to 170 deg" in error["error"]
     assert (error["joint"], error["value"], error["upper"]) == ("J3", pytest.approx(171), pytest.approx(170))
     assert run("ik", "iiwa7", 400, 0, 600, 0, 180, 0, "--lock", "J3=170", "--all-branches").code in (0, 3)
@@ -172,9 +172,9 @@ def test_a_joint_locked_outside_its_limits_is_refused(more: list[str]) -> None:
 
 def test_ik_lets_another_task_be_asked_for() -> None:
     xy = run("fk", "robots/planar_3dof.yaml", 20, 50, -30, "--json").json["position_mm"][:2]
-    result = run("ik", "robots/planar_3dof.yaml", *xy, "--task", "xy")
-    assert result.code == 0
-    assert "families of q1" in result.out
+    completed = run("ik", "robots/planar_3dof.yaml", *xy, "--task", "xy")
+    assert completed.code == 0
+    assert "families of q1" in completed.out
     more = run("ik", "panda", 400, 0, 400, "--task", "xyz")
     assert (more.code, "4 degrees of freedom" in more.err) == (2, True)
 
@@ -206,9 +206,9 @@ def test_pulses_best() -> None:
 def test_pulses_of_servos() -> None:
     answer = run("pulses", "robots/planar_2dof.yaml", 0, 50, "--json").json
     assert answer["pulse_units"] == ["us", "us"]
-    result = run("pulses", "robots/planar_2dof.yaml", 0, 500)
-    assert result.code == 0
-    assert "the servo of q2 cannot turn that far" in result.err
+    completed = run("pulses", "robots/planar_2dof.yaml", 0, 500)
+    assert completed.code == 0
+    assert "the servo of q2 cannot turn that far" in completed.err
 
 
 def test_pulses_of_a_differential() -> None:
@@ -220,9 +220,9 @@ def test_pulses_of_a_differential() -> None:
 
 @pytest.mark.parametrize("robot", ALL_ROBOTS)
 def test_info_of_every_arm(robot: str) -> None:
-    result = run("info", f"robots/{robot}", "--json")
-    assert (result.code, result.err) == (0, "")
-    answer = result.json
+    completed = run("info", f"robots/{robot}", "--json")
+    assert (completed.code, completed.err) == (0, "")
+    answer = completed.json
     arm = armkin.load(ROOT / "robots" / robot)
     assert [joint["name"] for joint in answer["joints"]] == list(arm.joint_names)
     assert (answer["solver"] is None) == (answer["ik_refuses"] is not None)

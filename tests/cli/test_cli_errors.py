@@ -23,10 +23,10 @@ DOF = "robots/three_dof.yaml"
 
 def failed(*words: object, stdin: bytes = b"") -> dict[str, Any]:
     """The error of a command line under --json, whose stdout must be empty."""
-    result = run(*words, "--json", stdin=stdin)
-    assert result.out == ""
-    found: dict[str, Any] = json.loads(result.err)
-    assert found["exit_code"] == result.code
+    completed = run(*words, "--json", stdin=stdin)
+    assert completed.out == ""
+    found: dict[str, Any] = json.loads(completed.err)
+    assert found["exit_code"] == completed.code
     return found
 
 
@@ -58,31 +58,31 @@ def test_an_invalid_robot_file_names_its_line(tmp_path: Path) -> None:
 
 
 def test_a_row_is_named() -> None:
-    result = run("fk", DOF, "--batch", "-", "--json", stdin=b"1,2,3\n1,2\n")
-    assert result.code == 2
-    assert len(result.lines) == 1  # the complete rows before it stand
-    assert json.loads(result.err)["row"] == 2
+    completed = run("fk", DOF, "--batch", "-", "--json", stdin=b"1,2,3\n1,2\n")
+    assert completed.code == 2
+    assert len(completed.lines) == 1  # the complete rows before it stand
+    assert json.loads(completed.err)["row"] == 2
 
 
 def test_without_a_solution_both_are_there() -> None:
-    result = run("ik", DOF, 900, 0, 0, "--json")
-    assert (result.code, result.json["best"]) == (3, None)
-    found = json.loads(result.err)
-    assert (found["kind"], found["status"]) == ("no_solution", "unreachable")
-    assert found["distance_mm"] == result.json["closest"]["distance_mm"]
+    completed = run("ik", DOF, 900, 0, 0, "--json")
+    assert (completed.code, completed.json["best"]) == (3, None)
+    answer = json.loads(completed.err)
+    assert (answer["kind"], answer["status"]) == ("no_solution", "unreachable")
+    assert answer["distance_mm"] == completed.json["closest"]["distance_mm"]
 
 
 def test_notes_and_warnings_go_into_the_error() -> None:
-    result = run("ik", DOF, 0.5, 0, 0.3, "--json")
-    found = json.loads(result.err)
-    assert found["exit_code"] == 3
-    assert len(found["notes"]) == 1
+    completed = run("ik", DOF, 0.5, 0, 0.3, "--json")
+    answer = json.loads(completed.err)
+    assert answer["exit_code"] == 3
+    assert len(answer["notes"]) == 1
 
 
 def test_without_an_error_notes_and_warnings_are_lines() -> None:
-    result = run("fk", DOF, 0, 130, 0, "--json")
-    assert result.code == 0
-    assert result.err.startswith("warning: q2 = 130 deg is outside")
+    completed = run("fk", DOF, 0, 130, 0, "--json")
+    assert completed.code == 0
+    assert completed.err.startswith("warning: q2 = 130 deg is outside")
 
 
 def test_errors_survive_pickling() -> None:

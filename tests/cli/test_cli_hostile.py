@@ -182,8 +182,8 @@ def folder(tmp_path: Path) -> Iterator[Path]:
 
 def outcome(name: str, folder: Path) -> Result:
     _, words, stdin = CASES[name]
-    result = run(*(word.replace("@", str(folder)) for word in words), stdin=stdin, cwd=folder / "here")
-    return result._replace(err=result.err.replace(str(folder), "FOLDER"))
+    completed = run(*(word.replace("@", str(folder)) for word in words), stdin=stdin, cwd=folder / "here")
+    return completed._replace(err=completed.err.replace(str(folder), "FOLDER"))
 
 
 def shown(text: str) -> str:
@@ -211,9 +211,9 @@ def test_hostile(name: str, folder: Path) -> None:
     assert "Traceback" not in result.err
     assert "internal error" not in result.err
     if "--json" in CASES[name][1]:  # one object that says the same
-        found = json.loads(result.err)
-        assert (found["exit_code"], bool(found["kind"])) == (code, True)
-        result = result._replace(err="error: " + found["error"].replace("\n", "\n  ") + "\n")
+        answer = json.loads(result.err)
+        assert (answer["exit_code"], bool(answer["kind"])) == (code, True)
+        result = result._replace(err="error: " + answer["error"].replace("\n", "\n  ") + "\n")
     assert result.err.startswith("error: ")
     assert 1 <= result.err.count("\n") <= 2
     assert all(len(line) < 250 for line in result.err.splitlines())
@@ -238,9 +238,9 @@ def test_a_robot_file_that_may_not_be_read(tmp_path: Path, monkeypatch: pytest.M
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)
-    result = run("fk", DOF, 1, 2, 3)
-    assert (result.code, result.out) == (1, "")
-    assert result.err == f"error: {DOF}: cannot read the robot file: Permission denied\n"
+    completed = run("fk", DOF, 1, 2, 3)
+    assert (completed.code, completed.out) == (1, "")
+    assert completed.err == f"error: {DOF}: cannot read the robot file: Permission denied\n"
 
 
 def test_an_output_file_that_may_not_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -248,8 +248,8 @@ def test_an_output_file_that_may_not_be_written(tmp_path: Path, monkeypatch: pyt
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(os, "replace", refuse)
-    result = run("fk", DOF, 1, 2, 3, "--out", tmp_path / "out")
-    assert result == (1, "", f"error: {tmp_path / 'out'}: cannot write: Permission denied\n")
+    completed = run("fk", DOF, 1, 2, 3, "--out", tmp_path / "out")
+    assert completed == (1, "", f"error: {tmp_path / 'out'}: cannot write: Permission denied\n")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -261,8 +261,8 @@ def test_a_batch_in_a_folder_that_may_not_be_written_has_nothing_to_go_on_with(
 
     (tmp_path / "rows.csv").write_text("1,2,3\n" * 200_000)
     monkeypatch.setattr(Path, "mkdir", refuse)
-    result = run("fk", DOF, "--batch", tmp_path / "rows.csv", "--out", tmp_path / "out.csv")
-    assert result == (1, "", f"error: {tmp_path / 'out.csv'}: cannot write: Permission denied\n")
+    completed = run("fk", DOF, "--batch", tmp_path / "rows.csv", "--out", tmp_path / "out.csv")
+    assert completed == (1, "", f"error: {tmp_path / 'out.csv'}: cannot write: Permission denied\n")
 
 
 def test_a_bug_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -272,10 +272,10 @@ def test_a_bug_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
         raise ZeroDivisionError("division by zero")
 
     monkeypatch.setattr(arguments, "load_arm", bug)
-    result = run("fk", DOF, 1, 2, 3)
-    assert (result.code, result.out) == (1, "")
-    assert "internal error: ZeroDivisionError" in result.err
-    assert "Traceback" not in result.err
+    completed = run("fk", DOF, 1, 2, 3)
+    assert (completed.code, completed.out) == (1, "")
+    assert "internal error: ZeroDivisionError" in completed.err
+    assert "Traceback" not in completed.err
     monkeypatch.setenv("ARMKIN_TRACEBACK", "1")
     assert "Traceback" in run("fk", DOF, 1, 2, 3).err
     monkeypatch.setattr(arguments, "load_arm", lambda *_: (_ for _ in ()).throw(MemoryError))

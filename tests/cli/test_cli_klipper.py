@@ -54,9 +54,9 @@ def test_stop_ends_the_motion_of_another_terminal(tmp_path: Path) -> None:
             assert time.monotonic() < end
             time.sleep(0.02)
         assert run("stop", "--port", port.name).code == 0
-        _, said = mover.communicate(timeout=60)
+        _, output = mover.communicate(timeout=60)
         assert mover.returncode == 128 + signal.SIGTERM
-        assert "stopped: the arm stands at q1 = " in said
+        assert "stopped: the arm stands at q1 = " in output
         stands = run("status", ROBOT, "--port", port.name, "--json").json
         assert stands["position"] == "known"
         assert stands["pulses"] == pins(board)
@@ -66,15 +66,15 @@ def test_stop_ends_the_motion_of_another_terminal(tmp_path: Path) -> None:
 
 
 def test_setup_prints_what_printer_cfg_needs() -> None:
-    done = run("setup", ROBOT)
-    assert done.code == 0
-    assert done.out.startswith("[printer]\nkinematics: none\n")
+    completed = run("setup", ROBOT)
+    assert completed.code == 0
+    assert completed.out.startswith("[printer]\nkinematics: none\n")
     for axis, name in zip("abc", ("q1", "q2", "q3"), strict=True):
-        assert f"[manual_stepper axis_{axis}]\n# {name}\nstep_pin: ?\n" in done.out
-    assert "not compared" in done.out
+        assert f"[manual_stepper axis_{axis}]\n# {name}\nstep_pin: ?\n" in completed.out
+    assert "not compared" in completed.out
     found = run("setup", ROBOT, "--json").json
     assert (found["port"], found["differences"]) == (None, None)
-    assert found["printer_cfg"] + "\n# not compared" in done.out
+    assert found["printer_cfg"] + "\n# not compared" in completed.out
 
 
 @pytest.mark.parametrize(
@@ -92,8 +92,8 @@ def test_what_cannot_be_done_is_refused(
     words: tuple[object, ...], code: int, message: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
-    done = run(*words)
-    assert (done.code, done.out, message in done.err) == (code, "", True), done.err
+    completed = run(*words)
+    assert (completed.code, completed.out, message in completed.err) == (code, "", True), completed.err
 
 
 def test_a_socket_that_nobody_listens_on_and_one_that_is_not_klipper_s(tmp_path: Path) -> None:

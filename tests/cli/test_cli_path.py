@@ -36,9 +36,9 @@ def pick(tmp_path: Path) -> Path:
 
 
 def test_a_plan_is_told_drawn_and_written(pick: Path, tmp_path: Path) -> None:
-    done = run("path", THREE_DOF, pick, "--json", "--out", tmp_path / "o.csv", "--plot", tmp_path / "o.png")
-    assert done.code == 0, done.err
-    found = done.json
+    completed = run("path", THREE_DOF, pick, "--json", "--out", tmp_path / "o.csv", "--plot", tmp_path / "o.png")
+    assert completed.code == 0, completed.err
+    found = completed.json
     assert found["robot"] == "three_dof"
     assert len(found["robot_sha256"]) == 64
     assert found["length_mm"] == pytest.approx(134.628, abs=0.001)
@@ -60,20 +60,20 @@ def test_a_plan_is_told_drawn_and_written(pick: Path, tmp_path: Path) -> None:
 
 
 def test_the_arm_goes_along_a_path_and_ends_at_exact_counts(pick: Path) -> None:
-    done = run("path", THREE_DOF, pick, "--port", "sim", "--json")
-    assert done.code == 0, done.err
-    assert done.json["pulses"] == [0, 0, 0]
-    assert done.json["position"] == "known"
+    completed = run("path", THREE_DOF, pick, "--port", "sim", "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["pulses"] == [0, 0, 0]
+    assert completed.json["position"] == "known"
 
 
 def test_a_closed_path_moves_although_it_ends_where_it_starts(tmp_path: Path) -> None:
     circle = tmp_path / "circle.yaml"
     circle.write_text("moves:\n  - circle: {centre: [228, 10, 367], normal: [0, 0, 1]}\n")
-    done = run("path", THREE_DOF, circle, "--port", "sim", "--json")
-    assert done.code == 0, done.err
-    assert done.json["pulses"] == [0, 0, 0]
-    assert done.json["length_mm"] == pytest.approx(60 * np.pi)
-    assert done.json["segments"] > 30
+    completed = run("path", THREE_DOF, circle, "--port", "sim", "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["pulses"] == [0, 0, 0]
+    assert completed.json["length_mm"] == pytest.approx(60 * np.pi)
+    assert completed.json["segments"] > 30
 
 
 def test_corners_from_options_and_from_csv(tmp_path: Path) -> None:
@@ -88,9 +88,9 @@ def test_corners_from_options_and_from_csv(tmp_path: Path) -> None:
 
 
 def test_what_is_not_carried_is_exit_3_with_the_verdict() -> None:
-    done = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,-400,300", "--json", "--port", "sim")
-    assert done.code == 3
-    found = done.json
+    completed = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,-400,300", "--json", "--port", "sim")
+    assert completed.code == 3
+    found = completed.json
     assert found["duration_s"] is None
     assert found["reconfigurations"][0]["why"] == "reach"
     assert found["reconfigurations"][0]["status_beyond"] == "unreachable"
@@ -127,28 +127,28 @@ AT = "moves:\n  - point: [390, 80, 300]\n"
 def test_bad_paths_are_refused_in_words(tmp_path: Path, text: str, code: int, words: str) -> None:
     bad = tmp_path / ("bad.csv" if text.startswith("x") else "bad.yaml")
     bad.write_text(text)
-    done = run("path", THREE_DOF, bad, "--port", "sim")
-    assert done.code == code, done.err
-    assert words in done.err
-    assert "read back" not in done.out
+    completed = run("path", THREE_DOF, bad, "--port", "sim")
+    assert completed.code == code, completed.err
+    assert words in completed.err
+    assert "read back" not in completed.out
 
 
 def test_a_file_that_is_not_there_is_called_a_path_file(tmp_path: Path) -> None:
-    done = run("path", THREE_DOF, tmp_path / "nofile.yaml")
-    assert (done.code, done.out) == (1, "")
-    assert "nofile.yaml: cannot read the path file: No such file" in done.err
-    assert "robot" not in done.err
+    completed = run("path", THREE_DOF, tmp_path / "nofile.yaml")
+    assert (completed.code, completed.out) == (1, "")
+    assert "nofile.yaml: cannot read the path file: No such file" in completed.err
+    assert "robot" not in completed.err
 
 
 def test_a_million_rows_are_refused_without_being_read() -> None:
     """The text is read, and of its rows as many as a path may have."""
     rows = b"x,y,z\n" + b"390,80,300\n" * 1_000_000
     tracemalloc.start()
-    done = run("path", THREE_DOF, "-", stdin=rows)
+    completed = run("path", THREE_DOF, "-", stdin=rows)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert done.code == 2
-    assert "has more than 120000 rows" in done.err
+    assert completed.code == 2
+    assert "has more than 120000 rows" in completed.err
     assert most < 12 * len(rows)
 
 
@@ -187,9 +187,9 @@ def test_send_follows_a_path_file_and_rounds_waypoints(pick: Path, tmp_path: Pat
 def test_a_branch_is_asked_for_in_any_spelling_and_a_wrong_one_is_told(tmp_path: Path) -> None:
     corners = ("--via", "390,80,300", "--via", "390,100,300")
     for name in ("left, elbow up", "left elbow up", "left/elbow-up", "Elbow up left"):
-        done = run("path", THREE_DOF, *corners, "--branch", name, "--json")
-        assert done.code == 0, done.err
-        assert done.json["runs"][0]["branches"][0]["name"] == "left, elbow up"
+        completed = run("path", THREE_DOF, *corners, "--branch", name, "--json")
+        assert completed.code == 0, completed.err
+        assert completed.json["runs"][0]["branches"][0]["name"] == "left, elbow up"
     wrong = run("path", THREE_DOF, *corners, "--branch", "nope")
     assert (wrong.code, wrong.out) == (2, "")
     assert "no branch is called 'nope'; this arm's are: right, elbow up;" in wrong.err
@@ -205,12 +205,12 @@ def test_a_branch_is_asked_for_in_any_spelling_and_a_wrong_one_is_told(tmp_path:
 
 
 def test_samples_on_stdout_and_the_answer_beside_them() -> None:
-    done = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,100,300", "--out", "-", "--json")
-    assert done.code == 0
-    heading, *rows = done.out.splitlines()
+    completed = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,100,300", "--out", "-", "--json")
+    assert completed.code == 0
+    heading, *rows = completed.out.splitlines()
     assert heading.startswith("time_s,q1,")
     assert all(row.count(",") == heading.count(",") for row in rows)
-    assert json.loads(done.err)["length_mm"] == pytest.approx(20)
+    assert json.loads(completed.err)["length_mm"] == pytest.approx(20)
 
 
 def test_a_plan_begins_within_the_limits() -> None:
@@ -218,14 +218,14 @@ def test_a_plan_begins_within_the_limits() -> None:
         ("path", THREE_DOF, "--via", "390,80,300", "--start", "500,0,0"),
         ("send", THREE_DOF, "home", "--dry-run", "--from", "500,0,0"),
     ):
-        done = run(*words)
-        assert (done.code, done.out) == (3, ""), words
-        assert f"error: {words[-2]}: q1 = 500 deg is outside -120 to 120 deg" in done.err
+        completed = run(*words)
+        assert (completed.code, completed.out) == (3, ""), words
+        assert f"error: {words[-2]}: q1 = 500 deg is outside -120 to 120 deg" in completed.err
 
 
 def test_a_start_outside_the_limits_is_refused_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "begin.yaml"
     path.write_text("start: {joints: [0, 130, 0]}\nmoves:\n  - joint: home\n")
-    done = run("path", THREE_DOF, path)
-    assert done.code == 3
-    assert f"{path}:1: start: q2 = 130 deg is outside" in done.err
+    completed = run("path", THREE_DOF, path)
+    assert completed.code == 3
+    assert f"{path}:1: start: q2 = 130 deg is outside" in completed.err

@@ -11,16 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from command_line import ROOT, THREE_DOF, process, run
+from command_line import ROOT, THREE_DOF, run, run_process
 
 ARMKIN = [sys.executable, "-m", "armkin"]
 MANY = b"1,2,3\n" * 20_000
 
 
 def test_a_process_ends_with_the_exit_code() -> None:
-    assert process("fk", THREE_DOF, -30, 5, -5).code == 0
-    assert process("fk", THREE_DOF, -30, 5).code == 2
-    assert process("ik", THREE_DOF, 900, 0, 0).code == 3
+    assert run_process("fk", THREE_DOF, -30, 5, -5).code == 0
+    assert run_process("fk", THREE_DOF, -30, 5).code == 2
+    assert run_process("ik", THREE_DOF, 900, 0, 0).code == 3
 
 
 def test_head_has_seen_enough(tmp_path: Path) -> None:
@@ -40,15 +40,15 @@ def test_head_has_seen_enough(tmp_path: Path) -> None:
 def test_a_full_disk(words: list[str], unbuffered: str) -> None:
     with open("/dev/full", "wb") as full:
         settings = {"stdout": full, "stderr": subprocess.PIPE, "capture_output": False}
-        result = process(*words, env={**os.environ, "PYTHONUNBUFFERED": unbuffered}, **settings)
-    assert result.code == 1
-    assert result.err == "error: standard output: No space left on device\n"
+        completed = run_process(*words, env={**os.environ, "PYTHONUNBUFFERED": unbuffered}, **settings)
+    assert completed.code == 1
+    assert completed.err == "error: standard output: No space left on device\n"
 
 
 def test_a_closed_stdout() -> None:
-    result = process("fk", THREE_DOF, 1, 2, 3, preexec_fn=lambda: os.close(1))
-    assert result.code == 1
-    assert "standard output is closed" in result.err
+    completed = run_process("fk", THREE_DOF, 1, 2, 3, preexec_fn=lambda: os.close(1))
+    assert completed.code == 1
+    assert "standard output is closed" in completed.err
 
 
 def test_a_closed_stderr_and_stdin() -> None:
@@ -56,8 +56,8 @@ def test_a_closed_stderr_and_stdin() -> None:
         os.close(0)
         os.close(2)
 
-    assert process("fk", THREE_DOF, 1, 2, preexec_fn=close).code == 2
-    assert process("fk", THREE_DOF, "--batch", "-", preexec_fn=close).code == 1
+    assert run_process("fk", THREE_DOF, 1, 2, preexec_fn=close).code == 2
+    assert run_process("fk", THREE_DOF, "--batch", "-", preexec_fn=close).code == 1
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
@@ -105,7 +105,7 @@ def on_a_terminal(words: list[str], stdin: bytes, **environment: str) -> str:
 
 def test_colours_and_progress_on_a_terminal_only() -> None:
     batch = ["fk", THREE_DOF, "--batch", "-"]
-    plain = process(*batch, input=MANY, env={**os.environ, "NO_COLOR": ""})
+    plain = run_process(*batch, input=MANY, env={**os.environ, "NO_COLOR": ""})
     assert plain.err == ""
     seen = on_a_terminal(batch, 10 * MANY, NO_COLOR="")
     assert " rows" in seen
@@ -120,8 +120,8 @@ def test_colours_and_progress_on_a_terminal_only() -> None:
 
 def test_an_ascii_terminal_can_show_everything() -> None:
     env = {**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
-    assert process("info", THREE_DOF, env=env).code == 0
-    assert process("fk", "\u00e9\udcff.yaml", 1, env=env).code == 1
+    assert run_process("info", THREE_DOF, env=env).code == 0
+    assert run_process("fk", "\u00e9\udcff.yaml", 1, env=env).code == 1
 
 
 @pytest.mark.parametrize("words", [[], ["help"], ["--help"], ["help", "fk"], ["info", THREE_DOF]])
@@ -129,14 +129,14 @@ def test_nobody_reads(words: list[str]) -> None:
     read, write = os.pipe()
     os.close(read)
     try:
-        result = process(*words, stdout=write, stderr=subprocess.PIPE, capture_output=False)
+        completed = run_process(*words, stdout=write, stderr=subprocess.PIPE, capture_output=False)
     finally:
         os.close(write)
-    assert (result.code, result.err) == (0, "")
+    assert (completed.code, completed.err) == (0, "")
 
 
 def test_bare_and_help_print_the_help() -> None:
-    bare = process()
+    bare = run_process()
     assert "Commands:" in bare.out
     assert bare == run() == run("help") == run("--help")
     assert bare.code == 0
@@ -150,9 +150,9 @@ def test_a_terminal_of_any_encoding(encoding: str, tmp_path: Path) -> None:
     path.write_text(text, encoding="utf-8")
     environment = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
     for words in (["info", path], ["fk", path, 0, 0, 0], ["--help"]):
-        result = process(*words, env=environment)
-        assert (result.code, result.err) == (0, "")
-    name = process("fk", path, 0, 0, 0, "--json", env=environment).json["robot"]
+        completed = run_process(*words, env=environment)
+        assert (completed.code, completed.err) == (0, "")
+    name = run_process("fk", path, 0, 0, 0, "--json", env=environment).json["robot"]
     assert name == "Ωmega → 3"
 
 
@@ -160,5 +160,5 @@ def test_out_dash_is_standard_output(tmp_path: Path) -> None:
     for words in (["fk", "1", "2", "3", "--json"], ["pulses", "1", "2", "3"], ["info"]):
         words.insert(1, str(ROOT / THREE_DOF))
         assert run(*words, "--out", "-", cwd=tmp_path) == run(*words, cwd=tmp_path)
-    assert process("schema", "-o", "-", cwd=tmp_path).out.startswith("{")
+    assert run_process("schema", "-o", "-", cwd=tmp_path).out.startswith("{")
     assert not list(tmp_path.iterdir())

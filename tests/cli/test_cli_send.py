@@ -13,13 +13,13 @@ from command_line import COUNTS, POSE, THREE_DOF, run
 
 
 def test_the_first_command_just_works() -> None:
-    done = run("send", THREE_DOF, *POSE, "--port", "sim")
-    assert done.code == 0, done.err
-    assert "-1067" in done.out
-    assert "-10144" in done.out
-    assert "5667" in done.out
-    assert "starts with the arm in its home pose" in done.err
-    assert done.out.endswith("read back: as planned, 1.917 s\n")
+    completed = run("send", THREE_DOF, *POSE, "--port", "sim")
+    assert completed.code == 0, completed.err
+    assert "-1067" in completed.out
+    assert "-10144" in completed.out
+    assert "5667" in completed.out
+    assert "starts with the arm in its home pose" in completed.err
+    assert completed.out.endswith("read back: as planned, 1.917 s\n")
 
 
 def test_json_tells_plan_and_arrival() -> None:
@@ -36,8 +36,8 @@ def test_json_tells_plan_and_arrival() -> None:
 
 
 def test_a_target_goes_through_ik() -> None:
-    done = run("send", THREE_DOF, "--target", "390,80,300", "--port", "sim", "--json")
-    assert done.json["position_mm"] == pytest.approx([390, 80, 300], abs=0.06)
+    completed = run("send", THREE_DOF, "--target", "390,80,300", "--port", "sim", "--json")
+    assert completed.json["position_mm"] == pytest.approx([390, 80, 300], abs=0.06)
 
 
 def test_a_named_branch_is_taken() -> None:
@@ -45,14 +45,16 @@ def test_a_named_branch_is_taken() -> None:
     legal = [branch for branch in branches if branch["within_limits"]]
     assert len(legal) >= 2
     for branch in legal[:2]:
-        done = run("send", THREE_DOF, "--target", "390,80,300", "--branch", branch["name"], "--port", "sim", "--json")
-        assert done.json["joints"] == pytest.approx(branch["joints"], abs=0.02)
+        completed = run(
+            "send", THREE_DOF, "--target", "390,80,300", "--branch", branch["name"], "--port", "sim", "--json"
+        )
+        assert completed.json["joints"] == pytest.approx(branch["joints"], abs=0.02)
 
 
 def test_a_target_out_of_reach_is_exit_3_and_moves_nothing() -> None:
-    done = run("send", THREE_DOF, "--target", "3900,80,300", "--port", "sim", "--json")
-    assert (done.code, done.out) == (3, "")
-    assert "cannot reach" in done.err
+    completed = run("send", THREE_DOF, "--target", "3900,80,300", "--port", "sim", "--json")
+    assert (completed.code, completed.out) == (3, "")
+    assert "cannot reach" in completed.err
 
 
 @pytest.mark.parametrize(
@@ -73,9 +75,9 @@ def test_a_target_out_of_reach_is_exit_3_and_moves_nothing() -> None:
     ],
 )
 def test_refusals(words: Sequence[object], code: int, message: str) -> None:
-    done = run("send", *words)
-    assert (done.code, done.out) == (code, "")
-    assert message in done.err
+    completed = run("send", *words)
+    assert (completed.code, completed.out) == (code, "")
+    assert message in completed.err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="names of devices")
@@ -88,43 +90,43 @@ def test_refusals(words: Sequence[object], code: int, message: str) -> None:
     ],
 )
 def test_a_port_that_is_none(port: str, message: str) -> None:
-    done = run("send", THREE_DOF, *POSE, "--port", port)
-    assert (done.code, done.out) == (5, "")
-    assert message in done.err
+    completed = run("send", THREE_DOF, *POSE, "--port", port)
+    assert (completed.code, completed.out) == (5, "")
+    assert message in completed.err
 
 
 def test_a_file_of_waypoints(tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text("q1,q2,q3\n10,80,-80\n# a comment\n-20,60,-60\n-30,5,-5\n")
-    done = run("send", THREE_DOF, "--batch", path, "--port", "sim", "--json")
-    assert done.code == 0, done.err
-    assert done.json["waypoints"] == 3
-    assert done.json["pulses"] == COUNTS
+    completed = run("send", THREE_DOF, "--batch", path, "--port", "sim", "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["waypoints"] == 3
+    assert completed.json["pulses"] == COUNTS
 
 
 def test_a_file_with_one_row_outside_moves_nothing(tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text("10,80,-80\n0,130,0\n")
-    done = run("send", THREE_DOF, "--batch", path, "--port", "sim")
-    assert (done.code, done.out) == (3, "")
-    assert "row 2: q2 = 130" in done.err
+    completed = run("send", THREE_DOF, "--batch", path, "--port", "sim")
+    assert (completed.code, completed.out) == (3, "")
+    assert "row 2: q2 = 130" in completed.err
 
 
 @pytest.mark.parametrize(
     ("last", "code", "message"), [(b"x,5,-5\n", 2, "row 3"), (b"0,130,0\n", 3, "row 3: q2 = 130"), (b"", 0, "")]
 )
 def test_streamed_waypoints_stand_up_to_the_first_wrong_one(last: bytes, code: int, message: str) -> None:
-    done = run("send", THREE_DOF, "--batch", "-", "--port", "sim", "--json", stdin=b"10,80,-80\n-30,5,-5\n" + last)
-    assert done.code == code, done.err
-    told = json.loads(done.err)["sent"] if code == 2 else done.json
+    completed = run("send", THREE_DOF, "--batch", "-", "--port", "sim", "--json", stdin=b"10,80,-80\n-30,5,-5\n" + last)
+    assert completed.code == code, completed.err
+    told = json.loads(completed.err)["sent"] if code == 2 else completed.json
     assert told["pulses"] == COUNTS
-    assert (done.out == "") == (code == 2)
-    assert message in done.err
+    assert (completed.out == "") == (code == 2)
+    assert message in completed.err
 
 
 def test_a_ramp_of_many_segments_does_not_run_dry(tmp_path: Path) -> None:
     """27 segments of a ramp and frames of 6 left 26 in a queue of 32: DRY where the ramp began."""
     path = tmp_path / "path.csv"
     path.write_text("q1,q2,q3\n0.0258,24.2795,-38.6976\n43.2443,77.0574,-19.3756\n42.6755,76.9006,-18.9291\n")
-    done = run("send", THREE_DOF, "--batch", path, "--port", "sim", "--speed", "70", "--json")
-    assert done.code == 0, done.err
+    completed = run("send", THREE_DOF, "--batch", path, "--port", "sim", "--speed", "70", "--json")
+    assert completed.code == 0, completed.err

@@ -44,10 +44,10 @@ DOF = THREE_DOF
     ],
 )
 def test_a_slip_is_answered_with_what_is_meant(line: str, says: str) -> None:
-    result = run(*line.split())
-    assert (result.code, result.out) == (2, "")
-    assert says in result.err
-    assert result.err.count("\n") <= 2
+    completed = run(*line.split())
+    assert (completed.code, completed.out) == (2, "")
+    assert says in completed.err
+    assert completed.err.count("\n") <= 2
 
 
 @pytest.mark.parametrize(
@@ -60,10 +60,10 @@ def test_a_slip_is_answered_with_what_is_meant(line: str, says: str) -> None:
     ],
 )
 def test_numbers_in_other_units_are_noted_and_taken(line: str, says: str) -> None:
-    result = run(*line.split())
-    assert result.code in (0, 3)
-    assert f"{says}" in result.err
-    assert result.err.startswith("note: ")
+    completed = run(*line.split())
+    assert completed.code in (0, 3)
+    assert f"{says}" in completed.err
+    assert completed.err.startswith("note: ")
 
 
 @pytest.mark.parametrize(
@@ -88,10 +88,10 @@ def test_a_robot_file_in_metres_and_radians_is_noted(tmp_path: Path) -> None:
         text = text.replace(old, new)
     path = tmp_path / "metres.yaml"
     path.write_text(text.replace("alpha: 90", "alpha: 1.5708"))
-    result = run("fk", path, 0, 0, 0)
-    assert result.code == 0
-    assert "together are 0.635 mm; if they are metres, multiply them by 1000" in result.err
-    assert "an angle of 1.5708 degrees; if it is in radians, write 90" in result.err
+    completed = run("fk", path, 0, 0, 0)
+    assert completed.code == 0
+    assert "together are 0.635 mm; if they are metres, multiply them by 1000" in completed.err
+    assert "an angle of 1.5708 degrees; if it is in radians, write 90" in completed.err
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "robots").glob("*.yaml")))
@@ -107,10 +107,10 @@ def test_a_variable_in_the_table_is_left_out(variable: str) -> None:
 
 
 def test_a_path_file_in_the_robots_place_is_called_one() -> None:
-    result = run("path", "examples/pick_and_place.yaml", "three_dof")
-    assert (result.code, result.out) == (4, "")
-    assert "a path file, not a robot; write armkin path ROBOT FILE" in result.err
-    assert result.err.count("\n") == 1
+    completed = run("path", "examples/pick_and_place.yaml", "three_dof")
+    assert (completed.code, completed.out) == (4, "")
+    assert "a path file, not a robot; write armkin path ROBOT FILE" in completed.err
+    assert completed.err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -122,20 +122,20 @@ def test_a_path_file_in_the_robots_place_is_called_one() -> None:
     ],
 )
 def test_the_beginning_of_a_robots_name_is_completed(name: str, says: str) -> None:
-    result = run("fk", name, "home")
-    assert result.code == 1
-    assert says in result.err
+    completed = run("fk", name, "home")
+    assert completed.code == 1
+    assert says in completed.err
 
 
 @pytest.mark.parametrize(
     "line", ["send moveo home --dry-run", "path ur5e --via 390,80,300,0,180,0 --via 390,160,300,0,180,0 --port none"]
 )
 def test_what_a_shipped_robot_lacks_is_added_to_a_copy(line: str, tmp_path: Path) -> None:
-    result = run(*line.split())
-    assert (result.code, result.out) == (2, "")
+    completed = run(*line.split())
+    assert (completed.code, completed.out) == (2, "")
     name = line.split()[1]
     copy = f"armkin export {name} --dh -o my_{name}.yaml"
-    assert copy in result.err
+    assert copy in completed.err
     again = run(*line.replace(name, f"robots/{name}.yaml").split())
     assert f"add to robots/{name}.yaml" in again.err
     assert "copy" not in again.err
@@ -145,23 +145,23 @@ def test_what_a_shipped_robot_lacks_is_added_to_a_copy(line: str, tmp_path: Path
 def test_a_new_robots_note_can_be_typed() -> None:
     with tempfile.TemporaryDirectory() as folder:  # tmp_path is so long that the note is cut
         file = Path(folder) / "my arm.yaml"
-        result = run("new", "my arm", "--dh", "90,0,170", "--convention", "standard", "--out", str(file))
-    assert result.code == 0
-    assert f"armkin info '{file}'" in result.err
+        completed = run("new", "my arm", "--dh", "90,0,170", "--convention", "standard", "--out", str(file))
+    assert completed.code == 0
+    assert f"armkin info '{file}'" in completed.err
 
 
 def test_answers_of_ik_are_corners_of_a_path(tmp_path: Path) -> None:
     (tmp_path / "targets.csv").write_text("390,80,300\n400,0,250\n")
     rows = tmp_path / "rows.csv"
     assert run("ik", DOF, "--batch", str(tmp_path / "targets.csv"), "--out", str(rows)).code == 0
-    result = run("path", DOF, str(rows))
-    assert (result.code, result.err) == (0, "")
+    completed = run("path", DOF, str(rows))
+    assert (completed.code, completed.err) == (0, "")
 
 
 def test_a_path_ends_for_each_reason_once(tmp_path: Path) -> None:
     moves = tmp_path / "far.yaml"
     moves.write_text("moves:\n  - point: [390, 80, 300]\n  - line: [900, 80, 300]\n")
-    result = run("path", DOF, str(moves))
-    assert result.code == 3
-    lines = [line for line in result.out.splitlines() if line.startswith("  at ")]
+    completed = run("path", DOF, str(moves))
+    assert completed.code == 3
+    lines = [line for line in completed.out.splitlines() if line.startswith("  at ")]
     assert len(lines) == len(set(lines)) > 0

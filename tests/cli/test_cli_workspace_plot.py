@@ -16,9 +16,9 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def test_workspace_json_is_the_survey() -> None:
-    result = run("workspace", THREE_DOF, "--samples", 5000, "--seed", 7, "--measure", "step_error", "--json")
-    assert (result.code, result.err) == (0, "")
-    answer = result.json
+    completed = run("workspace", THREE_DOF, "--samples", 5000, "--seed", 7, "--measure", "step_error", "--json")
+    assert (completed.code, completed.err) == (0, "")
+    answer = completed.json
     arm = armkin.load(ROOT / THREE_DOF)
     w = workspace(arm, 5000, seed=7, measures=["step_error"])
     assert answer["samples"] == 5000
@@ -49,10 +49,10 @@ def test_workspace_for_people() -> None:
 def test_the_homeworks_sweep_is_one_command(tmp_path: Path) -> None:
     out, picture = tmp_path / "sweep.csv", tmp_path / "sweep.png"
     words = ["workspace", "robots/pan_tilt.yaml", "--grid", "50,200", "--out", out, "--plot", picture]
-    result = run(*words, "--color", "z", "--json")
-    assert (result.code, result.err) == (0, "")
-    assert result.json["samples"] == 10_000
-    assert result.json["volume_mm3"] == 0.0
+    completed = run(*words, "--color", "z", "--json")
+    assert (completed.code, completed.err) == (0, "")
+    assert completed.json["samples"] == 10_000
+    assert completed.json["volume_mm3"] == 0.0
     lines = out.read_text().splitlines()
     assert lines[:2] == ["q1,q2,x,y,z", "-180,-180,1500,-1000,0"]
     assert len(lines) == 10_001
@@ -60,9 +60,9 @@ def test_the_homeworks_sweep_is_one_command(tmp_path: Path) -> None:
 
 
 def test_a_picture_has_the_measure_that_colours_it(tmp_path: Path) -> None:
-    result = run("workspace", THREE_DOF, "--samples", 500, "--plot", tmp_path / "a.svg", "--json")
-    assert result.code == 0
-    assert list(result.json["measures"]) == ["manipulability"]
+    completed = run("workspace", THREE_DOF, "--samples", 500, "--plot", tmp_path / "a.svg", "--json")
+    assert completed.code == 0
+    assert list(completed.json["measures"]) == ["manipulability"]
     assert b"<svg" in (tmp_path / "a.svg").read_bytes()
 
 
@@ -82,9 +82,9 @@ def test_a_picture_has_the_measure_that_colours_it(tmp_path: Path) -> None:
     ],
 )
 def test_workspace_usage(words: list[str], message: str) -> None:
-    result = run("workspace", THREE_DOF, *words)
-    assert (result.code, result.out) == (2, "")
-    assert message in result.err
+    completed = run("workspace", THREE_DOF, *words)
+    assert (completed.code, completed.out) == (2, "")
+    assert message in completed.err
 
 
 def test_plot_one_pose(tmp_path: Path) -> None:
@@ -97,9 +97,9 @@ def test_plot_one_pose(tmp_path: Path) -> None:
 
 
 def test_plot_warns_of_a_pose_outside_the_limits(tmp_path: Path) -> None:
-    result = run("plot", THREE_DOF, 200, 0, 0, "--view", "top", "--out", tmp_path / "arm.png")
-    assert (result.code, result.out) == (0, "")
-    assert result.err == "warning: q1 = 200 deg is outside -120 to 120 deg\n"
+    completed = run("plot", THREE_DOF, 200, 0, 0, "--view", "top", "--out", tmp_path / "arm.png")
+    assert (completed.code, completed.out) == (0, "")
+    assert completed.err == "warning: q1 = 200 deg is outside -120 to 120 deg\n"
 
 
 def test_plot_all_branches(tmp_path: Path) -> None:
@@ -141,18 +141,18 @@ def test_plot_errors(
 ) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    result = run("plot", THREE_DOF, *words)
-    assert (result.code, result.out) == (code, "")
-    assert message in result.err
+    completed = run("plot", THREE_DOF, *words)
+    assert (completed.code, completed.out) == (code, "")
+    assert message in completed.err
     assert not (ROOT / "a.png").exists()
 
 
 def test_too_long_a_path(tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text("1,2,3\n" * 20_001)
-    result = run("plot", THREE_DOF, "--path", path, "--out", tmp_path / "a.png")
-    assert result.code == 2
-    assert "more than 20000 poses are too many for one picture" in result.err
+    completed = run("plot", THREE_DOF, "--path", path, "--out", tmp_path / "a.png")
+    assert completed.code == 2
+    assert "more than 20000 poses are too many for one picture" in completed.err
 
 
 def test_plot_takes_what_other_commands_print(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,13 +163,13 @@ def test_plot_takes_what_other_commands_print(tmp_path: Path, monkeypatch: pytes
 
     monkeypatch.setattr("armkin.plot.plot_poses", plot_poses)
     targets = b"390,80,300\n9000,0,0\n0,400,200\n"
-    one = run("ik", THREE_DOF, 390, 80, 300, "--json")
+    completed = run("ik", THREE_DOF, 390, 80, 300, "--json")
     every = run("ik", THREE_DOF, 390, 80, 300, "--json", "--all-branches")
     rows = run("ik", THREE_DOF, "--batch", "-", stdin=targets)
     lines = run("ik", THREE_DOF, "--batch", "-", "--json", stdin=targets)
     trace = run("send", THREE_DOF, -30, 5, -5, "--dry-run", "--trace", "-")
     for source, words in [
-        (one, []),
+        (completed, []),
         (every, []),
         (rows, [THREE_DOF, "--batch", "-"]),
         (rows, [THREE_DOF, "--path", "-"]),
@@ -207,9 +207,9 @@ def test_without_matplotlib(tmp_path: Path, words: list[str]) -> None:
     code = "import sys; sys.modules['matplotlib'] = None; from armkin.cli import main; main()"
     out = str(tmp_path / "a.png")
     command = [sys.executable, "-c", code, words[0], THREE_DOF, *words[1:], out]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("error: pictures need matplotlib, which cannot be imported (")
-    assert done.stderr.endswith("pip install matplotlib (armkin's extra: plot)\n")
-    assert done.stderr.count("\n") == 1
+    completed = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert (completed.returncode, completed.stdout) == (1, "")
+    assert completed.stderr.startswith("error: pictures need matplotlib, which cannot be imported (")
+    assert completed.stderr.endswith("pip install matplotlib (armkin's extra: plot)\n")
+    assert completed.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []

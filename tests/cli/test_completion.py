@@ -8,7 +8,7 @@ import pytest
 
 from armkin.cli.commands import COMMANDS
 from armkin.robot_file import catalogue
-from command_line import ROOT, process, run
+from command_line import ROOT, run, run_process
 
 
 def offered(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
@@ -17,9 +17,9 @@ def offered(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
     index = len(words) if line.endswith(" ") else len(words) - 1
     for name, value in (("COMP_WORDS", line), ("COMP_CWORD", str(index)), ("_ARMKIN_COMPLETE", "complete_bash")):
         monkeypatch.setenv(name, value)
-    result = run()
-    assert result.err == ""
-    return result.out.split()
+    completed = run()
+    assert completed.err == ""
+    return completed.out.split()
 
 
 @pytest.mark.parametrize(
@@ -58,9 +58,11 @@ def test_an_offered_branch_is_understood() -> None:
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_bash_takes_the_script() -> None:
-    script = process(
+    script = run_process(
         "--show-completion", "bash", env={**os.environ, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
     )
     assert script.code == 0
-    done = subprocess.run(["bash", "--norc", "-c", f"{script.out}\ncomplete -p armkin"], capture_output=True, text=True)
-    assert "armkin" in done.stdout, ROOT
+    completed = subprocess.run(
+        ["bash", "--norc", "-c", f"{script.out}\ncomplete -p armkin"], capture_output=True, text=True
+    )
+    assert "armkin" in completed.stdout, ROOT

@@ -53,9 +53,9 @@ def test_the_same_across_chunks_and_unreachable_rows(winding: np.ndarray, monkey
 
 def test_all_branches_lock_and_branch_go_with_it() -> None:
     rows = b"390,80,300\n390,100,300\n390,120,300\n"
-    done = run("ik", THREE_DOF, "--batch", "-", "--continuous", "--all-branches", "--json", stdin=rows)
-    assert [len(line["branches"]) for line in done.lines] == [4, 4, 4]
-    for line in done.lines:
+    completed = run("ik", THREE_DOF, "--batch", "-", "--continuous", "--all-branches", "--json", stdin=rows)
+    assert [len(line["branches"]) for line in completed.lines] == [4, 4, 4]
+    for line in completed.lines:
         legal = [branch["motion"] for branch in line["branches"] if branch["within_limits"]]
         assert legal == sorted(legal)
     down = run("ik", THREE_DOF, "--batch", "-", "--continuous", "--branch", "elbow down", "--json", stdin=rows)
@@ -66,6 +66,6 @@ def test_all_branches_lock_and_branch_go_with_it() -> None:
 
 
 def test_it_belongs_to_a_batch() -> None:
-    result = run("ik", THREE_DOF, 390, 80, 300, "--continuous")
-    assert (result.code, result.out) == (2, "")
-    assert "--continuous belongs to --batch" in result.err
+    completed = run("ik", THREE_DOF, 390, 80, 300, "--continuous")
+    assert (completed.code, completed.out) == (2, "")
+    assert "--continuous belongs to --batch" in completed.err

@@ -35,9 +35,9 @@ def test_the_environment_names_a_port(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_only_board_that_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     with PtyBoard("uno_servos") as other, PtyBoard() as board:
         plugged_in(monkeypatch, other.port, board.port)
-        done = run("status", THREE_DOF, "--json")
-        assert done.json["port"] == board.port
-        assert done.err == f"note: using {board.port}, the only port where an uno_cnc_shield answers\n"
+        completed = run("status", THREE_DOF, "--json")
+        assert completed.json["port"] == board.port
+        assert completed.err == f"note: using {board.port}, the only port where an uno_cnc_shield answers\n"
         assert run("send", THREE_DOF, 0, 80, -80, "--assume-home").code == 0
         assert run("stop", "--port", board.port).code == 0
 
@@ -48,11 +48,11 @@ def test_several_boards_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (none.code, none.out) == (2, "")
     assert "no port where an uno_cnc_shield answers was found" in none.err
     assert run("stop").code == 2
-    with PtyBoard() as one, PtyBoard() as two:
-        plugged_in(monkeypatch, one.port, two.port)
+    with PtyBoard() as board, PtyBoard() as two:
+        plugged_in(monkeypatch, board.port, two.port)
         several = run("send", THREE_DOF, 0, 90, -90)
         assert several.code == 2
-        assert f"2 boards answer ({one.port}, {two.port})" in several.err
+        assert f"2 boards answer ({board.port}, {two.port})" in several.err
 
 
 def test_boards_of_others_are_looked_for_as_the_robot_file_says(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,9 +61,9 @@ def test_boards_of_others_are_looked_for_as_the_robot_file_says(monkeypatch: pyt
     servos = ServoBus([Servo(1, 2058), Servo(2, 2068)])
     with PtyPort(Grbl(settings=settings)) as grbl, PtyPort(servos) as bus, PtyPort(ServoBus([Servo(1)])) as other:
         plugged_in(monkeypatch, grbl.name, bus.name, other.name)
-        found = run("status", bus_arm, "--json")
-        assert found.json["port"] == bus.name
-        assert f"using {bus.name}, the only port where a feetech board answers" in found.err
+        completed = run("status", bus_arm, "--json")
+        assert completed.json["port"] == bus.name
+        assert f"using {bus.name}, the only port where a feetech board answers" in completed.err
         plugged_in(monkeypatch, grbl.name, other.name)
         assert run("status", robot, "--json").json["port"] == grbl.name
         plugged_in(monkeypatch, other.name)

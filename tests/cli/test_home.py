@@ -49,10 +49,12 @@ def behind_a_port(path: str, monkeypatch: pytest.MonkeyPatch) -> SimBoard:
 @pytest.mark.parametrize(("normally", "upper"), [("closed", False), ("open", True)])
 def test_homing_is_rehearsed_and_ends_in_the_home_pose(tmp_path: Path, normally: str, upper: bool) -> None:
     path = arm_with_switches(tmp_path, four=False, normally=normally, upper=upper)
-    done = run("home", path, "--port", "sim", "--json")
-    assert done.code == 0
-    assert (done.json["position"], done.json["pulses"]) == ("known", [0, 0, 0])
-    assert [line for line in done.err.splitlines() if "homing" in line] == [f"note: homing q{i}" for i in (1, 2, 3)]
+    completed = run("home", path, "--port", "sim", "--json")
+    assert completed.code == 0
+    assert (completed.json["position"], completed.json["pulses"]) == ("known", [0, 0, 0])
+    assert [line for line in completed.err.splitlines() if "homing" in line] == [
+        f"note: homing q{i}" for i in (1, 2, 3)
+    ]
     stays = run("home", path, "--port", "sim", "--stay", "--json").json["joints"]
     at = UPPER if upper else LOWER
     step = np.rad2deg(armkin.load(path).motor_gain.max(axis=1) ** -1)
@@ -65,9 +67,9 @@ def test_a_joint_without_a_switch_rests_at_home(tmp_path: Path) -> None:
     assert refused.code == 2
     assert "has no homing for q4" in refused.err
     assert "--rest-at-home" in refused.err
-    done = run("home", path, "--port", "sim", "--rest-at-home", "--json")
-    assert done.code == 0
-    assert done.json["joints"] == pytest.approx([0, 90, -90, 10])
+    completed = run("home", path, "--port", "sim", "--rest-at-home", "--json")
+    assert completed.code == 0
+    assert completed.json["joints"] == pytest.approx([0, 90, -90, 10])
 
 
 def test_homing_that_leaves_a_joint_lost_fails_and_says_the_next_step(tmp_path: Path) -> None:
@@ -76,9 +78,9 @@ def test_homing_that_leaves_a_joint_lost_fails_and_says_the_next_step(tmp_path: 
     assert (some.code, some.out) == (5, "")
     assert "homed q1, q2, q3; the position of q4 is still lost" in some.err
     assert f"armkin home {path} --rest-at-home" in some.err
-    one = run("home", arm_with_switches(tmp_path, four=False), "q2", "--port", "sim")
-    assert one.code == 5
-    assert f"armkin home {path} q1 q3" in one.err
+    completed = run("home", arm_with_switches(tmp_path, four=False), "q2", "--port", "sim")
+    assert completed.code == 5
+    assert f"armkin home {path} q1 q3" in completed.err
 
 
 def test_the_documented_way_on_a_board_behind_a_port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,8 +89,8 @@ def test_the_documented_way_on_a_board_behind_a_port(tmp_path: Path, monkeypatch
     behind_a_port(path, monkeypatch)
     assert run("send", path, 10, 80, -80, 0, "--port", "COM3").code == 5
     assert run("home", path, "--port", "COM3", "--rest-at-home").code == 0
-    done = run("send", path, 10, 80, -80, 0, "--port", "COM3", "--json")
-    assert (done.code, done.json["position"]) == (0, "known")
+    completed = run("send", path, 10, 80, -80, 0, "--port", "COM3", "--json")
+    assert (completed.code, completed.json["position"]) == (0, "known")
     assert run("send", path, "home", "--port", "COM3", "--assume-home").code == 5
 
 
@@ -104,9 +106,9 @@ def test_the_order_of_the_file_is_kept(tmp_path: Path) -> None:
 
 def test_a_wrong_board_is_called_by_its_name() -> None:
     with PtyBoard("uno_servos") as board:
-        result = run("status", THREE_DOF, "--port", board.port)
-    assert result.code == 5
-    assert f"{board.port} is uno_servos, three_dof's board is uno_cnc_shield" in result.err
+        completed = run("status", THREE_DOF, "--port", board.port)
+    assert completed.code == 5
+    assert f"{board.port} is uno_servos, three_dof's board is uno_cnc_shield" in completed.err
 
 
 def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,12 +127,14 @@ def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypat
     assert x["difference"] == pytest.approx(x["steps"] / armkin.load(path).motor_gain[0, 0] * 180 / np.pi)
     assert max(abs(y["steps"]), abs(z["steps"])) <= 1
     board.motors.axes.net[0] -= 40
-    told = run("home", path, "--port", "COM3")
-    assert f"q1: {x['steps']} steps were lost since its position was last set ({x['difference']:.3f} deg)" in told.err
-    assert "q2" not in told.err.replace("homing q2", "")
+    completed = run("home", path, "--port", "COM3")
+    assert (
+        f"q1: {x['steps']} steps were lost since its position was last set ({x['difference']:.3f} deg)" in completed.err
+    )
+    assert "q2" not in completed.err.replace("homing q2", "")
 
 
 def test_home_without_switches_is_refused_by_name() -> None:
-    done = run("home", THREE_DOF, "--port", "sim")
-    assert done.code == 2
-    assert "has no homing for q1, q2, q3" in done.err
+    completed = run("home", THREE_DOF, "--port", "sim")
+    assert completed.code == 2
+    assert "has no homing for q1, q2, q3" in completed.err

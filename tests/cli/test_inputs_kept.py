@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import THREE_DOF, process, run
+from command_line import THREE_DOF, run, run_process
 
 PATH = "moves:\n  - point: [390, 80, 300]\n  - line: [390, 140, 300]\n"
 CORNERS = "x,y,z\n390,80,300\n390,140,300\n"
@@ -25,9 +25,9 @@ def test_a_path_file_is_not_replaced_by_its_own_plan(tmp_path: Path, name: str, 
         ("send", THREE_DOF, "--path", file, "--dry-run", "--trace", file),
         ("send", THREE_DOF, "--path", file, "--port", "sim", "--trace", file),
     ):
-        done = run(*words)
-        assert done.code == 2, (words, done.err)
-        assert "is what this command reads" in done.err
+        completed = run(*words)
+        assert completed.code == 2, (words, completed.err)
+        assert "is what this command reads" in completed.err
         assert file.read_text() == text
 
 
@@ -44,9 +44,9 @@ def test_what_comes_through_standard_input_is_not_replaced(tmp_path: Path, words
     file = tmp_path / "good.csv"
     file.write_text(text)
     with file.open("rb") as stdin:
-        done = process(*words, "--out", file, stdin=stdin)
-    assert done.code == 2, done.err
-    assert "is what this command reads" in done.err
+        completed = run_process(*words, "--out", file, stdin=stdin)
+    assert completed.code == 2, completed.err
+    assert "is what this command reads" in completed.err
     assert file.read_text() == text
     with file.open("rb") as stdin:
-        assert process(*words, "--out", tmp_path / "other.csv", stdin=stdin).code == 0
+        assert run_process(*words, "--out", tmp_path / "other.csv", stdin=stdin).code == 0

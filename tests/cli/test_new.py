@@ -20,16 +20,16 @@ TABLE = ["--dh", "90,0,170", "--dh", "0,197,-10", "--dh", "0,258,0"]
 
 def made(*words: object, stdin: bytes = b"") -> robot_file.RobotFile:
     """The robot file that a command line writes to standard output."""
-    result = run("new", "arm", *words, "--out", "-", stdin=stdin)
-    assert result.code == 0, result.err
-    return robot_file.parse_robot_file(result.out, "arm.yaml")
+    completed = run("new", "arm", *words, "--out", "-", stdin=stdin)
+    assert completed.code == 0, completed.err
+    return robot_file.parse_robot_file(completed.out, "arm.yaml")
 
 
 def test_a_table_becomes_an_arm(tmp_path: Path) -> None:
     path = tmp_path / "mine"
-    result = run("new", path, *TABLE, "--convention", "standard", "--source", 'the "paper": Table 1')
-    assert (result.code, result.out) == (0, "")
-    assert f"wrote {path}.yaml" in result.err
+    completed = run("new", path, *TABLE, "--convention", "standard", "--source", 'the "paper": Table 1')
+    assert (completed.code, completed.out) == (0, "")
+    assert f"wrote {path}.yaml" in completed.err
     arm, paper = armkin.load(f"{path}.yaml"), armkin.load("three_dof")
     q = np.random.default_rng(1).uniform(-3, 3, (50, 3))
     assert np.array_equal(armkin.fk(arm, q), armkin.fk(paper, q))
@@ -95,9 +95,9 @@ def test_the_comments_become_keys_when_they_are_taken_out() -> None:
     ],
 )
 def test_what_is_wrong_is_told_and_nothing_is_written(words: list[str], says: str, tmp_path: Path) -> None:
-    result = run("new", *words, cwd=tmp_path)
-    assert result.code == 2
-    assert says in result.err
+    completed = run("new", *words, cwd=tmp_path)
+    assert completed.code == 2
+    assert says in completed.err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -11,14 +11,14 @@ import sys
 import pytest
 
 from armkin.cli import output
-from command_line import ROOT, process, run
+from command_line import ROOT, run, run_process
 
 
 def test_new_says_all_that_is_missing_at_once() -> None:
-    done = run("new", "mine")
-    assert done.code == 2
-    assert "no table: give --dh" in done.err
-    assert "--convention is missing" in done.err
+    completed = run("new", "mine")
+    assert completed.code == 2
+    assert "no table: give --dh" in completed.err
+    assert "--convention is missing" in completed.err
     assert "--convention" not in run("new", "mine", "--convention", "standard").err
     assert "no table" not in run("new", "mine", "--dh", "0,0,0").err
 
@@ -63,9 +63,9 @@ def test_notes_are_not_cut_in_the_middle(capsys: pytest.CaptureFixture[str]) -> 
 )
 @pytest.mark.skipif(sys.platform == "win32", reason="names of devices")
 def test_teach_refuses_a_port_that_is_none(port: str, message: str) -> None:
-    done = process("teach", "three_dof", "--no-open", "--port", port)
-    assert (done.code, done.out) == (5, "")
-    assert message in done.err
+    completed = run_process("teach", "three_dof", "--no-open", "--port", port)
+    assert (completed.code, completed.out) == (5, "")
+    assert message in completed.err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")

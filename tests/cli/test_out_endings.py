@@ -51,9 +51,9 @@ def test_an_unknown_ending_is_refused_with_those_allowed(tmp_path: Path, command
     (tmp_path / "poses.csv").write_bytes(POSES)
     known = {"POSES": tmp_path / "poses.csv", "FILE": tmp_path / name}
     words = [known.get(word, word) for word in words]
-    done = run(*words, *(() if "--trace" in words else ("--out", tmp_path / name)), stdin=POSES)
-    assert (done.code, done.out) == (2, "")
-    assert f"written as {allowed}; end the file's name with" in done.err
+    completed = run(*words, *(() if "--trace" in words else ("--out", tmp_path / name)), stdin=POSES)
+    assert (completed.code, completed.out) == (2, "")
+    assert f"written as {allowed}; end the file's name with" in completed.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["poses.csv"]
 
 
@@ -63,16 +63,16 @@ def test_two_endings_are_refused(tmp_path: Path, command: str, name: str) -> Non
     words, _ = ASKED[command]
     (tmp_path / "poses.csv").write_bytes(POSES)
     words = [tmp_path / "poses.csv" if word == "POSES" else word for word in words]
-    done = run(*words, "--out", tmp_path / name, stdin=POSES)
-    assert done.code == 2
-    assert "its name has two endings" in done.err or "written as" in done.err
+    completed = run(*words, "--out", tmp_path / name, stdin=POSES)
+    assert completed.code == 2
+    assert "its name has two endings" in completed.err or "written as" in completed.err
     assert not (tmp_path / name).exists()
 
 
 def test_json_is_not_written_as_csv(tmp_path: Path) -> None:
-    done = run("fk", "three_dof", "--batch", "-", "--json", "--out", tmp_path / "x.csv", stdin=POSES)
-    assert done.code == 2
-    assert "--json" in done.err
+    completed = run("fk", "three_dof", "--batch", "-", "--json", "--out", tmp_path / "x.csv", stdin=POSES)
+    assert completed.code == 2
+    assert "--json" in completed.err
     for name in ("x.jsonl", "x"):
         assert run("fk", "three_dof", "--batch", "-", "--json", "--out", tmp_path / name, stdin=POSES) == (0, "", "")
 

@@ -30,24 +30,24 @@ def test_a_held_joint_goes_to_its_value_first_and_stays(planar: Path, tmp_path: 
     path = tmp_path / "way.yaml"
     path.write_text(MOVES)
     out = tmp_path / "way.csv"
-    done = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--port", "sim", "--json", "--out", out)
-    assert done.code == 0, done.err
+    completed = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--port", "sim", "--json", "--out", out)
+    assert completed.code == 0, completed.err
     arm = armkin.load(planar)
-    assert done.json["task"] == "xy"
-    assert done.json["joints"][2] == pytest.approx(20, abs=0.1)  # what the servo makes of it
-    assert done.json["pulses"] == armkin.pulses(arm, np.deg2rad(done.json["joints"])).tolist()
-    assert list(done.json["limits"]["speed"]) == ["q1", "q2", "q3"]
+    assert completed.json["task"] == "xy"
+    assert completed.json["joints"][2] == pytest.approx(20, abs=0.1)  # what the servo makes of it
+    assert completed.json["pulses"] == armkin.pulses(arm, np.deg2rad(completed.json["joints"])).tolist()
+    assert list(completed.json["limits"]["speed"]) == ["q1", "q2", "q3"]
     rows = list(csv.DictReader(out.read_text().splitlines()))
     q = np.deg2rad([[float(row[name]) for name in ("q1", "q2", "q3")] for row in rows])
     on = np.array([float(row["s_mm"]) for row in rows]) > 0
-    assert done.json["approach"]["from_joints"][2] == 0
-    assert "first a joint move to where the path starts" in done.err
+    assert completed.json["approach"]["from_joints"][2] == 0
+    assert "first a joint move to where the path starts" in completed.err
     assert np.allclose(q[:, 2], np.deg2rad(20))
     tips = armkin.fk(arm, q[on])[:, :2, 3]
     assert np.abs(tips.sum(axis=1) - 650).max() < 0.05 * np.sqrt(2)  # on the line
     assert tips[-1] == pytest.approx([350, 300], abs=1e-6)
     planned = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--json").json
-    assert planned["duration_s"] == pytest.approx(done.json["duration_s"], abs=0.01)
+    assert planned["duration_s"] == pytest.approx(completed.json["duration_s"], abs=0.01)
     there = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--start", "0,0,20", "--json").json
     assert "approach" not in there
     assert there["duration_s"] == pytest.approx(planned["duration_s"], abs=1e-9)
@@ -56,13 +56,13 @@ def test_a_held_joint_goes_to_its_value_first_and_stays(planar: Path, tmp_path: 
 def test_a_held_joint_outside_its_limits_or_a_way_beyond_the_reach_moves_nothing(planar: Path, tmp_path: Path) -> None:
     path = tmp_path / "way.yaml"
     path.write_text(MOVES)
-    done = run("path", planar, path, "--lock", "q3=120", "--task", "xy", "--port", "sim")
-    assert done.code == 3
-    assert "q3 = 120 deg is outside -90 to 90 deg" in done.err
+    completed = run("path", planar, path, "--lock", "q3=120", "--task", "xy", "--port", "sim")
+    assert completed.code == 3
+    assert "q3 = 120 deg is outside -90 to 90 deg" in completed.err
     path.write_text("moves:\n  - point: [450, 200]\n  - line: [850, 200]\n")
-    done = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--json")
-    assert done.code == 3
-    assert [len(branch["start_joints"]) for branch in done.json["branches"]] == [3, 3]
+    completed = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--json")
+    assert completed.code == 3
+    assert [len(branch["start_joints"]) for branch in completed.json["branches"]] == [3, 3]
 
 
 def test_joint_moves_need_no_task(tmp_path: Path) -> None:
@@ -74,15 +74,15 @@ def test_joint_moves_need_no_task(tmp_path: Path) -> None:
     ))  # fmt: skip
     path = tmp_path / "look.yaml"
     path.write_text("moves:\n  - joint: [30, 20]\n  - wait: 0.5\n  - joint: {q1: -30}\n  - joint: home\n")
-    done = run("path", arm, path, "--json")
-    assert done.code == 0, done.err
-    assert done.json["task"] is None
-    assert done.json["joints"] == [0, 0]
-    assert done.json["duration_s"] == pytest.approx(1.0 + 0.5 + 1.5 + 1.0)
+    completed = run("path", arm, path, "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["task"] is None
+    assert completed.json["joints"] == [0, 0]
+    assert completed.json["duration_s"] == pytest.approx(1.0 + 0.5 + 1.5 + 1.0)
     path.write_text("moves:\n  - joint: [30, 20]\n  - line: [1000, 1000, 0]\n")
-    done = run("path", arm, path)
-    assert done.code == 2
-    assert "no task fits its 2 joints" in done.err
+    completed = run("path", arm, path)
+    assert completed.code == 2
+    assert "no task fits its 2 joints" in completed.err
 
 
 SEVEN = "task: pose\nstart: home\nmoves:\n  - point: [400, 0, 400, 180, 0, 0]\n  - line: [400, 150, 400, 180, 0, 0]\n"
@@ -91,9 +91,9 @@ SEVEN = "task: pose\nstart: home\nmoves:\n  - point: [400, 0, 400, 180, 0, 0]\n 
 @pytest.mark.parametrize(("robot", "held"), [("panda", 45.0), ("iiwa7", None)])
 def test_of_seven_joints_the_redundant_one_is_held_where_it_carries_the_path(robot: str, held: float | None) -> None:
     """panda's J7 stays at home; iiwa7's does not carry there, and goes to the nearest value that does."""
-    done = run("path", robot, "-", "--json", stdin=SEVEN.encode())
-    assert done.code == 0, done.err
-    arm, plan = armkin.load(robot), done.json
+    completed = run("path", robot, "-", "--json", stdin=SEVEN.encode())
+    assert completed.code == 0, completed.err
+    arm, plan = armkin.load(robot), completed.json
     assert plan["held"]["J7"] == plan["joints"][6]
     assert plan["held"]["J7"] == (held if held is not None else pytest.approx(-2.4648, abs=1e-3))
     assert plan["start_joints"] == pytest.approx(np.rad2deg(arm.home).tolist())
@@ -114,9 +114,9 @@ def test_near_says_where_the_redundant_joint_is_preferred() -> None:
     from_here = SEVEN.replace("  - point: [400, 0, 400, 180, 0, 0]\n", "").replace(
         "line: [", "offset: {xyz: [0, 20, 0]}  # ["
     )
-    kept = run("path", "panda", "-", "--near", near, "--json", stdin=from_here.encode())
-    assert kept.code == 0, kept.err
-    assert kept.json["held"]["J7"] == pytest.approx(45.0)  # the way begins where the joints stand
+    completed = run("path", "panda", "-", "--near", near, "--json", stdin=from_here.encode())
+    assert completed.code == 0, completed.err
+    assert completed.json["held"]["J7"] == pytest.approx(45.0)  # the way begins where the joints stand
 
 
 def arm_with_rates(robot: str) -> armkin.Arm:
@@ -127,9 +127,9 @@ def arm_with_rates(robot: str) -> armkin.Arm:
 def test_joint_moves_say_where_the_redundant_joint_is_held_and_agree() -> None:
     joint = "  - joint: [0, -17, 0, -120, 0, 110, 30]\n"
     down = "  - offset: {xyz: [0, 0, -30]}\n"
-    done = run("path", "panda", "-", "--json", stdin=(SEVEN + joint + down).encode())
-    assert done.code == 0, done.err
-    assert done.json["held"] == {"J7": pytest.approx(30.0)}
+    completed = run("path", "panda", "-", "--json", stdin=(SEVEN + joint + down).encode())
+    assert completed.code == 0, completed.err
+    assert completed.json["held"] == {"J7": pytest.approx(30.0)}
     other = joint.replace("30]", "31]")
     refused = run("path", "panda", "-", stdin=(SEVEN + joint + other + down).encode())
     assert refused.code == 2

@@ -43,19 +43,19 @@ START = "moves:\n  - point: [390, 80, 300]\n"
 def test_a_move_that_makes_no_sense_is_told_with_its_line(tmp_path: Path, name: str, text: str, says: str) -> None:
     file = tmp_path / name
     file.write_text(text)
-    done = run("path", THREE_DOF, file)
-    assert done.code in (2, 3), done.err
-    assert f"{tmp_path}/{says}" in done.err
+    completed = run("path", THREE_DOF, file)
+    assert completed.code in (2, 3), completed.err
+    assert f"{tmp_path}/{says}" in completed.err
 
 
 def test_a_way_that_is_not_carried_names_its_own_moves_and_keeps_the_verdict(tmp_path: Path) -> None:
     """The group of moves 2 and 3 is planned when move 4 ends it, which is not at fault."""
     file = tmp_path / "g.yaml"
     file.write_text("moves:\n  - joint: home\n  - point: [390, 80, 300]\n  - line: [390, -400, 300]\n  - joint: home\n")
-    done = run("path", THREE_DOF, file, "--json")
-    assert done.code == 3
-    assert f"{file}:3: moves 2 to 3: no branch carries" in done.err
-    assert done.json["reconfigurations"][0]["why"] == "reach"
+    completed = run("path", THREE_DOF, file, "--json")
+    assert completed.code == 3
+    assert f"{file}:3: moves 2 to 3: no branch carries" in completed.err
+    assert completed.json["reconfigurations"][0]["why"] == "reach"
     with pytest.raises(NoSolutionError) as refused:
         armkin.path(armkin.load("three_dof"), str(file))
     assert refused.value.plan.branches
@@ -73,10 +73,10 @@ def test_a_way_that_is_not_carried_names_its_own_moves_and_keeps_the_verdict(tmp
 def test_a_path_file_is_not_called_a_robot_file(tmp_path: Path, text: str, says: str) -> None:
     file = tmp_path / "deep.yaml"
     file.write_text(text)
-    done = run("path", THREE_DOF, file)
-    assert done.code == 2, done.err
-    assert says in done.err
-    assert "robot file" not in done.err
+    completed = run("path", THREE_DOF, file)
+    assert completed.code == 2, completed.err
+    assert says in completed.err
+    assert "robot file" not in completed.err
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "nonsense"])
@@ -84,10 +84,10 @@ def test_a_path_of_another_robot_is_refused(tmp_path: Path, robot: str) -> None:
     file = tmp_path / "rb.yaml"
     file.write_text(f"# of another arm\nrobot: {robot}\n{START}")
     for words in (("path", "three_dof", file), ("send", "three_dof", "--path", file, "--dry-run")):
-        done = run(*words)
-        assert done.code == 2, done.err
-        assert f"{file}:2: robot: this is a path of {robot}, and the arm is three_dof" in done.err
-        assert "or write robot: three_dof" in done.err
+        completed = run(*words)
+        assert completed.code == 2, completed.err
+        assert f"{file}:2: robot: this is a path of {robot}, and the arm is three_dof" in completed.err
+        assert "or write robot: three_dof" in completed.err
     with pytest.raises(PathFileError, match=r"rb\.yaml:2: robot"):
         Program(armkin.load("three_dof")).load(file.read_text(), str(file))
 
@@ -98,8 +98,8 @@ def test_a_path_of_this_robot_is_planned_by_its_name_and_by_its_file(tmp_path: P
     file = tmp_path / "g.yaml"
     for robot, arm in (("three_dof", THREE_DOF), (THREE_DOF, "three_dof"), ("mine.yaml", mine), ("my_arm", mine)):
         file.write_text(f"robot: {robot}\n{START}")
-        done = run("path", arm, file)
-        assert done.code == 0, (robot, done.err)
+        completed = run("path", arm, file)
+        assert completed.code == 0, (robot, completed.err)
     program = Program(armkin.load(mine))
     program.moves = [{"line": [390.123456, 80.123456, 300.123456]}] * MOST
     program.names = ["a name of a move"] * MOST
@@ -115,9 +115,9 @@ def test_a_value_beyond_the_gripper_is_refused_while_planning(tmp_path: Path) ->
     file = tmp_path / "g.yaml"
     file.write_text(START + "  - grip: 99999\n")
     for words in (("path", THREE_DOF, file), ("send", THREE_DOF, "--path", file, "--dry-run")):
-        done = run(*words)
-        assert done.code == 2, done.err
-        assert f"{file}:3: move 2: grip: 99999 is outside of the gripper's 30 to 120" in done.err
+        completed = run(*words)
+        assert completed.code == 2, completed.err
+        assert f"{file}:3: move 2: grip: 99999 is outside of the gripper's 30 to 120" in completed.err
     for value in ("30", "120", "75.5", "open", "closed"):
         file.write_text(START + f"  - grip: {value}\n")
         assert run("path", THREE_DOF, file).code == 0, value
@@ -131,37 +131,40 @@ def test_a_grip_without_a_gripper_is_refused_before_anything_moves(tmp_path: Pat
     file = tmp_path / "g.yaml"
     file.write_text(START + "  - grip: closed\n")
     for words in (("path", bare, file), ("path", bare, file, "--dry-run"), ("send", bare, "--path", file, "--dry-run")):
-        done = run(*words)
-        assert (done.code, done.out) == (2, ""), words
-        assert done.err == f"error: {file}:3: move 2: grip: three_dof has no gripper; add gripper: to its robot file\n"
+        completed = run(*words)
+        assert (completed.code, completed.out) == (2, ""), words
+        assert (
+            completed.err
+            == f"error: {file}:3: move 2: grip: three_dof has no gripper; add gripper: to its robot file\n"
+        )
     assert run("path", slow, file).code == 0  # a plan needs no board, a rehearsal does
     for words in (("path", slow, file, "--dry-run"), ("send", slow, "--path", file, "--dry-run")):
-        done = run(*words)
-        assert (done.code, done.out) == (2, ""), words
-        assert "the gripper has no max_speed" in done.err
+        completed = run(*words)
+        assert (completed.code, completed.out) == (2, ""), words
+        assert "the gripper has no max_speed" in completed.err
 
 
 def test_an_arm_on_a_board_of_others_is_planned_without_a_port(tmp_path: Path) -> None:
     robot = "tests/robots/three_dof_grbl.yaml"
     corners = ("--via", "390,80,300", "--via", "390,100,300")
-    done = run("path", robot, *corners, "--json")
-    assert done.code == 0, done.err
-    assert done.json["segments"] > 5
+    completed = run("path", robot, *corners, "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["segments"] > 5
     assert run("path", robot, *corners, "--dry-run").code == 0
     file = tmp_path / "g.yaml"
     file.write_text(START + "  - grip: closed\n")
-    done = run("send", robot, "--path", file, "--dry-run")
-    assert done.code == 2
-    assert "has no gripper that a board of kind grbl moves" in done.err
+    completed = run("send", robot, "--path", file, "--dry-run")
+    assert completed.code == 2
+    assert "has no gripper that a board of kind grbl moves" in completed.err
 
 
 def test_an_arm_without_rates_is_planned_with_a_named_guess_and_never_moved(tmp_path: Path) -> None:
     corners = ("--via", "300,0,400", "--via", "300,50,400")
-    done = run("path", "ur5e", *corners, "--json")
-    assert done.code == 0, done.err
-    assert done.json["duration_s"] > 0
-    assert "assumed for this plan alone, as ur5e does not say: max_accel of J1, J2, J3, J4" in done.err
-    assert "60 deg/s2" in done.err
+    completed = run("path", "ur5e", *corners, "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["duration_s"] > 0
+    assert "assumed for this plan alone, as ur5e does not say: max_accel of J1, J2, J3, J4" in completed.err
+    assert "60 deg/s2" in completed.err
     assert run("path", "ur5e", *corners, "--port", "none", "--dry-run").code == 0
     refused = run("path", "ur5e", *corners, "--port", "none")
     assert (refused.code, refused.out) == (2, "")
@@ -171,5 +174,5 @@ def test_an_arm_without_rates_is_planned_with_a_named_guess_and_never_moved(tmp_
     sent = run("send", "ur5e", "--path", file, "--dry-run", "--json")
     assert sent.code == 0, sent.err
     assert "assumed for this plan alone, as ur5e does not say: max_accel of J1" in sent.err
-    assert sent.json["duration_s"] == done.json["duration_s"]
+    assert sent.json["duration_s"] == completed.json["duration_s"]
     assert run("send", "ur5e", "--path", file, "--port", "none").code == 2

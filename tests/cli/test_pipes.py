@@ -29,10 +29,10 @@ def test_json_of_ik_goes_into_fk_and_pulses() -> None:
 
 def test_json_lines_are_a_batch_and_unsolved_answers_are_skipped() -> None:
     answers = run("ik", THREE_DOF, "--batch", "-", "--json", stdin=TARGETS)
-    done = piped(answers, "fk")
-    assert done.code == 0
-    assert len(done.out.splitlines()) == 3
-    assert done.err == "warning: 1 of 3 answers have no branch within limits: skipped\n"
+    completed = piped(answers, "fk")
+    assert completed.code == 0
+    assert len(completed.out.splitlines()) == 3
+    assert completed.err == "warning: 1 of 3 answers have no branch within limits: skipped\n"
     assert [line["robot"] for line in piped(answers, "pulses", "--json").lines] == ["three_dof"] * 2
     none = piped(run("ik", THREE_DOF, 9000, 0, 0, "--json"), "fk")
     assert (none.code, none.out) == (3, "")
@@ -52,17 +52,20 @@ def test_json_lines_are_a_batch_and_unsolved_answers_are_skipped() -> None:
     ],
 )
 def test_what_is_no_answer_is_refused(words: tuple[str, ...], stdin: bytes, code: int, says: str) -> None:
-    result = run(*words, stdin=stdin)
-    assert (result.code, result.out) == (code, "")
-    assert says in result.err
+    completed = run(*words, stdin=stdin)
+    assert (completed.code, completed.out) == (code, "")
+    assert says in completed.err
 
 
 def test_csv_of_ik_goes_into_fk_and_pulses() -> None:
     solved = run("ik", THREE_DOF, "--batch", "-", stdin=TARGETS)
     assert solved.code == 3
-    done = piped(solved, "fk", THREE_DOF, "--batch", "-", "--json")
-    assert [line["position_mm"] for line in done.lines] == [pytest.approx([390, 80, 300]), pytest.approx([0, 400, 200])]
-    assert done.err == "warning: 1 row without q1,q2,q3 skipped\n"
+    completed = piped(solved, "fk", THREE_DOF, "--batch", "-", "--json")
+    assert [line["position_mm"] for line in completed.lines] == [
+        pytest.approx([390, 80, 300]),
+        pytest.approx([0, 400, 200]),
+    ]
+    assert completed.err == "warning: 1 row without q1,q2,q3 skipped\n"
     back = piped(piped(solved, "fk", THREE_DOF, "--batch", "-"), "ik", THREE_DOF, "--batch", "-", "--json")
     assert [line["target"] for line in back.lines] == [pytest.approx([390, 80, 300]), pytest.approx([0, 400, 200])]
     assert piped(solved, "pulses", THREE_DOF, "--batch", "-").code == 0
@@ -117,17 +120,17 @@ def test_columns_go_by_their_names(text: bytes, joints: list[float]) -> None:
     ],
 )
 def test_a_heading_that_does_not_fit_is_told(text: bytes, says: str) -> None:
-    result = run("fk", THREE_DOF, "--batch", "-", "--json", stdin=text)
-    assert (result.code, result.out) == (2, "")
-    assert says in result.err
+    completed = run("fk", THREE_DOF, "--batch", "-", "--json", stdin=text)
+    assert (completed.code, completed.out) == (2, "")
+    assert says in completed.err
 
 
 def test_a_heading_costs_no_speed() -> None:
     """A long file with text columns is read in one go, like one of plain numbers."""
     rows = b"note,q3,q2,q1\n" + b"left elbow up,3,2,1\n" * 9000
-    done = run("fk", THREE_DOF, "--batch", "-", stdin=rows)
+    completed = run("fk", THREE_DOF, "--batch", "-", stdin=rows)
     plain = run("fk", THREE_DOF, "--batch", "-", stdin=b"1,2,3\n" * 9000)
-    assert done == plain
+    assert completed == plain
 
 
 def test_send_takes_poses_and_named_columns(tmp_path: Path) -> None:
@@ -135,7 +138,7 @@ def test_send_takes_poses_and_named_columns(tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
     path.write_bytes(text)
     for source in ("-", path):
-        done = run("send", THREE_DOF, "--batch", source, "--port", "sim", "--json", stdin=text)
-        assert done.json["waypoints"] == 2
-        assert done.json["joints"] == pytest.approx([0, 80, -80], abs=0.02)
+        completed = run("send", THREE_DOF, "--batch", source, "--port", "sim", "--json", stdin=text)
+        assert completed.json["waypoints"] == 2
+        assert completed.json["joints"] == pytest.approx([0, 80, -80], abs=0.02)
     assert run("send", THREE_DOF, "--batch", "-", "--dry-run", "--json", stdin=b"home\n").json["waypoints"] == 1

@@ -43,9 +43,9 @@ def test_home_is_a_pose_of_every_arm() -> None:
 
 
 def test_an_unknown_pose_is_named_with_those_that_exist(arm_file: str) -> None:
-    result = run("fk", arm_file, "prk")
-    assert (result.code, result.out) == (2, "")
-    assert "no pose 'prk'; did you mean park?" in result.err
+    completed = run("fk", arm_file, "prk")
+    assert (completed.code, completed.out) == (2, "")
+    assert "no pose 'prk'; did you mean park?" in completed.err
     assert "its poses: home, park, up" in run("fk", arm_file, "zzz").err
     assert "--near: three_dof has no pose 'upp'; did you mean up?" in run("ik", arm_file, 1, 2, 3, "--near", "upp").err
 

@@ -32,18 +32,18 @@ LINE = "start: {point: [390, 80, 300]}\nmoves: [{line: [390, -80, 300]}]\n"
 def test_a_path_has_least_speeds_and_a_least_tolerance(key: str, says: str, tmp_path: Path) -> None:
     file = tmp_path / "path.yaml"
     file.write_text(f"{key}\n{LINE}")
-    done = run("path", DOF, file)
-    assert (done.code, done.out) == (2, "")
-    assert says in done.err
-    assert done.err.count("\n") == 1
+    completed = run("path", DOF, file)
+    assert (completed.code, completed.out) == (2, "")
+    assert says in completed.err
+    assert completed.err.count("\n") == 1
 
 
 def test_a_table_of_corners_has_the_same_least_speed(tmp_path: Path) -> None:
     file = tmp_path / "path.csv"
     file.write_text("x,y,z,tool_speed\n390,80,300,1\n390,-80,300,1e-300\n")
-    done = run("path", DOF, file)
-    assert (done.code, done.out) == (2, "")
-    assert "path.csv:3: blend is at least 0, tool_speed at least 0.001 mm/s" in done.err
+    completed = run("path", DOF, file)
+    assert (completed.code, completed.out) == (2, "")
+    assert "path.csv:3: blend is at least 0, tool_speed at least 0.001 mm/s" in completed.err
 
 
 @pytest.mark.parametrize(
@@ -64,10 +64,10 @@ def test_a_table_of_corners_has_the_same_least_speed(tmp_path: Path) -> None:
     ],
 )
 def test_a_number_without_sense_is_refused_with_what_is_allowed(line: str, says: str) -> None:
-    done = run(*line.split())
-    assert (done.code, done.out) == (2, "")
-    assert says in done.err
-    assert done.err.count("\n") == 1
+    completed = run(*line.split())
+    assert (completed.code, completed.out) == (2, "")
+    assert says in completed.err
+    assert completed.err.count("\n") == 1
 
 
 def test_programs_are_refused_the_same() -> None:
@@ -87,9 +87,9 @@ def test_programs_are_refused_the_same() -> None:
 
 
 def test_a_speed_below_one_percent_is_noted_and_taken() -> None:
-    done = run("send", DOF, 0, 89, -90, "--dry-run", "--speed", 0.5)
-    assert done.code == 0
-    assert "note: --speed 0.5: 0.5 percent; half is --speed 50" in done.err
+    completed = run("send", DOF, 0, 89, -90, "--dry-run", "--speed", 0.5)
+    assert completed.code == 0
+    assert "note: --speed 0.5: 0.5 percent; half is --speed 50" in completed.err
     assert run("send", DOF, 0, 89, -90, "--dry-run", "--speed", 1).err == ""
 
 
@@ -114,10 +114,10 @@ def test_a_speed_below_one_percent_is_noted_and_taken() -> None:
     ],
 )
 def test_a_word_without_sense_is_told_in_its_own_words(words: tuple[str, ...], code: int, says: str) -> None:
-    done = run(*words)
-    assert (done.code, done.out) == (code, "")
-    assert says in done.err
-    assert done.err.count("\n") <= 1 + done.err.count("--help")
+    completed = run(*words)
+    assert (completed.code, completed.out) == (code, "")
+    assert says in completed.err
+    assert completed.err.count("\n") <= 1 + completed.err.count("--help")
 
 
 @pytest.mark.parametrize(
@@ -130,9 +130,9 @@ def test_a_word_without_sense_is_told_in_its_own_words(words: tuple[str, ...], c
     ],
 )
 def test_a_row_without_sense_has_the_right_hint(rows: str, says: str) -> None:
-    done = run("send", DOF, "--batch", "-", "--dry-run", stdin=rows.encode())
-    assert done.code == 2
-    assert says in done.err
+    completed = run("send", DOF, "--batch", "-", "--dry-run", stdin=rows.encode())
+    assert completed.code == 2
+    assert says in completed.err
 
 
 def test_targets_in_a_file_are_solved_and_sent() -> None:
@@ -145,8 +145,8 @@ def test_targets_in_a_file_are_solved_and_sent() -> None:
 @pytest.mark.parametrize("name", ["true", "123", "null"])
 def test_any_name_of_an_arm_is_text(name: str, tmp_path: Path) -> None:
     file = tmp_path / "arm.yaml"
-    done = run("new", name, "--dh", "90,0,170", "--convention", "standard", "-o", file)
-    assert done.code == 0, done.err
+    completed = run("new", name, "--dh", "90,0,170", "--convention", "standard", "-o", file)
+    assert completed.code == 0, completed.err
     assert armkin.load(str(file)).name == name
 
 
@@ -198,9 +198,9 @@ def test_what_does_not_speak_the_protocol_is_told_apart(said: bytes, says: str) 
 
 def test_a_stream_that_moves_nothing_prints_nothing() -> None:
     for data in (b"", b"x\n", b"0,130,0\n"):
-        done = run("send", THREE_DOF, "--batch", "-", "--port", "sim", stdin=data)
-        assert done.out == "", data
-        assert done.code == (3 if b"130" in data else 2)
+        completed = run("send", THREE_DOF, "--batch", "-", "--port", "sim", stdin=data)
+        assert completed.out == "", data
+        assert completed.code == (3 if b"130" in data else 2)
 
 
 def test_counts_of_one_are_said_so(tmp_path: Path) -> None:

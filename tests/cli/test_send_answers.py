@@ -11,40 +11,40 @@ from pathlib import Path
 
 import pytest
 
-from command_line import POSE, ROOT, THREE_DOF, process, run
+from command_line import POSE, ROOT, THREE_DOF, run, run_process
 
 
 @pytest.mark.parametrize("words", [("fk", *POSE), ("pulses", *POSE), ("ik", 390, 80, 300)])
 def test_answers_can_be_piped_in(words: Sequence[object]) -> None:
     command, *numbers = words
     answer = run(command, THREE_DOF, *numbers, "--json")
-    done = run("send", "--port", "sim", "--json", stdin=answer.out.encode())
-    assert done.code == 0, done.err
+    completed = run("send", "--port", "sim", "--json", stdin=answer.out.encode())
+    assert completed.code == 0, completed.err
     sent = answer.json if command != "ik" else answer.json["branches"][answer.json["best"]]
-    assert done.json["joints"] == pytest.approx(sent["joints"], abs=0.02)
+    assert completed.json["joints"] == pytest.approx(sent["joints"], abs=0.02)
 
 
 def test_many_answers_can_be_piped_in(tmp_path: Path) -> None:
     rows = tmp_path / "targets.csv"
     rows.write_text("390,80,300\n380,60,280\n")
     answers = run("ik", THREE_DOF, "--batch", rows, "--json")
-    done = run("send", "--port", "sim", "--json", stdin=answers.out.encode())
-    assert done.json["waypoints"] == 2
-    assert done.json["position_mm"] == pytest.approx([380, 60, 280], abs=0.06)
+    completed = run("send", "--port", "sim", "--json", stdin=answers.out.encode())
+    assert completed.json["waypoints"] == 2
+    assert completed.json["position_mm"] == pytest.approx([380, 60, 280], abs=0.06)
 
 
 def test_a_malformed_row_ends_a_stream_and_the_error_tells_what_was_sent() -> None:
     words = ("send", THREE_DOF, "--batch", "-", "--port", "sim")
     rows = b"10,80,-70\n12,78,-70\n1,x,3\n"
     for stdin, waypoints in ((rows, 2), (b"1,x,3\n", 0)):
-        done = run(*words, "--json", stdin=stdin)
-        assert (done.code, done.out) == (2, "")
-        told = json.loads(done.err)
-        assert "x" in told["error"]
-        assert ("sent" in told) == (waypoints > 0)
+        completed = run(*words, "--json", stdin=stdin)
+        assert (completed.code, completed.out) == (2, "")
+        answer = json.loads(completed.err)
+        assert "x" in answer["error"]
+        assert ("sent" in answer) == (waypoints > 0)
         if waypoints:
-            assert told["sent"]["waypoints"] == waypoints
-            assert told["sent"]["joints"] == pytest.approx([12, 78, -70], abs=0.02)
+            assert answer["sent"]["waypoints"] == waypoints
+            assert answer["sent"]["joints"] == pytest.approx([12, 78, -70], abs=0.02)
     people = run(*words, stdin=rows)
     assert people.code == 2
     assert "read back: as planned" in people.out
@@ -52,9 +52,9 @@ def test_a_malformed_row_ends_a_stream_and_the_error_tells_what_was_sent() -> No
 
 def test_an_answer_without_a_best_branch_is_refused() -> None:
     answer = run("ik", THREE_DOF, 3900, 80, 300, "--json")
-    done = run("send", "--port", "sim", stdin=answer.out.encode())
-    assert (done.code, done.out) == (3, "")
-    assert "no branch within limits" in done.err
+    completed = run("send", "--port", "sim", stdin=answer.out.encode())
+    assert (completed.code, completed.out) == (3, "")
+    assert "no branch within limits" in completed.err
 
 
 @pytest.mark.parametrize(
@@ -75,9 +75,9 @@ def test_a_damaged_answer_is_refused(key: str, value: object, message: str) -> N
     answer = {**run(*words, "--json").json, key: value}
     if key == "joints":
         del answer["pulses"]
-    done = run("send", "--port", "sim", stdin=json.dumps(answer).encode())
-    assert (done.code, done.out) == (2, "")
-    assert message in done.err
+    completed = run("send", "--port", "sim", stdin=json.dumps(answer).encode())
+    assert (completed.code, completed.out) == (2, "")
+    assert message in completed.err
 
 
 def test_an_answer_may_begin_with_a_byte_order_mark() -> None:
@@ -90,9 +90,9 @@ def test_a_changed_robot_file_is_noticed(tmp_path: Path) -> None:
     shutil.copy(ROOT / THREE_DOF, mine)
     answer = run("fk", mine, *POSE, "--json")
     mine.write_text(mine.read_text() + "# a comment\n")
-    done = run("send", "--port", "sim", stdin=answer.out.encode())
-    assert (done.code, done.out) == (1, "")
-    assert "has changed" in done.err
+    completed = run("send", "--port", "sim", stdin=answer.out.encode())
+    assert (completed.code, completed.out) == (1, "")
+    assert "has changed" in completed.err
 
 
 @pytest.mark.parametrize(
@@ -106,17 +106,17 @@ def test_a_changed_robot_file_is_noticed(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_answer_is_refused(stdin: bytes, message: str) -> None:
-    done = run("send", "--port", "sim", stdin=stdin)
-    assert (done.code, done.out) == (2, "")
-    assert message in done.err
+    completed = run("send", "--port", "sim", stdin=stdin)
+    assert (completed.code, completed.out) == (2, "")
+    assert message in completed.err
 
 
 def test_nothing_to_send_and_a_terminal_as_input() -> None:
     master, slave = pty.openpty()
     try:
-        done = process("send", "--port", "sim", stdin=slave)
+        completed = run_process("send", "--port", "sim", stdin=slave)
     finally:
         os.close(master)
         os.close(slave)
-    assert done.code == 2
-    assert "nothing to send" in done.err
+    assert completed.code == 2
+    assert "nothing to send" in completed.err

@@ -20,15 +20,15 @@ import pytest
 from armkin.board.firmware.wire.protocol import State
 from armkin.board.sim.sim_board import SimBoard
 from armkin.board_catalogue import BOARDS
-from command_line import COUNTS, POSE, ROOT, THREE_DOF, patiently, process, run
+from command_line import COUNTS, POSE, ROOT, THREE_DOF, run, run_patiently, run_process
 from pty_board import PtyBoard
 from pty_port import Patient
 
 
 @pytest.fixture
 def board() -> Iterator[PtyBoard]:
-    with PtyBoard() as one:
-        yield one
+    with PtyBoard() as board:
+        yield board
 
 
 def started(*words: object, stdin: int | None = None) -> subprocess.Popen[bytes]:
@@ -59,46 +59,46 @@ def on_the_line(net: Sequence[int]) -> None:
 
 def finish(board: PtyBoard) -> None:
     """The next command plans from where the arm stands."""
-    done = patiently("send", THREE_DOF, *POSE, "--port", board.port, "--json", run=process)
-    assert done.code == 0, done.err
-    assert done.json["pulses"] == COUNTS
+    completed = run_patiently("send", THREE_DOF, *POSE, "--port", board.port, "--json", run=run_process)
+    assert completed.code == 0, completed.err
+    assert completed.json["pulses"] == COUNTS
     assert board.net[:3] == COUNTS
 
 
 def test_lost_then_assumed_then_known(board: PtyBoard) -> None:
-    lost = process("send", THREE_DOF, *POSE, "--port", board.port)
+    lost = run_process("send", THREE_DOF, *POSE, "--port", board.port)
     assert lost.code == 5
     assert "position is lost" in lost.err
     assert "--assume-home" in lost.err
     assert board.net[:3] == [0, 0, 0]
-    first = process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home", "--json")
+    first = run_process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home", "--json")
     assert first.code == 0, first.err
-    again = process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home")
+    again = run_process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home")
     assert again.code == 5
     assert "position is known" in again.err
     # From where it stands, and near to it: the other branch would be nearer to home.
     finish(board)
-    status = process("status", THREE_DOF, "--port", board.port, "--json").json
+    status = run_process("status", THREE_DOF, "--port", board.port, "--json").json
     assert (status["position"], status["pulses"], status["drivers_on"]) == ("known", COUNTS, True)
 
 
 def test_a_changed_file_means_a_lost_position(board: PtyBoard, tmp_path: Path) -> None:
-    assert process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+    assert run_process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
     mine = tmp_path / "mine.yaml"
     mine.write_text((ROOT / THREE_DOF).read_text().replace("limits: [-20, 120]", "limits: [-10, 120]"))
-    done = process("send", mine, *POSE, "--port", board.port)
-    assert done.code == 5
-    assert "has changed" in done.err
-    assert process("status", THREE_DOF, "--port", board.port, "--json").json["position"] == "known"
+    completed = run_process("send", mine, *POSE, "--port", board.port)
+    assert completed.code == 5
+    assert "has changed" in completed.err
+    assert run_process("status", THREE_DOF, "--port", board.port, "--json").json["position"] == "known"
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_the_arm_first(board: PtyBoard, number: signal.Signals, code: int) -> None:
     sender = moving(board)
     sender.send_signal(number)
-    out, err = sender.communicate(timeout=60)
+    output, err = sender.communicate(timeout=60)
     assert sender.returncode == code, err
-    assert out == b""
+    assert output == b""
     assert b"stopped: the arm stands at" in err
     assert board.state == State.IDLE
     on_the_path(board.net)
@@ -133,10 +133,10 @@ def test_a_cut_line(board: PtyBoard) -> None:
 
 def test_stop_from_another_terminal(board: PtyBoard) -> None:
     sender = moving(board, speed=5)
-    busy = process("send", THREE_DOF, *POSE, "--port", board.port)
+    busy = run_process("send", THREE_DOF, *POSE, "--port", board.port)
     assert busy.code == 5
     assert f"process {sender.pid}" in busy.err
-    stop = process("stop", "--port", board.port)
+    stop = run_process("stop", "--port", board.port)
     assert stop.code == 0, stop.err
     _, err = sender.communicate(timeout=60)
     assert sender.returncode == 143, err
@@ -153,7 +153,7 @@ def test_stop_beside_a_suspended_sender() -> None:
             board.time.patience = math.inf  # the board, too, notices
             sender.send_signal(signal.SIGSTOP)
             began = time.monotonic()
-            stop = process("stop", "--port", board.port)
+            stop = run_process("stop", "--port", board.port)
             seconds.append(time.monotonic() - began)
             assert stop.code == 0, stop.err
             assert "the arm stands" in stop.err
@@ -168,8 +168,8 @@ def test_stop_beside_a_suspended_sender() -> None:
 
 
 def test_stop_without_a_sender(board: PtyBoard) -> None:
-    assert process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
-    assert process("stop", "--port", board.port).code == 0
+    assert run_process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+    assert run_process("stop", "--port", board.port).code == 0
     finish(board)
 
 
@@ -182,9 +182,9 @@ def test_rows_that_trickle_in(board: PtyBoard) -> None:
     board.until(lambda: board.net[:3] == [36, -119, 67], "at the first row")  # before the second one is written
     time.sleep(0.7)
     assert board.net[:3] == [36, -119, 67]
-    out, _ = sender.communicate(b"2,88,-88\n", timeout=60)
+    output, _ = sender.communicate(b"2,88,-88\n", timeout=60)
     assert sender.returncode == 0
-    assert json.loads(out)["waypoints"] == 2
+    assert json.loads(output)["waypoints"] == 2
     assert board.net[:3] == [71, -239, 133]
 
 
@@ -192,12 +192,12 @@ def test_rows_that_trickle_in(board: PtyBoard) -> None:
 def test_a_noisy_line(seed: int) -> None:
     """1 % of the bytes flipped and 1 % dropped, both ways: exact counts, or the arm stands on its path."""
     with PtyBoard(noise=0.01, seed=seed) as board:
-        done = process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home", "--json")
-        if done.code == 0:
+        completed = run_process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home", "--json")
+        if completed.code == 0:
             assert board.net[:3] == COUNTS
         else:  # a machine too busy to keep the queue filled: held, known, and it ends
-            assert done.code == 5
-            assert "position is known" in done.err
+            assert completed.code == 5
+            assert "position is known" in completed.err
             on_the_line(board.net)
 
 
@@ -221,7 +221,7 @@ def test_a_board_behind_a_socket() -> None:
 
         thread = threading.Thread(target=serve)
         thread.start()
-        done = run("send", THREE_DOF, 10, 80, -80, "--port", port, "--assume-home", "--json")
+        completed = run("send", THREE_DOF, 10, 80, -80, "--port", port, "--assume-home", "--json")
         thread.join()
-    assert done.code == 0, done.err
-    assert board.net[:3] == done.json["pulses"] == [356, -1193, 667]
+    assert completed.code == 0, completed.err
+    assert board.net[:3] == completed.json["pulses"] == [356, -1193, 667]

@@ -11,10 +11,10 @@ from command_line import COUNTS, POSE, ROOT, THREE_DOF, run
 
 
 def test_a_dry_run_moves_nothing_and_needs_no_port() -> None:
-    done = run("send", THREE_DOF, *POSE, "--dry-run", "--json")
-    assert done.code == 0
-    assert done.json["dry_run"] is True
-    assert done.json["moves"] == COUNTS
+    completed = run("send", THREE_DOF, *POSE, "--dry-run", "--json")
+    assert completed.code == 0
+    assert completed.json["dry_run"] is True
+    assert completed.json["moves"] == COUNTS
     text = run("send", THREE_DOF, *POSE, "--dry-run")
     assert "nothing moves" in text.out
     assert "-10144" in text.out
@@ -63,31 +63,31 @@ def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: 
     values = [float(x) for x in (arm.home / [1.0 if slides else 0.0174532925199433 for slides in arm.prismatic])]
     goal = [value + 1 if value < 50 else value - 1 for value in values]
     for words in (("--dry-run",), ("--port", "sim")):
-        done = run("send", path, *goal, "--json", *words)
+        completed = run("send", path, *goal, "--json", *words)
         lacks = missing_for_motion(arm, board=False)
         if lacks and "sim" not in words:
-            assert done.code == 2
-            assert all(lack in done.err for lack in lacks)
-            assert "max_accel: 60 " in done.err
+            assert completed.code == 2
+            assert all(lack in completed.err for lack in lacks)
+            assert "max_accel: 60 " in completed.err
         else:
-            assert not lacks or "max_accel of " in done.err  # what is assumed is named
-            assert done.code == 0, done.err
-            assert done.json["joints"] == pytest.approx(goal, abs=0.2)
+            assert not lacks or "max_accel of " in completed.err  # what is assumed is named
+            assert completed.code == 0, completed.err
+            assert completed.json["joints"] == pytest.approx(goal, abs=0.2)
 
 
 def test_a_real_port_still_needs_a_board_and_all_is_said_at_once(tmp_path: Path) -> None:
     mine = tmp_path / "mine.yaml"
     text = (ROOT / THREE_DOF).read_text()
     mine.write_text(text[: text.index("board: {kind")].replace("    max_accel: 120\n", "", 1))
-    done = run("send", mine, *POSE, "--port", tmp_path / "none")
-    assert done.code == 2
+    completed = run("send", mine, *POSE, "--port", tmp_path / "none")
+    assert completed.code == 2
     for words in (
         "joint q1 has no max_accel",
         "it has no board",
         "max_accel: 60 ",
         "board: {kind: uno_cnc_shield, driver: A4988}",
     ):
-        assert words in done.err
+        assert words in completed.err
 
 
 def test_a_redundant_arm_is_sent_to_a_target_with_a_joint_held(tmp_path: Path) -> None:
@@ -100,10 +100,10 @@ def test_a_redundant_arm_is_sent_to_a_target_with_a_joint_held(tmp_path: Path) -
     path.write_text("\n".join(lines))
     words = ("send", path, "--target", "400,0,400,180,0,0", "--dry-run", "--json")
     assert run(*words).json["position_mm"] == pytest.approx([400, 0, 400], abs=0.1)
-    done = run(*words, "--lock", "J3=20")
-    assert done.code == 0, done.err
-    assert done.json["joints"][2] == pytest.approx(20, abs=0.01)
-    assert done.json["position_mm"] == pytest.approx([400, 0, 400], abs=0.1)
+    completed = run(*words, "--lock", "J3=20")
+    assert completed.code == 0, completed.err
+    assert completed.json["joints"][2] == pytest.approx(20, abs=0.01)
+    assert completed.json["position_mm"] == pytest.approx([400, 0, 400], abs=0.1)
     alone = run("send", THREE_DOF, 0, 90, -90, "--lock", "q1=1", "--dry-run")
     assert (alone.code, alone.out) == (2, "")
     assert "--branch, --task, --near and --lock belong to --target" in alone.err
@@ -114,15 +114,15 @@ def test_bus_servos_without_a_board_are_told_which(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text((ROOT / "robots/so100.yaml").read_text().replace("board: {kind: feetech}\n", ""))
     for words in (("--dry-run",), ("--port", "sim")):
-        done = run("send", path, "home", *words)
-        assert (done.code, done.out) == (2, "")
-        assert "add to" in done.err
-        assert "board: {kind: feetech}" in done.err
+        completed = run("send", path, "home", *words)
+        assert (completed.code, completed.out) == (2, "")
+        assert "add to" in completed.err
+        assert "board: {kind: feetech}" in completed.err
 
 
 def test_an_export_beyond_what_a_robot_file_takes_prints_nothing(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     path.write_text((ROOT / "robots/three_dof.yaml").read_text().replace("a: 197, d: -10", "a: 10000000, d: -10", 1))
     assert run("info", path).code == 0
-    done = run("export", path, "--screws")
-    assert (done.code, done.out) == (4, "")
+    completed = run("export", path, "--screws")
+    assert (completed.code, completed.out) == (4, "")

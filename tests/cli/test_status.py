@@ -82,6 +82,6 @@ def test_a_watched_terminal_is_drawn_where_something_changes(monkeypatch: pytest
 
 
 def test_a_table_wider_than_a_terminal_stands_upright() -> None:
-    done = run("send", "so101", 20, 10, -30, 40, 0, "--port", "sim")
-    assert max(map(len, done.out.splitlines())) <= 80
-    assert "  shoulder_pan/deg    20.0391\n" in done.out
+    completed = run("send", "so101", 20, 10, -30, 40, 0, "--port", "sim")
+    assert max(map(len, completed.out.splitlines())) <= 80
+    assert "  shoulder_pan/deg    20.0391\n" in completed.out

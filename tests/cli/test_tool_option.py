@@ -16,9 +16,9 @@ MADE_WITH = ("robot_file", "robot_sha256", "tool", "seconds")
 @pytest.fixture
 def other(tmp_path: Path) -> Path:
     """puma560 with that tool in its file."""
-    data = yaml.safe_load((ROOT / "robots" / "puma560.yaml").read_text())
+    document = yaml.safe_load((ROOT / "robots" / "puma560.yaml").read_text())
     path = tmp_path / "puma560.yaml"
-    path.write_text(yaml.safe_dump({**data, "tool": TOOL}))
+    path.write_text(yaml.safe_dump({**document, "tool": TOOL}))
     return path
 
 
@@ -39,12 +39,12 @@ def _bare(answer: dict[str, Any]) -> dict[str, Any]:
 )
 def test_answers_are_those_of_a_file_with_that_tool(words: tuple[str, ...], other: Path) -> None:
     command, *rest = words
-    got = run(command, "puma560", *rest, GIVEN, "--json")
+    completed = run(command, "puma560", *rest, GIVEN, "--json")
     want = run(command, other, *rest, "--json")
-    assert got.code == want.code == 0, got.err + want.err
-    assert got.json["tool"] == TOOL
+    assert completed.code == want.code == 0, completed.err + want.err
+    assert completed.json["tool"] == TOOL
     assert "tool" not in want.json
-    assert _bare(got.json) == _bare(want.json)
+    assert _bare(completed.json) == _bare(want.json)
 
 
 def test_three_numbers_turn_nothing() -> None:

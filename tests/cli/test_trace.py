@@ -29,8 +29,8 @@ def test_trace_tells_bytes_and_states_on_stderr_and_nothing_else_changes(robot: 
 
 
 def test_send_s_trace_is_its_plan_and_log_tells_the_line() -> None:
-    done = run("send", THREE_DOF, 1, 89, -89, "--port", "sim", "--log")
-    assert (done.code, " DEBUG " in done.err) == (0, True)
+    completed = run("send", THREE_DOF, 1, 89, -89, "--port", "sim", "--log")
+    assert (completed.code, " DEBUG " in completed.err) == (0, True)
     assert run("send", THREE_DOF, 1, 89, -89, "--dry-run", "--trace", "-").out.startswith("time")
 
 

@@ -34,16 +34,16 @@ def calibration(tmp_path: Path) -> Path:
 
 def changed(path: Path, name: str, **values: Any) -> None:
     """The calibration file with other values of a motor; None: without that key."""
-    told = json.loads(path.read_text())
-    told[name] = {key: value for key, value in (told[name] | values).items() if value is not None}
-    path.write_text(json.dumps(told))
+    answer = json.loads(path.read_text())
+    answer[name] = {key: value for key, value in (answer[name] | values).items() if value is not None}
+    path.write_text(json.dumps(answer))
 
 
 def test_zeros_limits_and_directions_are_the_file_s(calibration: Path, tmp_path: Path) -> None:
     mine = tmp_path / "mine.yaml"
-    done = run("zero", "so101", "--from", calibration, "-o", mine, "--json")
-    assert done.code == 0, done.err
-    assert done.json["zero"] == [2111.5, 2016, 2005.5, 2032.5, 2047.5]
+    completed = run("zero", "so101", "--from", calibration, "-o", mine, "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["zero"] == [2111.5, 2016, 2005.5, 2032.5, 2047.5]
     arm = armkin.load(mine)
     motors = list(FILE.values())[:5]
     for j, motor in enumerate(motors):
@@ -60,7 +60,7 @@ def test_zeros_limits_and_directions_are_the_file_s(calibration: Path, tmp_path:
     assert jaw is not None
     assert jaw.zero + jaw.open * 4096 / 360 == pytest.approx(3363, abs=1e-3)
     assert jaw.zero + jaw.closed * 4096 / 360 == pytest.approx(1899, abs=1e-3)
-    assert done.json["gripper_ends"] == pytest.approx([732 * 360 / 4096, -732 * 360 / 4096])
+    assert completed.json["gripper_ends"] == pytest.approx([732 * 360 / 4096, -732 * 360 / 4096])
     assert "2111.5" in run("zero", "so101", "--from", calibration).out
 
 
@@ -83,8 +83,8 @@ def test_a_zero_far_from_the_middle_of_its_limits_wants_the_pose(calibration: Pa
     arm = armkin.load("so100")
     middle = np.rad2deg(arm.lower + arm.upper) / 2
     pose = ",".join(f"{value:.4f}" for value in middle)
-    done = run("zero", "so100", "--from", calibration, "--pose", pose, "-o", tmp_path / "mine.yaml", "--json")
-    assert done.code == 0, done.err
+    completed = run("zero", "so100", "--from", calibration, "--pose", pose, "-o", tmp_path / "mine.yaml", "--json")
+    assert completed.code == 0, completed.err
     mine = armkin.load(tmp_path / "mine.yaml")
     for j, motor in enumerate(list(FILE.values())[:5]):
         assert armkin.pulses(mine, np.deg2rad(middle))[j] == pytest.approx(
@@ -111,26 +111,29 @@ def test_a_file_that_does_not_fit_is_refused_with_the_joint(
     calibration: Path, tmp_path: Path, name: str, values: dict[str, Any], code: int, says: str
 ) -> None:
     changed(calibration, name, **values)
-    done = run("zero", "so101", "--from", calibration, "-o", tmp_path / "mine.yaml")
-    assert (done.code, done.out) == (code, "")
-    assert says in done.err
+    completed = run("zero", "so101", "--from", calibration, "-o", tmp_path / "mine.yaml")
+    assert (completed.code, completed.out) == (code, "")
+    assert says in completed.err
     assert not (tmp_path / "mine.yaml").exists()
 
 
 def test_two_motors_that_have_changed_places_are_refused(calibration: Path) -> None:
     changed(calibration, "elbow_flex", id=4)
     changed(calibration, "wrist_flex", id=3)
-    done = run("zero", "so101", "--from", calibration)
-    assert (done.code, "joint elbow_flex is servo 3, which is wrist_flex in the file" in done.err) == (2, True)
+    completed = run("zero", "so101", "--from", calibration)
+    assert (completed.code, "joint elbow_flex is servo 3, which is wrist_flex in the file" in completed.err) == (
+        2,
+        True,
+    )
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", "null", '{"a": 1}', "[" * 100_000, "\x00", '{"a": {"id": NaN}}'])
 def test_what_is_no_calibration_file_is_said(tmp_path: Path, text: str) -> None:
     path = tmp_path / "no.json"
     path.write_text(text)
-    done = run("zero", "so101", "--from", path)
-    assert (done.code, done.out, done.err.count("\n") <= 2) == (1, "", True)
-    assert str(path) in done.err
+    completed = run("zero", "so101", "--from", path)
+    assert (completed.code, completed.out, completed.err.count("\n") <= 2) == (1, "", True)
+    assert str(path) in completed.err
     assert run("zero", "so101", "--from", tmp_path / "missing.json").code == 1
     assert run("zero", "three_dof", "--from", path).code == 2
 
@@ -141,8 +144,8 @@ def test_with_a_port_the_file_is_compared_with_the_servos(calibration: Path, tmp
         servo.set(registers.OFFSET, motor["homing_offset"])
     with PtyPort(ServoBus(servos)) as pty:
         mine = tmp_path / "mine.yaml"
-        done = run("zero", "so101", "--from", calibration, "--port", pty.name, "-o", mine, "--json")
-        assert (done.code, done.json["port"]) == (0, pty.name), done.err
+        completed = run("zero", "so101", "--from", calibration, "--port", pty.name, "-o", mine, "--json")
+        assert (completed.code, completed.json["port"]) == (0, pty.name), completed.err
         servos[2].set(registers.OFFSET, -985)
         mine.unlink()
         refused = run("zero", "so101", "--from", calibration, "--port", pty.name, "-o", mine)

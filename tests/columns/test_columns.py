@@ -292,9 +292,9 @@ def test_bad_archives_are_told(tmp_path: Path) -> None:
         ("g.jsonl", 'row 1: y: "two" is no number'),
         ("h.npz", "cannot read"),
     ):
-        done = run("ik", THREE_DOF, "--batch", tmp_path / name)
-        assert done.code in (1, 2), name
-        assert said in done.err, done.err
+        completed = run("ik", THREE_DOF, "--batch", tmp_path / name)
+        assert completed.code in (1, 2), name
+        assert said in completed.err, completed.err
 
 
 def test_the_error_of_unfinished_parts_has_its_fields(tmp_path: Path) -> None:

@@ -102,9 +102,9 @@ def test_joints_half_a_turn_from_near_say_what_python_says(robot: str) -> None:
     fast, target = armkin.compile(arm), questions(arm, "corners", 200)
     each = np.pi / 4 * np.random.default_rng(5).integers(-4, 5, (200, arm.n))
     for near in (np.zeros(arm.n), np.full(arm.n, -np.pi / 2), each):
-        found = armkin.ik(arm, target, near=near)
-        same(found, fast.ik(target, near=near))
-        assert (np.abs(np.abs(found.q - found.near[:, None]) - np.pi) < 1e-9).any()
+        solutions = armkin.ik(arm, target, near=near)
+        same(solutions, fast.ik(target, near=near))
+        assert (np.abs(np.abs(solutions.q - solutions.near[:, None]) - np.pi) < 1e-9).any()
         alone = near if near.ndim == 1 else near[7]
         same(armkin.ik(arm, target[7], near=alone), fast.ik(target[7], near=alone))
 
@@ -233,10 +233,10 @@ def test_without_a_place_to_keep_it_it_is_built_all_the_same(monkeypatch: pytest
 def test_without_a_compiler_one_line_says_what_to_install() -> None:
     code = "import armkin; armkin.compile(armkin.load('robots/three_dof.yaml'))"
     environment = {**os.environ, "PATH": str(Path(sys.executable).parent), "CC": ""}
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment, cwd=ROBOTS.parent
     )
-    last = done.stderr.strip().splitlines()[-1]
+    last = completed.stderr.strip().splitlines()[-1]
     assert last.startswith("armkin.errors.MissingExtraError: a C compiler is needed and none is installed: apt install")
 
 
@@ -272,9 +272,9 @@ def test_a_posture_on_its_limit_stays() -> None:
     T[:3, 3] = np.round(T[:3, 3], 6)
     fast = armkin.compile(arm)
     for target in (T, np.stack([T] * 3)):
-        found = fast.ik(target, near=q)
-        same(found, armkin.ik(arm, target, near=q))
-        assert np.abs(found.q.reshape(-1, 8, 6)[0, np.ravel(found.best)[0]] - q).max() < 1e-12
+        solutions = fast.ik(target, near=q)
+        same(solutions, armkin.ik(arm, target, near=q))
+        assert np.abs(solutions.q.reshape(-1, 8, 6)[0, np.ravel(solutions.best)[0]] - q).max() < 1e-12
 
 
 @pytest.mark.parametrize("robot", ["three_dof", "puma560", "ur5e", "jaco_j2n6s300"])
@@ -308,12 +308,12 @@ def test_results_keep_their_own_targets(robot: str) -> None:
     target, near = questions(arm, "random", 3), np.random.default_rng(2).uniform(-1, 1, (3, arm.n))
     for goal, close in ((target, near), (target[0], near[0]), (target, near[0])):
         asked, beside = goal.copy(), close.copy()
-        found = fast.ik(asked, near=beside)
-        best = found.best
+        solutions = fast.ik(asked, near=beside)
+        best = solutions.best
         asked[...], beside[...] = 0.0, 2.0
-        np.testing.assert_array_equal(found.target, goal)
-        np.testing.assert_array_equal(found.near, np.broadcast_to(close, found.near.shape))
-        np.testing.assert_array_equal(found.best, best)
+        np.testing.assert_array_equal(solutions.target, goal)
+        np.testing.assert_array_equal(solutions.near, np.broadcast_to(close, solutions.near.shape))
+        np.testing.assert_array_equal(solutions.best, best)
 
 
 @pytest.mark.parametrize("workers", [0, -1, 1.5, 2.0, "2", None, float("nan")])
@@ -342,10 +342,10 @@ def test_roots_that_solutions_share_are_taken_apart_in_c(
         request.getfixturevalue("quickly")
     own = armkin.ik(arm, T)
     asked = left_to_python(monkeypatch)
-    found = armkin.compile(arm).ik(T)
+    solutions = armkin.compile(arm).ik(T)
     assert sum(asked) <= 1
     assert own.valid.sum() > 100
-    found_by_elimination(found, own)
+    found_by_elimination(solutions, own)
 
 
 @pytest.mark.usefixtures("quickly")
@@ -355,11 +355,11 @@ def test_an_arm_off_its_class_is_solved_in_c_and_named_after_it(monkeypatch: pyt
     target = questions(arm, "random", 60)
     own, one = armkin.ik(arm, target), armkin.ik(arm, target[0])
     asked = left_to_python(monkeypatch)
-    found = armkin.compile(arm).ik(target)
+    solutions = armkin.compile(arm).ik(target)
     assert sum(asked) <= 1
-    assert found.method == "general elimination"
-    assert "flip" in found.names[0]
-    found_by_elimination(found, own)
+    assert solutions.method == "general elimination"
+    assert "flip" in solutions.names[0]
+    found_by_elimination(solutions, own)
     found_by_elimination(armkin.compile(arm).ik(target[0]), one)
 
 
@@ -386,7 +386,7 @@ def test_targets_on_an_edge_are_eliminated_in_c(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(method, "solve", counted)
     asked = left_to_python(monkeypatch)
-    found = fast.ik(target)
+    solutions = fast.ik(target)
     assert sum(asked) > 5
     assert sum(eliminated) <= 2
-    found_by_elimination(found, own)
+    found_by_elimination(solutions, own)

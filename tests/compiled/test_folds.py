@@ -39,16 +39,16 @@ def test_merging_branches_are_told_without_python(arm: armkin.Arm, monkeypatch: 
     fast, target = armkin.compile(arm), beside_folds(arm)
     expected = armkin.ik(arm, target)
     left = left_to_python(monkeypatch)
-    found = fast.ik(target)
+    solutions = fast.ik(target)
     assert sum(left) < COUNT / 4
-    assert {0, 1} <= set(found.status.tolist())
+    assert {0, 1} <= set(solutions.status.tolist())
     for field in ("status", "valid", "within_limits", "branch", "free", "complete"):
-        assert np.array_equal(getattr(found, field), getattr(expected, field)), field
+        assert np.array_equal(getattr(solutions, field), getattr(expected, field)), field
     # before a sum of joints is taken off a target is rounded otherwise
     off = np.full(COUNT, 1e-12)
     if len(task_for(arm).sums):
         off += np.minimum(ROOT, ROOT**2 / BESIDE)
-    for q in (found.q, np.stack([fast.ik(one).q for one in target])):
+    for q in (solutions.q, np.stack([fast.ik(one).q for one in target])):
         assert np.array_equal(np.isnan(q), np.isnan(expected.q))
         assert (np.nan_to_num(np.abs(q - expected.q)).max(axis=(1, 2)) < off).all()
     np.testing.assert_array_equal([fast.ik(one).status for one in target], expected.status)
@@ -57,9 +57,9 @@ def test_merging_branches_are_told_without_python(arm: armkin.Arm, monkeypatch: 
 def test_a_posture_on_a_fold_that_near_has_stays() -> None:
     arm = armkin.load("three_dof")
     q = np.array([0.3, 0.5, 1e-6])
-    found = armkin.compile(arm).ik(armkin.fk(arm, q)[:3, 3], near=q)
-    assert found.status == armkin.Status.BOUNDARY
-    assert np.array_equal(found.q[found.best], q)
+    solutions = armkin.compile(arm).ik(armkin.fk(arm, q)[:3, 3], near=q)
+    assert solutions.status == armkin.Status.BOUNDARY
+    assert np.array_equal(solutions.q[solutions.best], q)
 
 
 @pytest.mark.parametrize("name", ["puma560", "ur5e", "irb120"])
@@ -70,12 +70,12 @@ def test_short_self_motions_are_told_without_python(arm: armkin.Arm, monkeypatch
     fast, target = armkin.compile(arm), armkin.fk(arm, q)
     expected = armkin.ik(arm, target)
     left = left_to_python(monkeypatch)
-    found = fast.ik(target)
+    solutions = fast.ik(target)
     told = COUNT - sum(left)
     assert told > (expected.status != armkin.Status.SINGULAR).sum() + COUNT / 4
     for field in ("status", "valid", "within_limits", "branch", "free", "complete"):
-        assert np.array_equal(getattr(found, field), getattr(expected, field)), field
-    np.testing.assert_allclose(found.q, expected.q, rtol=0, atol=1e-12)
+        assert np.array_equal(getattr(solutions, field), getattr(expected, field)), field
+    np.testing.assert_allclose(solutions.q, expected.q, rtol=0, atol=1e-12)
     for one, status, free in zip(map(fast.ik, target), expected.status, expected.free, strict=True):
         assert one.status == status
         assert np.array_equal(one.free, free)

@@ -32,8 +32,8 @@ def test_a_task_by_name_is_built_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     fast = armkin.compile(arm, "xyz_axis")
     T = armkin.fk(arm, arm.home)
     np.testing.assert_allclose(fast.fk(arm.home), T, atol=1e-9)
-    found = fast.ik(np.concatenate([T[:3, 3], T[:3, 2]]), "xyz_axis")
-    assert found.status == armkin.Status.EXACT
+    solutions = fast.ik(np.concatenate([T[:3, 3], T[:3, 2]]), "xyz_axis")
+    assert solutions.status == armkin.Status.EXACT
     assert len(contents) == 2  # the chain; five joints, a sixth held
 
 
@@ -49,6 +49,6 @@ def test_the_files_task_is_not_the_one_that_the_structure_suggests() -> None:
     arm = replace(armkin.load("so101"), task="xyz_axis")
     fast, T = armkin.compile(arm, "xyz_pitch_roll"), armkin.fk(arm, arm.home + 0.1)
     target = np.concatenate([T[:3, 3], T[:3, 2]])
-    found = fast.ik(target)
-    assert found.task.name == "xyz_axis"
-    assert found.valid.sum() == armkin.ik(arm, target).valid.sum() > 0
+    solutions = fast.ik(target)
+    assert solutions.task.name == "xyz_axis"
+    assert solutions.valid.sum() == armkin.ik(arm, target).valid.sum() > 0

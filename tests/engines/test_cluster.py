@@ -87,9 +87,9 @@ def test_a_batch_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path, mo
 def test_work_is_shared_by_one_kind_of_engine(tmp_path: Path) -> None:
     """Before anything is connected to, or written."""
     words = ("reach", "three_dof", "--grid", 200, "--out", tmp_path / "one.npz")
-    found = run(*words, "--workers", 2, "--cluster", "tcp://127.0.0.1:1")
-    assert found.code == 2
-    assert "workers and a cluster: the cluster has" in found.err
+    completed = run(*words, "--workers", 2, "--cluster", "tcp://127.0.0.1:1")
+    assert completed.code == 2
+    assert "workers and a cluster: the cluster has" in completed.err
     assert not [*tmp_path.iterdir()]
 
 

@@ -93,7 +93,7 @@ def agreement(arm: armkin.Arm, folder: Path, count: int) -> Agreement:
     q = postures(arm, count)
     T = armkin.fk(arm, q)
     target = targets_of(task, T, q)
-    found = armkin.ik(arm, target)
+    solutions = armkin.ik(arm, target)
     doubles = ctypes.c_double * n
 
     class Solution(ctypes.Structure):
@@ -105,7 +105,7 @@ def agreement(arm: armkin.Arm, folder: Path, count: int) -> Agreement:
     rows = np.ascontiguousarray(target.reshape(count, -1))
     fk.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
     ik.argtypes = [ctypes.c_void_p, doubles, Solution * 64, ctypes.POINTER(ctypes.c_int)]
-    valid, mine, legal, status = found.valid, found.q, found.within_limits, found.status
+    valid, mine, legal, status = solutions.valid, solutions.q, solutions.within_limits, solutions.status
     q = np.ascontiguousarray(q)
     unit = np.where(arm.prismatic, arm.reach, 1.0)
     for k in range(count):

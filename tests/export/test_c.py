@@ -39,10 +39,10 @@ def written(folder: Path, robot: str, single: bool = False) -> Path:
 
 
 def run(*command: str | Path, folder: Path) -> str:
-    done = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
-    assert not done.stderr
-    return done.stdout
+    completed = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stdout[-2000:] + completed.stderr[-4000:]
+    assert not completed.stderr
+    return completed.stdout
 
 
 @pytest.mark.parametrize("robot", [*CLOSED, *GENERAL, "panda", "kinova_gen3"])
@@ -83,9 +83,9 @@ def test_a_wrong_number_fails_the_test_program(tmp_path: Path) -> None:
     source = written(tmp_path, "three_dof")
     source.write_text(source.read_text().replace("170.0", "171.0"))
     run("gcc", *WARNINGS, source, "three_dof_test.c", "-lm", "-o", "test", folder=tmp_path)
-    done = subprocess.run(["./test"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 8
-    assert "not what armkin says" in done.stdout
+    completed = subprocess.run(["./test"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert completed.returncode == 8
+    assert "not what armkin says" in completed.stdout
 
 
 @pytest.mark.parametrize("robot", ["three_dof", "ur5e", "jaco_j2n6s300"])
@@ -143,16 +143,16 @@ def test_a_calibrated_arm_takes_and_gives_commanded_values(tmp_path: Path) -> No
 
 
 def test_the_command_writes_three_files(tmp_path: Path) -> None:
-    done = run_armkin("export", "robots/three_dof.yaml", "--c", "--float", "--out", tmp_path / "arm.c")
-    assert done.code == 0
+    completed = run_armkin("export", "robots/three_dof.yaml", "--c", "--float", "--out", tmp_path / "arm.c")
+    assert completed.code == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["arm.c", "arm.h", "arm_test.c"]
     assert "typedef float three_dof_real;" in (tmp_path / "arm.h").read_text()
 
 
 @pytest.mark.parametrize("name", ["arm_ik", "arm_real", "an arm", "Größe", "int", "@stem@"])
 def test_the_source_may_have_any_name(name: str, tmp_path: Path) -> None:
-    done = run_armkin("export", "three_dof", "--c", "--out", tmp_path / f"{name}.c")
-    assert done.code == 0
+    completed = run_armkin("export", "three_dof", "--c", "--out", tmp_path / f"{name}.c")
+    assert completed.code == 0
     run("gcc", *WARNINGS, f"{name}.c", f"{name}_test.c", "-lm", "-o", "test", folder=tmp_path)
     assert run("./test", folder=tmp_path) == "8 postures, 0 failed\n"
 
@@ -166,16 +166,16 @@ def test_words_of_a_robot_file_stay_within_their_comment(tmp_path: Path) -> None
 @pytest.mark.parametrize("name", ["arm.c", "arm.h", "arm_test.c"])
 def test_a_file_that_cannot_be_written_leaves_the_others_as_they_were(name: str, tmp_path: Path) -> None:
     (tmp_path / name).mkdir()
-    done = run_armkin("export", "three_dof", "--c", "--out", tmp_path / "arm.c")
-    assert done.code == 1
-    assert f"{name}: cannot write: Is a directory" in done.err
+    completed = run_armkin("export", "three_dof", "--c", "--out", tmp_path / "arm.c")
+    assert completed.code == 1
+    assert f"{name}: cannot write: Is a directory" in completed.err
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
 def test_a_header_that_cannot_be_included_is_refused(tmp_path: Path) -> None:
-    done = run_armkin("export", "three_dof", "--c", "--out", tmp_path / 'a"b.c')
-    assert done.code == 2
-    assert "#include cannot name a header with a quote" in done.err
+    completed = run_armkin("export", "three_dof", "--c", "--out", tmp_path / 'a"b.c')
+    assert completed.code == 2
+    assert "#include cannot name a header with a quote" in completed.err
     assert not list(tmp_path.iterdir())
 
 
@@ -265,10 +265,10 @@ def test_a_free_joint_that_cannot_stay_at_near_is_asked_elsewhere(robot: str, tm
     ],
 )
 def test_what_cannot_be_exported_is_refused_in_words(words: list[str], said: str) -> None:
-    done = run_armkin("export", f"robots/{words[0]}", *words[1:])
-    assert done.code == 2
-    assert said in done.err
-    assert not done.out
+    completed = run_armkin("export", f"robots/{words[0]}", *words[1:])
+    assert completed.code == 2
+    assert said in completed.err
+    assert not completed.out
 
 
 def built(folder: Path, arm: armkin.Arm, single: bool = False) -> str:

@@ -100,8 +100,8 @@ def test_roots_that_solutions_share_are_taken_apart(tmp_path: Path) -> None:
     assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
     inside = "import { readFileSync } from 'node:fs';\n" + (tmp_path / "arm.mjs").read_text() + _DOUBTS
     (tmp_path / "doubts.mjs").write_text(inside)
-    told = subprocess.run(["node", "doubts.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True)
-    assert json.loads(told.stdout) == [False] * len(q)
+    completed = subprocess.run(["node", "doubts.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert json.loads(completed.stdout) == [False] * len(q)
 
 
 SINGULAR: dict[str, list[list[float]]] = {
@@ -243,12 +243,12 @@ def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
     j, joint = spare.joint, arm.joint_names[spare.joint]
     assert told["redundant"] == joint
     for posture, target, answer in zip(q, targets, told["ik"], strict=True):
-        rest = armkin.lock(arm, {joint: posture[j]})
-        s = armkin.ik(rest, target[None], task, near=np.delete(posture, j))
+        locked_arm = armkin.lock(arm, {joint: posture[j]})
+        s = armkin.ik(locked_arm, target[None], task, near=np.delete(posture, j))
         assert {row["joints"][j] for row in answer["branches"]} == {posture[j]}
         for row in answer["branches"]:
             del row["joints"][j]
-        assert not differences(rest, [answer], s)
+        assert not differences(locked_arm, [answer], s)
 
 
 def test_surfaces_of_postures_are_counted_by_the_curves_that_they_are_swept_from(tmp_path: Path) -> None:

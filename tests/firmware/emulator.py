@@ -58,9 +58,9 @@ def make(*arguments: str) -> None:
     BUILD.mkdir(exist_ok=True)
     with (BUILD / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        done = subprocess.run(["make", *arguments], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise BoardError(f"make {' '.join(arguments)}:\n{done.stdout}{done.stderr}")
+        completed = subprocess.run(["make", *arguments], capture_output=True, text=True, check=False)
+    if completed.returncode:
+        raise BoardError(f"make {' '.join(arguments)}:\n{completed.stdout}{completed.stderr}")
 
 
 def build_simulator(board: str = "uno_cnc_shield") -> list[str]:

@@ -13,7 +13,7 @@ from pins import net
 
 import armkin
 from armkin.errors import NoSolutionError
-from command_line import THREE_DOF, patiently, run
+from command_line import THREE_DOF, run, run_patiently
 from starting_elsewhere import Result, judged
 
 
@@ -27,7 +27,7 @@ def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Seque
     file.write_text(json.dumps(moves))
     axes = board.stats()["axes"]
     assume = [] if any(axes[name]["positive"] or axes[name]["negative"] for name in "XYZ") else ["--assume-home"]
-    there = patiently("send", THREE_DOF, *place, "--port", board.port, *assume)
+    there = run_patiently("send", THREE_DOF, *place, "--port", board.port, *assume)
     assert there.code == 0, there.err
     before, begin = net(board), 0
 
@@ -37,12 +37,12 @@ def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Seque
         before, begin = net(board), board.control("cycles")["cycle"]
         return run(*words)
 
-    done = patiently("path", THREE_DOF, file, "--port", board.port, "--json", run=noted)
-    if done.code == 3:
+    completed = run_patiently("path", THREE_DOF, file, "--port", board.port, "--json", run=noted)
+    if completed.code == 3:
         assert net(board) == before
-        raise NoSolutionError(done.err.strip())
-    assert done.code == 0, done.err
-    assert net(board) == done.json["pulses"]
+        raise NoSolutionError(completed.err.strip())
+    assert completed.code == 0, completed.err
+    assert net(board) == completed.json["pulses"]
     trace = board.trace()
     steps = [(when[when > begin], way[when > begin]) for when, way in map(trace.steps, "XYZ")]
     cycle = np.concatenate([when for when, _ in steps])

@@ -115,9 +115,9 @@ def test_the_analyser_prints_what_the_emulated_pins_did(board: Any) -> None:
     build_simulator(PICO)  # the analyser runs in it, whichever board made the waveform
     wave = waveform(*board())
     command = ["node", str(Path(__file__).with_name("analyser_runner.mjs")), str(BUILD / "analyser.uf2")]
-    done = subprocess.run(command, input=json.dumps(wave), capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    table = json.loads(done.stdout.splitlines()[-1])
+    completed = subprocess.run(command, input=json.dumps(wave), capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stderr
+    table = json.loads(completed.stdout.splitlines()[-1])
     assert table["lost"] == 0
     for axis, name in enumerate(SEEN):
         got = table["axes"][name]

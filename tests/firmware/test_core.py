@@ -41,15 +41,15 @@ def test_every_board_builds_without_warnings_and_fits(board: str) -> None:
 
 
 def test_flash_says_which_port_is_missing() -> None:
-    done = subprocess.run(["make", "-C", str(FIRMWARE), "flash"], capture_output=True, text=True, check=False)
-    assert done.returncode != 0
-    assert "say which port: make flash PORT=" in done.stdout + done.stderr
+    completed = subprocess.run(["make", "-C", str(FIRMWARE), "flash"], capture_output=True, text=True, check=False)
+    assert completed.returncode != 0
+    assert "say which port: make flash PORT=" in completed.stdout + completed.stderr
 
 
 def test_an_unknown_board_is_refused_by_name() -> None:
-    done = subprocess.run(["make", "-C", str(FIRMWARE), "BOARD=uno"], capture_output=True, text=True, check=False)
-    assert done.returncode != 0
-    assert "BOARD is one of: uno_cnc_shield mega_ramps14 uno_servos pico6" in done.stderr
+    completed = subprocess.run(["make", "-C", str(FIRMWARE), "BOARD=uno"], capture_output=True, text=True, check=False)
+    assert completed.returncode != 0
+    assert "BOARD is one of: uno_cnc_shield mega_ramps14 uno_servos pico6" in completed.stderr
 
 
 def build_like_the_ide(folder: Path, mcu: str, variant: str, name: str) -> Path:

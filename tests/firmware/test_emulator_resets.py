@@ -170,8 +170,8 @@ def test_it_runs_for_people_too(probe: Path, tmp_path: Path) -> None:
 
     link.parent.mkdir()
     link.write_text("somebody's file")
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "no symbolic link" in done.stderr
+    completed = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert completed.returncode == 2
+    assert "no symbolic link" in completed.stderr
     assert link.read_text() == "somebody's file"
     shutil.rmtree(folder)

@@ -32,8 +32,8 @@ def test_a_lost_arm_is_brought_home_by_keys_and_a_motor_turns_the_other_way(
 
     monkeypatch.setattr("armkin.cli.commands.begin.keys", keys_of)
     with EmulatedBoard("uno_cnc_shield") as board:
-        done = run("begin", path, "--port", board.port)
-        assert done.code == 0, done.err
+        completed = run("begin", path, "--port", board.port)
+        assert completed.code == 0, completed.err
         assert not person.keys
         assert armkin.load(path).motors[1].invert
         steps = board.net()

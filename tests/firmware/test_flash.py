@@ -72,9 +72,9 @@ def test_an_empty_board_runs_armkin(kind: str, uploader: str, empty: Make, monke
     if uploader == "armkin":
         monkeypatch.setattr("armkin.flash.avrdude.find_avrdude", lambda: None)
     with empty(kind) as board:
-        done = run("flash", "--board", kind, "--port", board.port, "--json")
-        assert done.code == 0, done.err
-        answer = done.json
+        completed = run("flash", "--board", kind, "--port", board.port, "--json")
+        assert completed.code == 0, completed.err
+        answer = completed.json
         assert (answer["board"], answer["uploader"], answer["firmware"]) == (kind, uploader, "2.0")
         assert 20_000 < answer["bytes"] < 32_000
         if kind == "uno_cnc_shield":  # and a motor turns: its second command
@@ -87,10 +87,10 @@ def test_a_cut_in_the_middle_is_told_and_the_same_command_repeats_it(empty: Make
     command = ("flash", "--board", "uno_cnc_shield", "--port")
     with empty("uno_cnc_shield") as board:
         board.control("after 1s cut both")
-        done = run(*command, board.port)
-        assert done.code == 5
-        assert "bytes were written, so that the board has no whole program now" in done.err
-        assert "the same command writes it again" in done.err
+        completed = run(*command, board.port)
+        assert completed.code == 5
+        assert "bytes were written, so that the board has no whole program now" in completed.err
+        assert "the same command writes it again" in completed.err
         board.control("restore")
         assert run(*command, board.port).code == 0
 
@@ -99,10 +99,10 @@ def test_a_cut_in_the_middle_is_told_and_the_same_command_repeats_it(empty: Make
 def test_another_board_than_was_named_keeps_its_program(asked: str, there: str, empty: Make) -> None:
     chip = BOARDS[there].chip
     with empty(there) as board:
-        done = run("flash", "--board", asked, "--port", board.port)
-        assert done.code == 5
-        assert f"the chip on {board.port} is an {chip}" in done.err
-        assert "nothing was written" in done.err
+        completed = run("flash", "--board", asked, "--port", board.port)
+        assert completed.code == 5
+        assert f"the chip on {board.port} is an {chip}" in completed.err
+        assert "nothing was written" in completed.err
         assert board.stats()["uart"]["received"] < 200
 
 
@@ -112,17 +112,17 @@ def test_a_port_that_another_program_holds_is_not_reset(empty: Make) -> None:
     with empty("uno_cnc_shield") as board:
         held = SerialPort(board.port)
         resets = board.stats()["resets"]
-        done = run("flash", "--board", "uno_cnc_shield", "--port", board.port)
-        assert (done.code, board.stats()["resets"]) == (5, resets)
-        assert "is in use" in done.err
+        completed = run("flash", "--board", "uno_cnc_shield", "--port", board.port)
+        assert (completed.code, board.stats()["resets"]) == (5, resets)
+        assert "is in use" in completed.err
         held.close()
 
 
 def test_a_board_without_a_boot_loader_is_told() -> None:
     with EmulatedBoard("uno_cnc_shield", speed="max") as board:
-        done = run("flash", "--board", "uno_cnc_shield", "--port", board.port)
-        assert done.code == 5
-        assert "no boot loader answers" in done.err
+        completed = run("flash", "--board", "uno_cnc_shield", "--port", board.port)
+        assert completed.code == 5
+        assert "no boot loader answers" in completed.err
 
 
 @pytest.mark.parametrize("kind", KINDS)

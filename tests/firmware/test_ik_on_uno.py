@@ -82,8 +82,8 @@ def questions(arm: armkin.Arm) -> np.ndarray:
     rng = np.random.default_rng(8)
     T = armkin.fk(arm, rng.uniform([-1, -1, -2.4], [1, 1, -0.4], (200, 3)))
     target = T[:, :3, 3]
-    found = armkin.ik(arm, target)
-    return target[found.valid.all(axis=1)][:QUESTIONS]
+    solutions = armkin.ik(arm, target)
+    return target[solutions.valid.all(axis=1)][:QUESTIONS]
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +94,9 @@ def on_uno(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def test_an_uno_finds_the_branches_of_python(on_uno: dict[str, Any]) -> None:
     arm = armkin.load(ROBOTS / "three_dof.yaml")
-    found = armkin.ik(arm, questions(arm))
-    np.testing.assert_array_equal(on_uno["counts"], found.valid.sum(axis=1))
-    np.testing.assert_allclose(on_uno["q"], found.q, atol=2e-5)
+    solutions = armkin.ik(arm, questions(arm))
+    np.testing.assert_array_equal(on_uno["counts"], solutions.valid.sum(axis=1))
+    np.testing.assert_allclose(on_uno["q"], solutions.q, atol=2e-5)
 
 
 def test_its_cycles_and_bytes_are_those_of_the_documents(on_uno: dict[str, Any]) -> None:

@@ -20,7 +20,7 @@ from pins import net
 import armkin
 from armkin.board.firmware.wire import protocol
 from armkin.motors import motor_accel
-from command_line import ROOT, THREE_DOF, patiently, run
+from command_line import ROOT, THREE_DOF, run, run_patiently
 
 HALF_A_STEP = 0.14  # [mm] of all motors, at the tip
 CIRCLE = "moves:\n  - point: [350, 0, 300]\n  - circle: {centre: [300, 0, 300]}\n"
@@ -35,12 +35,12 @@ def off_the_circle(arm: armkin.Arm, counts: list[int]) -> float:
 def test_a_closed_circle_ends_at_exact_counts_and_a_hold_stays_on_it(board: EmulatedBoard, tmp_path: Path) -> None:
     path = tmp_path / "circle.yaml"
     path.write_text(CIRCLE)
-    done = patiently("path", THREE_DOF, path, "--port", board.port, "--assume-home", "--json")
-    assert done.code == 0, done.err
+    completed = run_patiently("path", THREE_DOF, path, "--port", board.port, "--assume-home", "--json")
+    assert completed.code == 0, completed.err
     arm = armkin.load(THREE_DOF)
     counts = net(board)
-    assert counts == done.json["pulses"]
-    assert done.json["segments"] < 100 * done.json["duration_s"]
+    assert counts == completed.json["pulses"]
+    assert completed.json["segments"] < 100 * completed.json["duration_s"]
     assert off_the_circle(arm, counts) < 0.3
     stats = board.stats()
     for axis in "XYZ":
@@ -60,7 +60,7 @@ def test_a_closed_circle_ends_at_exact_counts_and_a_hold_stays_on_it(board: Emul
     assert held["position"] in ("known", "retained")
     assert held["pulses"] == net(board)
     assert off_the_circle(arm, net(board)) < 0.05 + 0.14 + 0.2
-    back = patiently("path", THREE_DOF, path, "--port", board.port, "--json")
+    back = run_patiently("path", THREE_DOF, path, "--port", board.port, "--json")
     assert back.code == 0, back.err
     assert net(board) == counts
 

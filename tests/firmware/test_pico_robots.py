@@ -96,10 +96,10 @@ def finds_its_switches(name: str, wanted: range, monkeypatch: pytest.MonkeyPatch
         wire(board, arm, away.tolist())
         assert run("send", robot, "home", "--port", board.port, "--assume-home").code == 0
         names = [arm.joint_names[j] for j in wanted]
-        done = run("home", robot, *names, "--port", board.port, "--stay", "--json")
-        assert done.code == 0, done.err
-        found = np.subtract(done.json["pulses"], list(board.net().values()))
+        completed = run("home", robot, *names, "--port", board.port, "--stay", "--json")
+        assert completed.code == 0, completed.err
+        found = np.subtract(completed.json["pulses"], list(board.net().values()))
         wrong = np.where(np.isin(np.arange(6), wanted), edges(arm) - away, 0)
         assert found.tolist() == wrong.tolist()
-        lost = {one["joint"]: abs(one["steps"]) for one in done.json["lost_steps"]}
+        lost = {one["joint"]: abs(one["steps"]) for one in completed.json["lost_steps"]}
         assert lost == dict(zip(names, np.abs(wrong[list(wanted)]).tolist(), strict=True))

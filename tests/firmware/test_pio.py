@@ -175,8 +175,8 @@ def came() -> dict[str, dict[str, object]]:
     make("-C", str(FIRMWARE / "sim" / "rp2040"))
     cases = [{**asdict(case), "cycles": len(case.pins.replace(" ", ""))} for case in CASES.values()]
     command = ["node", str(Path(__file__).with_name("pio_runner.mjs"))]
-    done = subprocess.run(command, input=json.dumps(cases), capture_output=True, text=True, check=True)
-    return dict(zip(CASES, json.loads(done.stdout), strict=True))
+    completed = subprocess.run(command, input=json.dumps(cases), capture_output=True, text=True, check=True)
+    return dict(zip(CASES, json.loads(completed.stdout), strict=True))
 
 
 @pytest.mark.parametrize("name", CASES)

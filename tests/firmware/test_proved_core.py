@@ -16,11 +16,11 @@ COUNTED = {
 
 def test_no_bytes_of_a_segment_overflow_or_read_beside_it() -> None:
     command = ["make", "-s", "-C", str(FIRMWARE), "proof", "BOARD=uno_cnc_shield"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
-    assert "100% of the logical properties reached have been proven" in done.stdout
-    assert re.search(r"^\d{6,} calls, no overflow$", done.stdout, re.M)
-    alarms = re.findall(r"\[eva:alarm\] (\S+):(\d+): Warning: *\n? *(.*)", done.stdout)
+    completed = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stdout[-2000:] + completed.stderr
+    assert "100% of the logical properties reached have been proven" in completed.stdout
+    assert re.search(r"^\d{6,} calls, no overflow$", completed.stdout, re.M)
+    alarms = re.findall(r"\[eva:alarm\] (\S+):(\d+): Warning: *\n? *(.*)", completed.stdout)
     lines = {(FIRMWARE / name).read_text().splitlines()[int(line) - 1].strip() for name, line, _ in alarms}
     assert lines == COUNTED
     assert all("signed overflow" in what or "valid_dest" in what for *_, what in alarms)

@@ -16,12 +16,12 @@ from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as pl
 from armkin.board.firmware.wire.protocol import Flag
 from armkin.board.ports import SerialPort
 from armkin.model import build_arm as arms
-from command_line import COUNTS, POSE, ROOT, THREE_DOF, process, run
+from command_line import COUNTS, POSE, ROOT, THREE_DOF, run, run_process
 
 
 def test_the_published_pose_on_the_pins(board: EmulatedBoard) -> None:
-    done = process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home")
-    assert done.code == 0, done.err
+    completed = run_process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home")
+    assert completed.code == 0, completed.err
     assert net(board) == COUNTS
     stats = board.stats()
     for axis in "XYZ":
@@ -32,9 +32,9 @@ def test_the_published_pose_on_the_pins(board: EmulatedBoard) -> None:
 def test_waypoints_in_a_file(board: EmulatedBoard, tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text("10,80,-80\n12,78,-82\n-3,70,-85\n-3,70,-85\n0,90,-90\n")
-    done = run("send", THREE_DOF, "--batch", path, "--port", board.port, "--assume-home", "--json")
-    assert done.code == 0, done.err
-    assert done.json["waypoints"] == 5
+    completed = run("send", THREE_DOF, "--batch", path, "--port", board.port, "--assume-home", "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["waypoints"] == 5
     assert net(board) == [0, 0, 0]
     assert board.stats()["axes"]["Y"]["negative"] > 2000
 
@@ -43,8 +43,8 @@ def test_the_gripper(board: EmulatedBoard) -> None:
     refused = run("grip", THREE_DOF, "closed", "--port", board.port)
     assert refused.code == 5
     assert "--assume open" in refused.err
-    done = run("grip", THREE_DOF, "closed", "--port", board.port, "--assume", "open")
-    assert done.code == 0, done.err
+    completed = run("grip", THREE_DOF, "closed", "--port", board.port, "--assume", "open")
+    assert completed.code == 0, completed.err
     board.wait(0.05)
     [servo] = board.stats()["servos"].values()
     assert servo["width_us"] == pytest.approx(1833, abs=3)
@@ -58,19 +58,19 @@ def test_homing_finds_the_switches(board: EmulatedBoard, tmp_path: Path) -> None
     robot = with_switches(tmp_path / "homing.yaml")
     assert "armkin home" in run("send", robot, *POSE, "--port", board.port).err
     fit_switches(board)
-    done = run("home", robot, "--port", board.port, "--json")
-    assert done.code == 0, done.err
-    assert done.json["position"] == "known"
-    assert_found(done.json["pulses"], net(board))
+    completed = run("home", robot, "--port", board.port, "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["position"] == "known"
+    assert_found(completed.json["pulses"], net(board))
     finish_at = run("send", robot, *POSE, "--port", board.port, "--json")
     assert finish_at.code == 0, finish_at.err
     assert finish_at.json["pulses"] == COUNTS
 
 
 def test_a_jog_of_a_lost_arm_is_slow(board: EmulatedBoard) -> None:
-    done = run("jog", THREE_DOF, "q1", 60, "--port", board.port, "--seconds", "1")
-    assert done.code == 0, done.err
-    assert "position is lost" in done.err
+    completed = run("jog", THREE_DOF, "q1", 60, "--port", board.port, "--seconds", "1")
+    assert completed.code == 0, completed.err
+    assert "position is lost" in completed.err
     assert board.stats()["axes"]["X"]["max_rate_hz"] == pytest.approx(60 / 8 * 12800 / 360, rel=0.02)
     assert 20 < net(board)[0] < 300  # for a second of the host's time: a busy machine gives the board less of it
 
@@ -94,10 +94,10 @@ def test_coupled_motors_and_their_joint_limits_on_both_sides(tmp_path: Path) -> 
     robot = tmp_path / "wrist.yaml"
     robot.write_text(COUPLED)
     with EmulatedBoard("mega_ramps14") as board:
-        done = run("send", robot, 10, 40, -30, "--port", board.port, "--assume-home", "--json")
-        assert done.code == 0, done.err
+        completed = run("send", robot, 10, 40, -30, "--port", board.port, "--assume-home", "--json")
+        assert completed.code == 0, completed.err
         pins = board.net()
-        assert [pins[axis] for axis in ("X", "E0", "E1")] == done.json["pulses"] == [356, 267, 1867]
+        assert [pins[axis] for axis in ("X", "E0", "E1")] == completed.json["pulses"] == [356, 267, 1867]
         outside = run("send", robot, 10, 45, 0, "--port", board.port)
         assert (outside.code, board.net()) == (3, pins)
         # A host that forgets its own check meets the board's: joint 2 would go to 45 degrees.
@@ -108,11 +108,11 @@ def test_coupled_motors_and_their_joint_limits_on_both_sides(tmp_path: Path) -> 
         )}))  # fmt: skip
         port = SerialPort(board.port)
         try:
-            one = FirmwareMachine(port, arm, configure(arm))
-            one.prepare()
-            plan = plan_moves(loose, one.counts(), np.deg2rad([10, 45, -30]))
+            machine = FirmwareMachine(port, arm, configure(arm))
+            machine.prepare()
+            plan = plan_moves(loose, machine.counts(), np.deg2rad([10, 45, -30]))
             with pytest.raises(Exception, match="LIMIT_JOINT"):
-                one.run([plan])
+                machine.run([plan])
         finally:
             port.close()
         board.wait(0.2)
@@ -130,11 +130,11 @@ def test_servos_ramp_from_the_pose_that_they_are_said_to_have(tmp_path: Path) ->
     with EmulatedBoard("uno_servos") as board:
         refused = run("send", robot, 20, 20, 20, 20, "--port", board.port)
         assert refused.code == 5
-        done = run("send", robot, 20, 20, 20, 20, "--port", board.port, "--assume-home", "--json")
-        assert done.code == 0, done.err
+        completed = run("send", robot, 20, 20, 20, 20, "--port", board.port, "--assume-home", "--json")
+        assert completed.code == 0, completed.err
         board.wait(0.05)
         widths = [servo["width_us"] for servo in board.stats()["servos"].values()][:4]
-        assert widths == pytest.approx(done.json["pulses"], abs=3)
+        assert widths == pytest.approx(completed.json["pulses"], abs=3)
         status = run("status", robot, "--port", board.port, "--json").json
         # Opening the port again has reset the board: nothing holds servos without pulses.
         assert status["position"] == "lost"

@@ -23,7 +23,7 @@ from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as pl
 from armkin.board.ports import SerialPort
 from armkin.errors import HeldError
 from armkin.model import build_arm as arms
-from command_line import BUSY, COUNTS, POSE, ROOT, THREE_DOF, patiently, run
+from command_line import BUSY, COUNTS, POSE, ROOT, THREE_DOF, run, run_patiently
 
 
 def moving(board: EmulatedBoard) -> subprocess.Popen[bytes]:
@@ -37,7 +37,7 @@ def moving(board: EmulatedBoard) -> subprocess.Popen[bytes]:
         if sender.poll() is not None:
             told = sender.communicate()[1].decode()
             assert any(busy in told for busy in BUSY), told
-            stands = patiently("status", THREE_DOF, "--port", board.port, "--json").json["position"]
+            stands = run_patiently("status", THREE_DOF, "--port", board.port, "--json").json["position"]
             sender = started(*send, *(["--assume-home"] if stands == "lost" else []))
         assert time.monotonic() < end, "it does not move"
         time.sleep(0.01)
@@ -51,15 +51,15 @@ def started(*words: str) -> subprocess.Popen[bytes]:
 
 def finish(board: EmulatedBoard) -> None:
     """The next command plans from where the arm stands, to exact counts on the pins."""
-    done = patiently("send", THREE_DOF, *POSE, "--port", board.port, "--json")
-    assert done.code == 0, done.err
-    assert done.json["pulses"] == net(board) == COUNTS
+    completed = run_patiently("send", THREE_DOF, *POSE, "--port", board.port, "--json")
+    assert completed.code == 0, completed.err
+    assert completed.json["pulses"] == net(board) == COUNTS
 
 
 def test_a_position_is_kept_through_a_reset_at_rest_and_no_other(board: EmulatedBoard) -> None:
-    assert patiently("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+    assert run_patiently("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
     board.control("reset external")
-    status = patiently("status", THREE_DOF, "--port", board.port, "--json").json
+    status = run_patiently("status", THREE_DOF, "--port", board.port, "--json").json
     assert status["position"] == "retained"
     assert status["pulses"] == net(board)
     finish(board)
@@ -108,8 +108,8 @@ def test_a_killed_process(board: EmulatedBoard) -> None:
 def test_a_boot_loader_hides_the_cause_and_the_position_is_retained() -> None:
     """The stock Uno: it swallows what comes in its first second and a half, and clears MCUSR."""
     with EmulatedBoard(bootloader=1500, patience=0) as board:  # it does not wait for a host that waits for it
-        assert patiently("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
-        status = patiently("status", THREE_DOF, "--port", board.port, "--json").json
+        assert run_patiently("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
+        status = run_patiently("status", THREE_DOF, "--port", board.port, "--json").json
         assert (status["position"], status["reset_cause"]) == ("retained", 0)
         assert status["boots"] >= 2
         finish(board)
@@ -120,7 +120,7 @@ class _KilledError(Exception):
 
 
 @contextmanager
-def machine(board: EmulatedBoard, dies_after: float | None = None) -> Iterator[FirmwareMachine]:
+def connected_machine(board: EmulatedBoard, dies_after: float | None = None) -> Iterator[FirmwareMachine]:
     """The three-joint arm on this board; a sender that dies falls silent in the middle of whatever it does."""
     arm = arms.load(ROOT / THREE_DOF)
     port = SerialPort(board.port)
@@ -143,18 +143,21 @@ def _killed_often(seed: int, times: int) -> list[str]:
     wrong: list[Any] = []
     goals = np.deg2rad([[-30, 5, -5], [25, 85, -60]])
     with EmulatedBoard(seed=seed) as board:
-        with machine(board) as first:
+        with connected_machine(board) as first:
             first.prepare(assume=first.arm.home)
         for i in range(times):
             start = end = at_rest(board)
             try:
-                with machine(board, rng.uniform(0.15, 1.6)) as one:
-                    if one.position() == "lost" or list(one.counts()) != start:
-                        return [*wrong, f"kill {i}: the board says {one.position()} {one.counts()}, pins {start}"]
-                    one.prepare()
-                    plan = plan_moves(one.arm, start, goals[rng.randrange(2)])
+                with connected_machine(board, rng.uniform(0.15, 1.6)) as machine:
+                    if machine.position() == "lost" or list(machine.counts()) != start:
+                        return [
+                            *wrong,
+                            f"kill {i}: the board says {machine.position()} {machine.counts()}, pins {start}",
+                        ]
+                    machine.prepare()
+                    plan = plan_moves(machine.arm, start, goals[rng.randrange(2)])
                     end = plan.end.tolist()
-                    one.run([plan])
+                    machine.run([plan])
             except _KilledError:
                 board.wait(0.6)  # the board notices after half a second, at rest or not
             except HeldError:
@@ -206,8 +209,8 @@ def test_the_abort_input(board: EmulatedBoard) -> None:
 
 def _a_short_move(board: EmulatedBoard) -> None:
     """After it the position is known."""
-    done = patiently("send", THREE_DOF, 1, 89, -89, "--port", board.port, "--assume-home")
-    assert done.code == 0, done.err
+    completed = run_patiently("send", THREE_DOF, 1, 89, -89, "--port", board.port, "--assume-home")
+    assert completed.code == 0, completed.err
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -217,12 +220,12 @@ def test_a_noisy_line_ends_at_exact_counts(seed: int) -> None:
         _a_short_move(board)
         start = net(board)
         board.control(f"noise flip 0.01 drop 0.01 seed {seed}")
-        done = run("send", THREE_DOF, *POSE, "--port", board.port, "--json")
+        completed = run("send", THREE_DOF, *POSE, "--port", board.port, "--json")
         now = at_rest(board)
-        if done.code == 0:
+        if completed.code == 0:
             assert now == COUNTS
         else:  # too busy a machine to keep the queue filled: it must end, on the path, and know where
-            assert "its position is known" in done.err
+            assert "its position is known" in completed.err
             assert on_the_line(now, start, COUNTS)
         board.control("restore")
         finish(board)
@@ -232,8 +235,8 @@ def test_after_a_cut_of_the_power_the_position_is_declared_lost() -> None:
     with EmulatedBoard(reset_on_open=False) as board:
         _a_short_move(board)
         assert run("status", THREE_DOF, "--port", board.port, "--json").json["position"] == "known"
-        done = run("stop", "--power-cut", "--port", board.port)
-        assert (done.code, done.err) == (
+        completed = run("stop", "--power-cut", "--port", board.port)
+        assert (completed.code, completed.err) == (
             0,
             "note: the arm stands; its position is lost: home it, or say --assume-home\n",
         )

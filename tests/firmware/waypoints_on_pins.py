@@ -21,7 +21,7 @@ from armkin.board.firmware.segments.trajectory_to_counts import Cut
 from armkin.board.kinds import board_of
 from armkin.board.planner import Planner
 from armkin.formula.arrays import Array
-from command_line import THREE_DOF, process
+from command_line import THREE_DOF, run_process
 
 BLEND = 1.5  # [deg]
 WINDOW = 0.05  # [s] in which a speed is read from counts
@@ -71,9 +71,9 @@ def stream(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Stream
         file.write_text("".join(f"{a},{b},{c}\n" for a, b, c in q.tolist()))
         words = ["send", THREE_DOF, "--batch", file, "--port", board.port, "--assume-home", "--json"]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        done = process(*words, *(["--blend", blend] if blend else []), timeout=240 + 3 * plan.duration)
+        completed = run_process(*words, *(["--blend", blend] if blend else []), timeout=240 + 3 * plan.duration)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        said: dict[str, Any] = done.json if done.code == 0 else {"waypoints": 0, "pulses": None}
+        said: dict[str, Any] = completed.json if completed.code == 0 else {"waypoints": 0, "pulses": None}
         trace, axes = board.trace(), board.stats()["axes"]
     cycle, counts = counts_of(trace, [0, 0, 0])
     ends = [counts[-1].tolist(), [axes[name]["net"] for name in "XYZ"], said["pulses"]]
@@ -84,7 +84,7 @@ def stream(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Stream
     )
     apart = np.linalg.norm(np.diff(q, axis=0), axis=1)
     return Streamed(
-        "" if done.code == 0 else done.err,
+        "" if completed.code == 0 else completed.err,
         said["waypoints"],
         (float(apart.min()), float(apart.max())),
         all(end == plan.end.tolist() for end in ends),

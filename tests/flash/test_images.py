@@ -23,10 +23,10 @@ UF2 = b"UF2\n" * 30_000
 
 def test_a_clone_without_images_says_how_they_come(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(firmware_images.image, "__defaults__", (tmp_path,))
-    done = run("flash", "three_dof", "--port", "/dev/null")
-    assert done.code == 1
-    assert "scripts/release builds it" in done.err
-    assert "no firmware for uno_cnc_shield" in done.err
+    completed = run("flash", "three_dof", "--port", "/dev/null")
+    assert completed.code == 1
+    assert "scripts/release builds it" in completed.err
+    assert "no firmware for uno_cnc_shield" in completed.err
 
 
 @pytest.mark.parametrize("sums", ["", "00 uno_servos.hex\n", "uno_servos.hex\n", "\x00\xff"])
@@ -48,9 +48,9 @@ def test_an_image_that_is_not_what_was_built_is_refused(sums: str, tmp_path: Pat
     ],
 )
 def test_what_board_it_is_has_to_be_plain(words: tuple[str, ...], message: str) -> None:
-    done = run("flash", *words, "--port", "/dev/null")
-    assert done.code == 2
-    assert message in done.err
+    completed = run("flash", *words, "--port", "/dev/null")
+    assert completed.code == 2
+    assert message in completed.err
 
 
 def test_records_of_intel_hex_lie_where_they_say() -> None:
@@ -87,8 +87,8 @@ def test_the_command_says_what_it_copied(drive: Path, tmp_path: Path, monkeypatc
     (tmp_path / "SHA256SUMS").write_text(f"{hashlib.sha256(UF2).hexdigest()}  pico6.uf2\n")
     monkeypatch.setattr(firmware_images.image, "__defaults__", (tmp_path,))
     monkeypatch.setattr("armkin.flash.upload_firmware._RESTART", 0.0)
-    done = run("flash", "--board", "pico6", "--port", drive, "--json")
-    assert done.json == {"board": "pico6", "port": None, "bytes": len(UF2), "uploader": "UF2", "firmware": None}
+    completed = run("flash", "--board", "pico6", "--port", drive, "--json")
+    assert completed.json == {"board": "pico6", "port": None, "bytes": len(UF2), "uploader": "UF2", "firmware": None}
     assert "120000 bytes copied" in run("flash", "--board", "pico6", "--port", drive).out
 
 

@@ -24,20 +24,20 @@ NUMBERS = (
 def attack(*words: object, stdin: bytes = b"") -> Result:
     """Run a command line and hold it to the contract: known exit code, no traceback, honest JSON, quiet stdout."""
     ATTACKS[str(words[0])] += 1
-    done = run(*words, stdin=stdin)
-    shown = f"{words!r}\n{done}"[:3000]
-    assert done.code in CODES, shown
-    assert "internal error" not in done.err, shown
-    assert "Traceback" not in done.err, shown
-    assert "Warning" not in done.err, shown
-    if done.code not in (0, 3):
-        assert done.err.strip(), shown
+    completed = run(*words, stdin=stdin)
+    shown = f"{words!r}\n{completed}"[:3000]
+    assert completed.code in CODES, shown
+    assert "internal error" not in completed.err, shown
+    assert "Traceback" not in completed.err, shown
+    assert "Warning" not in completed.err, shown
+    if completed.code not in (0, 3):
+        assert completed.err.strip(), shown
         # Rows before a malformed one have been answered; what `send` has moved it tells people alone.
-        assert done.out == "" or ("--batch" in words and (words[0] != "send" or "--json" not in words)), shown
-    if "--json" in words and done.out:
-        for line in done.out.splitlines():
+        assert completed.out == "" or ("--batch" in words and (words[0] != "send" or "--json" not in words)), shown
+    if "--json" in words and completed.out:
+        for line in completed.out.splitlines():
             _finite(json.loads(line, parse_constant=_refused), shown)
-    return done
+    return completed
 
 
 def generator(seed: object) -> random.Random:

@@ -86,7 +86,7 @@ def test_as_many_branches_as_the_elimination_finds(name: str) -> None:
     s = armkin.ik(arm, T, task)
     assert s.complete.all()
     assert s.method in ("three parallel axes", "three axes that meet")
-    found = method.solve(method.prepare(arm.link, arm.prismatic), T)
+    solutions = method.solve(method.prepare(arm.link, arm.prismatic), T)
     exact = s.status == armkin.Status.EXACT  # two roots that a curve of solutions joins are one branch
     assert exact.mean() > 0.98
-    assert (s.valid.sum(axis=1) == (~np.isnan(found.q[:, :, 0])).sum(axis=1))[exact].all()
+    assert (s.valid.sum(axis=1) == (~np.isnan(solutions.q[:, :, 0])).sum(axis=1))[exact].all()

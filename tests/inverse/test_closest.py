@@ -41,18 +41,18 @@ CASES = [
 @pytest.mark.parametrize(("name", "task", "target"), CASES)
 def test_no_legal_pose_nearby_is_better(name: str, task: str | None, target: list[float]) -> None:
     arm = armkin.load(ROBOTS / f"{name}.yaml")
-    found = armkin.closest(arm, target, task)
-    assert found.converged
-    assert ((found.q >= arm.lower) & (found.q <= arm.upper)).all()
-    T = forward(screws(arm.file), found.q)
-    np.testing.assert_allclose(found.position, T[:3, 3], atol=1e-9)
+    closest = armkin.closest(arm, target, task)
+    assert closest.converged
+    assert ((closest.q >= arm.lower) & (closest.q <= arm.upper)).all()
+    T = forward(screws(arm.file), closest.q)
+    np.testing.assert_allclose(closest.position, T[:3, 3], atol=1e-9)
     p = task_for(arm, task).position
-    assert found.distance == pytest.approx(np.linalg.norm(T[:p, 3] - np.array(target)[:p]), abs=1e-9)
-    here = cost(arm, task, np.array(target), found.q[None])[0]
+    assert closest.distance == pytest.approx(np.linalg.norm(T[:p, 3] - np.array(target)[:p]), abs=1e-9)
+    here = cost(arm, task, np.array(target), closest.q[None])[0]
     rng = np.random.default_rng(1)
     for size in (1e-4, 1e-3, 1e-2, 0.1):
         step = rng.normal(size=(2000, arm.n)) * size * np.where(arm.prismatic, arm.reach / 5, 1.0)
-        around = np.clip(found.q + step, arm.lower, arm.upper)
+        around = np.clip(closest.q + step, arm.lower, arm.upper)
         assert cost(arm, task, np.array(target), around).min() >= here * (1 - 1e-9) - 1e-9
 
 
@@ -68,13 +68,13 @@ def test_poses_that_five_joints_cannot_reach() -> None:
     off[:3, :3] = off[:3, :3] @ np.array([[1, 0, 0], [0, np.cos(0.2), -np.sin(0.2)], [0, np.sin(0.2), np.cos(0.2)]])
     s = armkin.ik(arm, off, "pose")
     assert s.status == armkin.Status.UNREACHABLE
-    found = armkin.closest(arm, off, "pose")
-    assert found.converged
-    assert 0.0 < found.angle < 0.25
-    here = cost(arm, "pose", off, found.q[None])[0]
+    closest = armkin.closest(arm, off, "pose")
+    assert closest.converged
+    assert 0.0 < closest.angle < 0.25
+    here = cost(arm, "pose", off, closest.q[None])[0]
     rng = np.random.default_rng(2)
     for size in (1e-3, 1e-2, 0.1):
-        around = np.clip(found.q + rng.normal(size=(2000, 5)) * size, arm.lower, arm.upper)
+        around = np.clip(closest.q + rng.normal(size=(2000, 5)) * size, arm.lower, arm.upper)
         assert cost(arm, "pose", off, around).min() >= here * (1 - 1e-9)
 
 
@@ -93,5 +93,5 @@ def test_full_poses_of_short_arms(name: str, count: int) -> None:
 
 def test_a_reachable_legal_target_is_its_own_closest_pose() -> None:
     arm = armkin.load(ROBOTS / "three_dof.yaml")
-    found = armkin.closest(arm, [390, 80, 300])
-    assert found.distance < 1e-6
+    closest = armkin.closest(arm, [390, 80, 300])
+    assert closest.distance < 1e-6

@@ -125,7 +125,7 @@ def test_a_self_motion_that_hardly_turns_joint_6_is_listed_once() -> None:
 def test_surfaces_that_may_not_all_be_listed_are_not_called_complete(q: list[float]) -> None:
     """J3 and J5 of a folded iiwa7 share a line, and where two surfaces meet three directions are lost."""
     arm = armkin.lock(armkin.load("iiwa7"), {"J7": -0.7941})
-    found = armkin.ik(arm, armkin.fk(arm, np.radians(q)))
-    assert found.status == Status.SINGULAR
-    assert found.free.tolist() == [True, True, True, False, True, True]
-    assert found.valid.sum() >= 2 or not found.complete
+    solutions = armkin.ik(arm, armkin.fk(arm, np.radians(q)))
+    assert solutions.status == Status.SINGULAR
+    assert solutions.free.tolist() == [True, True, True, False, True, True]
+    assert solutions.valid.sum() >= 2 or not solutions.complete

@@ -92,20 +92,20 @@ def check(arm: Arm, q: Array, within: float = 1e-6) -> tuple[Array, Bool]:
     T = forward(arm, q)
     plan = method.prepare(*arm)
     assert plan.complete
-    found, near_singular, *_ = method.solve(plan, T)
-    lost = miss(arm, q, found) > within
+    solutions, near_singular, *_ = method.solve(plan, T)
+    lost = miss(arm, q, solutions) > within
     assert not lost.any(), f"{lost.sum()} of {len(q)} lost, the first: {q[lost][0]}"
-    assert pose_residual(arm, found, T) < 1e-10
-    revolute = found[..., ~arm[1]]
+    assert pose_residual(arm, solutions, T) < 1e-10
+    revolute = solutions[..., ~arm[1]]
     assert np.nanmax(revolute) <= np.pi
     assert np.nanmin(revolute) > -np.pi
-    assert found.shape[1] <= 16
-    for branches in found:
+    assert solutions.shape[1] <= 16
+    for branches in solutions:
         rows = branches[~np.isnan(branches[:, 0])]
         assert np.isnan(branches[len(rows) :]).all()
         apart = distance(arm, rows[:, None], rows[None]) + np.eye(len(rows))
         assert apart.min(initial=1.0) > 1e-7
-    return found, near_singular
+    return solutions, near_singular
 
 
 @pytest.mark.parametrize("name", [name for name in ARMS if name not in ("PUMA", "STANFORD")])
@@ -280,21 +280,21 @@ def test_targets_just_beyond_the_boundary_are_answered() -> None:
     arm = random_arm(3)
     plan = method.prepare(*arm)
     q = singular_joints(arm, 60)
-    found, _, *_ = method.solve(plan, forward(arm, q))
-    q = q[(~np.isnan(found[..., 0])).sum(axis=1) == 1]
+    solutions, _, *_ = method.solve(plan, forward(arm, q))
+    q = q[(~np.isnan(solutions[..., 0])).sum(axis=1) == 1]
     assert len(q) >= 3
     T = forward(arm, q)
     left, _, _ = np.linalg.svd(jacobian(arm, q))
     for way in (1e-10, -1e-10):
         beyond = T.copy()
         beyond[:, :3, 3] += way * 1000 * left[:, :3, 5]
-        found, near_singular, *_ = method.solve(plan, beyond)
-        assert (~np.isnan(found[..., 0])).sum(axis=1).min() >= 1
+        solutions, near_singular, *_ = method.solve(plan, beyond)
+        assert (~np.isnan(solutions[..., 0])).sum(axis=1).min() >= 1
         assert near_singular.all()
-        assert pose_residual(arm, found, beyond) < 1e-9
+        assert pose_residual(arm, solutions, beyond) < 1e-9
         beyond[:, :3, 3] += 1e5 * way * 1000 * left[:, :3, 5]  # and 1e-5 m: inside two answers, outside none
-        found, _, *_ = method.solve(plan, beyond)
-        assert set((~np.isnan(found[..., 0])).sum(axis=1)) <= {0, 2}
+        solutions, _, *_ = method.solve(plan, beyond)
+        assert set((~np.isnan(solutions[..., 0])).sum(axis=1)) <= {0, 2}
 
 
 # ---- the interface -----------------------------------------------------------------------------------------
@@ -303,17 +303,17 @@ def test_targets_just_beyond_the_boundary_are_answered() -> None:
 def test_no_targets_unreachable_targets_and_targets_that_are_no_numbers() -> None:
     arm = ARMS["JACO"]
     plan = method.prepare(*arm)
-    found, near_singular, *_ = method.solve(plan, np.empty((0, 4, 4)))
-    assert found.shape == (0, 0, 6)
+    solutions, near_singular, *_ = method.solve(plan, np.empty((0, 4, 4)))
+    assert solutions.shape == (0, 0, 6)
     assert near_singular.shape == (0,)
     T = forward(arm, random_joints(arm, 3, 14))
     alone, _, *_ = method.solve(plan, T[2:])
     T[0, 0, 3] += 1e4
     T[1, 1, 1] = np.nan
-    found, near_singular, *_ = method.solve(plan, T)
-    assert np.isnan(found[:2]).all()
+    solutions, near_singular, *_ = method.solve(plan, T)
+    assert np.isnan(solutions[:2]).all()
     assert not near_singular[:2].any()
-    np.testing.assert_allclose(found[2], alone[0], atol=1e-11)
+    np.testing.assert_allclose(solutions[2], alone[0], atol=1e-11)
 
 
 def test_a_pose_has_the_same_branches_in_any_batch(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -352,9 +352,9 @@ def test_arms_with_redundant_axes_are_doubtful_not_fatal() -> None:
     arm = dh([0, 90, 90, 60, 60, 0], [0, 300, 0, 50, 0, 0], [100, 50, 20, 250, 80, 100], [0.0] * 6)
     plan = method.prepare(*arm)
     assert not plan.complete
-    found, near_singular, *_ = method.solve(plan, forward(arm, random_joints(arm, 20, 18)))
-    assert found.shape[1] <= 16
-    assert near_singular[~np.isnan(found[:, :1, 0]).all(axis=1)].all()
+    solutions, near_singular, *_ = method.solve(plan, forward(arm, random_joints(arm, 20, 18)))
+    assert solutions.shape[1] <= 16
+    assert near_singular[~np.isnan(solutions[:, :1, 0]).all(axis=1)].all()
 
 
 def test_answers_of_equal_keys_are_not_taken_for_one() -> None:

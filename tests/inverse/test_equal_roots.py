@@ -107,11 +107,11 @@ def test_solutions_that_differ_in_the_end_joints_alone_are_one_root_and_not_forg
 
 def test_a_shared_root_that_rounding_makes_a_complex_pair_is_two_solutions() -> None:
     """Of targets that differ by 1e-13 mm 72 in 400 had six branches, not eight, and said complete."""
-    rest = armkin.lock(armkin.load("kinova_gen3"), {"J7": np.deg2rad(75.6)})
+    locked_arm = armkin.lock(armkin.load("kinova_gen3"), {"J7": np.deg2rad(75.6)})
     own = np.deg2rad([-45.0, -90, 90, -180, 90, -45])
-    targets = np.repeat(armkin.fk(rest, own)[None], 50, axis=0)
+    targets = np.repeat(armkin.fk(locked_arm, own)[None], 50, axis=0)
     targets[:, :3, 3] += np.random.default_rng(0).uniform(-1e-13, 1e-13, (50, 3))
-    s = armkin.ik(rest, targets)
+    s = armkin.ik(locked_arm, targets)
     assert (s.valid.sum(axis=1) == 8).all()
 
 

@@ -117,9 +117,9 @@ def test_what_is_shorter_than_a_sample_is_there(number: int, value: float) -> No
 
 
 def test_the_command_answers_without_options() -> None:
-    done = run("ik", "panda", 400, 0, 400, 180, 0, 0, "--json")
-    assert done.code == 0
-    [row] = done.json["branches"]
+    completed = run("ik", "panda", 400, 0, 400, 180, 0, 0, "--json")
+    assert completed.code == 0
+    [row] = completed.json["branches"]
     assert row["family"]["joint"] == "J7"
     low, high = row["family"]["interval"]
     assert low <= row["joints"][6] <= high
@@ -137,16 +137,16 @@ def test_a_turn_without_ends_is_the_whole_of_it() -> None:
 
 
 def test_out_of_reach_is_unreachable_and_exits_3() -> None:
-    done = run("ik", "panda", 1400, 0, 400, 180, 0, 0, "--json")
-    assert (done.code, done.json["status"]) == (3, "unreachable")
-    assert done.json["closest"]["distance_mm"] > 400
+    completed = run("ik", "panda", 1400, 0, 400, 180, 0, 0, "--json")
+    assert (completed.code, completed.json["status"]) == (3, "unreachable")
+    assert completed.json["closest"]["distance_mm"] > 400
 
 
 def test_held_joints_still_leave_isolated_branches() -> None:
-    done = run("ik", "panda", 400, 0, 400, 180, 0, 0, "--lock", "J7=20", "--json")
-    assert done.code == 0
-    assert "family" not in done.json["branches"][0]
-    assert done.json["branches"][0]["joints"][6] == pytest.approx(20)
+    completed = run("ik", "panda", 400, 0, 400, 180, 0, 0, "--lock", "J7=20", "--json")
+    assert completed.code == 0
+    assert "family" not in completed.json["branches"][0]
+    assert completed.json["branches"][0]["joints"][6] == pytest.approx(20)
 
 
 def test_with_keep_outs_the_posture_of_an_interval_is_free(tmp_path: object) -> None:
@@ -232,10 +232,10 @@ def test_the_arm_angle_knows_all_families_of_a_class_whatever_its_zeros_and_elbo
 def test_a_target_that_only_postures_outside_the_limits_reach_has_no_legal_interval() -> None:
     arm = armkin.load("panda")
     q = np.random.default_rng(5).uniform(-3.0, 3.0, (3000, 7))[7]
-    found = armkin.ik(arm, armkin.fk(arm, q))
-    assert found.status == Status.EXACT
-    assert found.valid.any()
-    assert not found.within_limits.any()
+    solutions = armkin.ik(arm, armkin.fk(arm, q))
+    assert solutions.status == Status.EXACT
+    assert solutions.valid.any()
+    assert not solutions.within_limits.any()
 
 
 @pytest.mark.parametrize(("k", "degrees", "count"), [(0, -1.38508, 2), (7, 119.39265, 4), (8, -84.25, 4)])

@@ -87,21 +87,21 @@ def test_what_stands_within_limits_is_not_said_to_be_outside(robot: str, width: 
     q, near = rng.uniform(arm.lower, arm.upper, (2, 120, arm.n))
     q[:, 4] = 0.0
     target = armkin.fk(arm, q)
-    found = armkin.ik(arm, target, near=near)
-    assert (found.status == armkin.Status.SINGULAR).all()
-    assert (found.best >= 0).all()
-    best = found.q[np.arange(len(q)), found.best]
+    solutions = armkin.ik(arm, target, near=near)
+    assert (solutions.status == armkin.Status.SINGULAR).all()
+    assert (solutions.best >= 0).all()
+    best = solutions.q[np.arange(len(q)), solutions.best]
     assert ((best >= arm.lower) & (best <= arm.upper)).all()
-    assert missed(arm, found.task, best, target).max() < 1e-9
+    assert missed(arm, solutions.task, best, target).max() < 1e-9
     for k in range(5):
-        one = armkin.ik(arm, target[k], near=near[k])
-        np.testing.assert_allclose(one.q[one.best], best[k], atol=1e-12)
+        single = armkin.ik(arm, target[k], near=near[k])
+        np.testing.assert_allclose(single.q[single.best], best[k], atol=1e-12)
 
 
 def test_near_outside_limits_gives_way_to_a_posture_within() -> None:
     """Joint 4 at -180 degrees is beyond its -160; with joint 6 turned back it need not stand there."""
     arm = armkin.load("irb120")
     near = np.radians([45.0, 90.0, 0.0, -180.0, 0.0, 45.0])
-    found = armkin.ik(arm, armkin.fk(arm, near), near=near)
-    assert found.within_limits.any()
-    np.testing.assert_allclose(armkin.fk(arm, found.q[found.best]), armkin.fk(arm, near), atol=1e-6)
+    solutions = armkin.ik(arm, armkin.fk(arm, near), near=near)
+    assert solutions.within_limits.any()
+    np.testing.assert_allclose(armkin.fk(arm, solutions.q[solutions.best]), armkin.fk(arm, near), atol=1e-6)

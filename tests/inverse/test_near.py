@@ -28,15 +28,15 @@ def test_near_as_a_batch_is_near_one_by_one(name: str, sample: Callable[[int, in
     near[::4] = np.where(arm.prismatic, 0.0, np.pi / 2 * rng.integers(-2, 3, near[::4].shape))
     many = armkin.ik(arm, target, near=near)
     for k in range(0, 40, 40 // sample(40, 13)):
-        one = armkin.ik(arm, target[k], near=near[k])
-        assert (one.status, one.complete, one.best) == (many.status[k], many.complete[k], many.best[k])
-        assert one.free.tolist() == many.free[k].tolist()
-        rows, count = many.valid[k], one.valid.sum()
+        single = armkin.ik(arm, target[k], near=near[k])
+        assert (single.status, single.complete, single.best) == (many.status[k], many.complete[k], many.best[k])
+        assert single.free.tolist() == many.free[k].tolist()
+        rows, count = many.valid[k], single.valid.sum()
         assert rows.sum() == count
-        assert many.within_limits[k][rows].tolist() == one.within_limits[one.valid].tolist()
-        np.testing.assert_allclose(many.q[k][rows], one.q[one.valid], rtol=0, atol=1e-7)
+        assert many.within_limits[k][rows].tolist() == single.within_limits[single.valid].tolist()
+        np.testing.assert_allclose(many.q[k][rows], single.q[single.valid], rtol=0, atol=1e-7)
         if geometry.pairs:  # others are numbered along a path
-            assert many.branch[k][rows].tolist() == one.branch[one.valid].tolist()
+            assert many.branch[k][rows].tolist() == single.branch[single.valid].tolist()
 
 
 @pytest.mark.parametrize("near", [0.0, -90.0, 90.0])
@@ -112,8 +112,8 @@ def test_a_posture_that_solves_its_target_is_listed_to_the_bit() -> None:
     np.testing.assert_array_equal(solves.q[rows, solves.best[rows]], q[rows])
     assert solves.within_limits[rows, solves.best[rows]].all()
     for k in rows[::20]:
-        one = armkin.ik(arm, target[k], near=q[k])
-        np.testing.assert_array_equal(one.q[one.best], q[k])
+        single = armkin.ik(arm, target[k], near=q[k])
+        np.testing.assert_array_equal(single.q[single.best], q[k])
         same = armkin.ik(arm, target, near=q[k])
         np.testing.assert_array_equal(same.q[k, same.best[k]], q[k])
 

@@ -35,10 +35,10 @@ def test_a_wrist_beside_straight_is_listed_once_a_shoulder(others: int) -> None:
     arm = armkin.load("stanford")
     rest = np.pi / 2 * np.random.default_rng(1).integers(-2, 3, (others, arm.n))
     q = np.concatenate([[BESIDE], np.where(arm.prismatic, BESIDE[2], rest)])
-    found = armkin.ik(arm, armkin.fk(arm, q), near=q)
-    rows = found.q[0][found.valid[0]]
-    assert found.status[0] == armkin.Status.SINGULAR
-    assert found.complete[0]
+    solutions = armkin.ik(arm, armkin.fk(arm, q), near=q)
+    rows = solutions.q[0][solutions.valid[0]]
+    assert solutions.status[0] == armkin.Status.SINGULAR
+    assert solutions.complete[0]
     assert len(rows) == 2
     np.testing.assert_array_equal(rows[0], BESIDE)
     assert rows[1][2] == pytest.approx(-BESIDE[2])
@@ -51,10 +51,10 @@ def test_a_curve_that_does_not_pass_its_posture_tells_nothing_of_it() -> None:
     """
     arm = armkin.load("stanford")
     T = armkin.fk(arm, FOLD)
-    found = armkin.ik(arm, T)
-    assert found.status == armkin.Status.BOUNDARY
-    assert found.valid.sum() == 4
-    apart = newton.distances(arm, found.q[None, found.valid], found.q[None, found.valid])[0]
+    solutions = armkin.ik(arm, T)
+    assert solutions.status == armkin.Status.BOUNDARY
+    assert solutions.valid.sum() == 4
+    apart = newton.distances(arm, solutions.q[None, solutions.valid], solutions.q[None, solutions.valid])[0]
     assert (apart + np.eye(4) > 0.1).all()
 
 
@@ -65,11 +65,11 @@ def test_manifolds_on_both_sides_of_a_straight_wrist_are_rows_of_their_own() -> 
     """
     arm = armkin.load("puma560")
     T = armkin.fk(arm, ARCS)
-    found = armkin.ik(arm, T)
-    assert found.status == armkin.Status.SINGULAR
-    assert found.complete
-    assert found.valid.sum() == 7
-    a, b = found.q[found.valid][3:5]
+    solutions = armkin.ik(arm, T)
+    assert solutions.status == armkin.Status.SINGULAR
+    assert solutions.complete
+    assert solutions.valid.sum() == 7
+    a, b = solutions.q[solutions.valid][3:5]
     np.testing.assert_allclose(np.abs(newton.difference(arm, a, b)), [0, 0, 0, np.pi, 0, np.pi], atol=1e-6)
     t = np.linspace(0.0, 2.0 * np.pi, 361)[:, None]
     way = a + t * np.array([0.0, 0.0, 0.0, 1.0, 0.0, -1.0])
@@ -77,10 +77,10 @@ def test_manifolds_on_both_sides_of_a_straight_wrist_are_rows_of_their_own() -> 
     # with joint 4 held where it is, the others leave what they cannot take away
     across = way + 0.0
     for _ in range(12):
-        r, J = newton.scaled(arm, found.task, across, goals)
+        r, J = newton.scaled(arm, solutions.task, across, goals)
         step = np.linalg.pinv(np.delete(J, 3, axis=2), rcond=1e-10) @ r[:, :, None]
         across += np.insert(step[:, :, 0], 3, 0.0, axis=1)
-    size = newton.missing(arm, found.task, across, goals)
+    size = newton.missing(arm, solutions.task, across, goals)
     assert (size[:181].max() > 2e-9) & (size[180:].max() > 2e-9)
     assert np.median(size) < 5e-10
 
@@ -99,13 +99,15 @@ def test_a_curve_not_followed_from_one_posture_is_known_from_another_on_it() -> 
     """A wrist 1e-11 beside axis 1, two circuits an elbow, were listed by six postures; one 1e-3 beside, by three."""
     for name, q, count in (("ar4", CIRCUIT, 4), ("puma560", FLAT, 2)):
         arm = armkin.load(name)
-        found = armkin.ik(arm, armkin.fk(arm, q), near=q)
-        assert (found.status, found.complete, found.valid.sum()) == (armkin.Status.SINGULAR, True, count), name
-        assert (found.q[found.valid] == q).all(axis=1).any(), name
+        solutions = armkin.ik(arm, armkin.fk(arm, q), near=q)
+        assert solutions.status == armkin.Status.SINGULAR, name
+        assert bool(solutions.complete), name
+        assert solutions.valid.sum() == count, name
+        assert (solutions.q[solutions.valid] == q).all(axis=1).any(), name
 
 
 def test_an_edge_s_candidate_that_leads_to_another_branch_is_no_second_row() -> None:
     """One of the left shoulder, on an edge and off its target, was moved onto a branch of the right, and listed."""
     arm = armkin.load("ur5e")
-    found = armkin.ik(arm, targets_in(LABELS["pose"], [[-213.531, 53.1393, 1047.8, -105.174, 28.9358, 48.3678]])[0])
-    assert found.valid.sum() == 2
+    solutions = armkin.ik(arm, targets_in(LABELS["pose"], [[-213.531, 53.1393, 1047.8, -105.174, 28.9358, 48.3678]])[0])
+    assert solutions.valid.sum() == 2

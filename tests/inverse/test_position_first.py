@@ -106,9 +106,9 @@ def test_rows_are_minima_each_once_by_angle(name: str) -> None:
 
 def test_the_command_lists_minima_by_angle_and_exits_0() -> None:
     words = ["ik", "so101", "250", "50", "150", "180", "0", "0", "--task", "pose", "--position-first", "--all-branches"]
-    done = run(*words, "--json")
-    assert done.code == 0
-    answer = done.json
+    completed = run(*words, "--json")
+    assert completed.code == 0
+    answer = completed.json
     assert (answer["status"], answer["best"]) == ("position", 0)
     angles = [row["residual_deg"] for row in answer["branches"]]
     assert angles == sorted(angles)
@@ -118,10 +118,12 @@ def test_the_command_lists_minima_by_angle_and_exits_0() -> None:
 
 
 def test_a_position_out_of_reach_exits_3_with_the_closest_posture() -> None:
-    done = run(*["ik", "so101", "950", "50", "150", "180", "0", "0", "--task", "pose", "--position-first", "--json"])
-    assert done.code == 3
-    assert (done.json["status"], done.json["best"]) == ("unreachable", None)
-    assert done.json["closest"]["distance_mm"] == pytest.approx(472.3562, abs=1e-3)
+    completed = run(
+        *["ik", "so101", "950", "50", "150", "180", "0", "0", "--task", "pose", "--position-first", "--json"]
+    )
+    assert completed.code == 3
+    assert (completed.json["status"], completed.json["best"]) == ("unreachable", None)
+    assert completed.json["closest"]["distance_mm"] == pytest.approx(472.3562, abs=1e-3)
 
 
 def test_free_comes_before_near_in_rotation() -> None:
@@ -162,9 +164,9 @@ def test_an_exact_answer_that_hits_something_comes_after_a_free_one(tmp_path: Pa
     ],
 )
 def test_what_position_first_is_not_for_is_a_usage_error(words: str, said: str) -> None:
-    done = run(*words.split())
-    assert done.code == 2
-    assert said in done.err
+    completed = run(*words.split())
+    assert completed.code == 2
+    assert said in completed.err
 
 
 def test_a_batch_gives_what_each_row_alone_gives(tmp_path: Path) -> None:

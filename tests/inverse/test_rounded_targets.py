@@ -47,9 +47,9 @@ def test_its_own_pose_in_few_digits_moves_no_joint(name: str) -> None:
         best = many.q[np.arange(len(q)), many.best]
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
         k = number % len(q)
-        one = armkin.ik(arm, given[k], near=q[k])
-        np.testing.assert_array_equal(one.q[one.best], best[k])
-        assert one.status == many.status[k]
+        single = armkin.ik(arm, given[k], near=q[k])
+        np.testing.assert_array_equal(single.q[single.best], best[k])
+        assert single.status == many.status[k]
 
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560"])
@@ -79,9 +79,9 @@ def test_it_stands_for_the_self_motion_that_it_is_on_but_for_rounding(q: list[fl
     arm, _ = shipped("puma560")
     T = np.round(armkin.fk(arm, q), 8)
     assert armkin.ik(arm, T).valid.sum() == rows
-    found = armkin.ik(arm, T, near=q)
-    assert found.valid.sum() == rows
-    np.testing.assert_array_equal(found.q[found.best], q)
+    solutions = armkin.ik(arm, T, near=q)
+    assert solutions.valid.sum() == rows
+    np.testing.assert_array_equal(solutions.q[solutions.best], q)
 
 
 def test_a_turn_about_one_axis_shows_its_rounding_by_its_digits() -> None:
@@ -91,8 +91,8 @@ def test_a_turn_about_one_axis_shows_its_rounding_by_its_digits() -> None:
     q[:, 0] = np.random.default_rng(1).uniform(-2.0, 2.0, len(q))
     T = armkin.fk(arm, q)
     for digits in ("6f", "7f", "7g"):
-        found = armkin.ik(arm, rounded(T, digits), near=q)
-        best = found.q[np.arange(len(q)), found.best]
+        solutions = armkin.ik(arm, rounded(T, digits), near=q)
+        best = solutions.q[np.arange(len(q)), solutions.best]
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
 
 
@@ -181,9 +181,9 @@ def test_a_posture_on_its_limits_is_its_own_printed_pose(name: str, q: list[int]
     """A number ends in a zero; or roll and yaw are both off by half a decimal, about nearly one axis."""
     T = armkin.fk(armkin.load(name), np.radians([q]))
     words = [f"{value:.{digits}f}" for value in targets_out(LABELS["pose"], T)[0]]
-    done = run("ik", name, *words, "--near", ",".join(map(str, q)), "--json")
-    assert done.code == 0
-    assert done.json["branches"][done.json["best"]]["joints"] == pytest.approx(q, abs=1e-9)
+    completed = run("ik", name, *words, "--near", ",".join(map(str, q)), "--json")
+    assert completed.code == 0
+    assert completed.json["branches"][completed.json["best"]]["joints"] == pytest.approx(q, abs=1e-9)
     rows = ",".join(LABELS["pose"]) + "\n" + ",".join(words)
     batch = run("ik", name, "--batch", "-", "--near", ",".join(map(str, q)), "--json", stdin=rows.encode())
     assert batch.json["branches"][batch.json["best"]]["joints"] == pytest.approx(q, abs=1e-9)
@@ -193,7 +193,7 @@ def test_six_printed_decimals_on_the_command_line_move_no_joint() -> None:
     q = [10.0, -80.0, 70.0, -30.0, 0.0, 20.0]
     T = armkin.fk(armkin.load("ur5e"), np.radians([q]))
     words = [f"{value:.6f}" for value in targets_out(LABELS["pose"], T)[0]]
-    done = run("ik", "ur5e", *words, "--near", ",".join(map(str, q)), "--json")
-    assert done.code == 0
-    best = done.json["branches"][done.json["best"]]
+    completed = run("ik", "ur5e", *words, "--near", ",".join(map(str, q)), "--json")
+    assert completed.code == 0
+    best = completed.json["branches"][completed.json["best"]]
     np.testing.assert_allclose(best["joints"], q, atol=1e-9)

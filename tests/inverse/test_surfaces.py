@@ -27,8 +27,8 @@ FOLDED = [
 
 def _rows(q: list[float]) -> tuple[armkin.Arm, armkin.Solutions]:
     arm, posture = armkin.load("iiwa7"), np.deg2rad(q)
-    rest = armkin.lock(arm, {"J7": posture[6]})
-    return rest, armkin.ik(rest, armkin.fk(arm, posture))
+    locked_arm = armkin.lock(arm, {"J7": posture[6]})
+    return locked_arm, armkin.ik(locked_arm, armkin.fk(arm, posture))
 
 
 @pytest.mark.parametrize(("q", "count"), FOLDED)
@@ -59,8 +59,8 @@ def test_three_joints_about_one_line_are_one_surface(q: list[float]) -> None:
 
 def test_an_arm_that_stands_on_a_surface_stays() -> None:
     arm, posture = armkin.load("iiwa7"), np.deg2rad([10.0, 0, 20, 0, 30, 40, 50])
-    rest = armkin.lock(arm, {"J7": posture[6]})
-    s = armkin.ik(rest, armkin.fk(arm, posture), near=posture[:6])
+    locked_arm = armkin.lock(arm, {"J7": posture[6]})
+    s = armkin.ik(locked_arm, armkin.fk(arm, posture), near=posture[:6])
     assert s.valid.sum() == 1
     assert s.best == 0
     assert (s.q[0] == posture[:6]).all()
@@ -75,9 +75,9 @@ def _rounded(target: np.ndarray, seed: int, digit: float) -> np.ndarray:
 @pytest.mark.parametrize("seed", [24, 39, 72])
 def test_where_surfaces_meet_rounding_does_not_choose_how_many_are_listed(seed: int) -> None:
     """All axes in two lines at right angles: three directions are lost; one row, and complete, of these roundings."""
-    rest = armkin.lock(armkin.load("iiwa7"), {"J7": 0.0})
-    s = armkin.ik(rest, _rounded(armkin.fk(rest, np.deg2rad([-90, -180, 180, 180, -90, 180])), seed, 2e-16))
-    z1, z2, z3, _, _, z6 = np.moveaxis(armkin.jacobian(rest, s.q[s.valid])[:, 3:], 2, 0)
+    locked_arm = armkin.lock(armkin.load("iiwa7"), {"J7": 0.0})
+    s = armkin.ik(locked_arm, _rounded(armkin.fk(locked_arm, np.deg2rad([-90, -180, 180, 180, -90, 180])), seed, 2e-16))
+    z1, z2, z3, _, _, z6 = np.moveaxis(armkin.jacobian(locked_arm, s.q[s.valid])[:, 3:], 2, 0)
     along = np.stack([(z3 * z1).sum(axis=1), -(z3 * z1).sum(axis=1), (z2 * z6).sum(axis=1), -(z2 * z6).sum(axis=1)])
     assert sorted(along.argmax(axis=0)) == [0, 1, 2, 3]
     assert not s.complete
@@ -86,8 +86,8 @@ def test_where_surfaces_meet_rounding_does_not_choose_how_many_are_listed(seed: 
 def test_a_surface_that_goes_through_limits_is_listed_within() -> None:
     """Many starts come to postures of it outside limits, all but as exact; nearer ones are within."""
     arm, posture = armkin.load("iiwa7"), np.deg2rad([90.0, 0, 90, 0, 90, 0, -129.50000000000003])
-    rest = armkin.lock(arm, {"J7": posture[6]})
-    s = armkin.ik(rest, armkin.fk(rest, posture[:6]))
+    locked_arm = armkin.lock(arm, {"J7": posture[6]})
+    s = armkin.ik(locked_arm, armkin.fk(locked_arm, posture[:6]))
     assert s.valid.sum() == 1
     assert s.best == 0
     np.testing.assert_allclose(np.abs(s.q[0]).sum(), np.pi / 2, atol=1e-6)

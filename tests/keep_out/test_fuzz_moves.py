@@ -61,10 +61,10 @@ BUSES = ("feetech", "dynamixel")
 
 def _robot(kind: str) -> str:
     """three_dof on a kind of board: with switches, or a gripper, where that kind has them."""
-    data = yaml.safe_load(KINDS["feetech" if kind == "dynamixel" else kind])
-    data["board"] = {**data["board"], "kind": kind}
+    document = yaml.safe_load(KINDS["feetech" if kind == "dynamixel" else kind])
+    document["board"] = {**document["board"], "kind": kind}
     if kind == OURS:
-        for joint, at in zip(data["joints"], SWITCHES, strict=True):
+        for joint, at in zip(document["joints"], SWITCHES, strict=True):
             way, axis = int(np.sign(at)), joint["drive"]["axis"]
             joint["homing"] = {
                 "switch": axis,
@@ -75,8 +75,8 @@ def _robot(kind: str) -> str:
                 "backoff": 3,
             }
     if kind in GRIPPERS:
-        data["gripper"] = yaml.safe_load(GRIPPERS[kind])
-    return str(yaml.safe_dump(data, sort_keys=False))
+        document["gripper"] = yaml.safe_load(GRIPPERS[kind])
+    return str(yaml.safe_dump(document, sort_keys=False))
 
 
 def _pressed(arm: armkin.Arm) -> Callable[[int, Sequence[int]], bool]:
@@ -138,9 +138,9 @@ class Arms:
         self.until = self.moving.now() + until
         if name == "home":
             self.search()
-        told = run(name, *words, "--port", self.moving.name, stdin=stdin)
-        line = f"{kind}: armkin {name} {' '.join(map(str, words))}: {told.code} {told.err}"
-        assert told.code in ((0, 2, 3) if until == np.inf else (0, 3, STOPPED)), line
+        completed = run(name, *words, "--port", self.moving.name, stdin=stdin)
+        line = f"{kind}: armkin {name} {' '.join(map(str, words))}: {completed.code} {completed.err}"
+        assert completed.code in ((0, 2, 3) if until == np.inf else (0, 3, STOPPED)), line
         for one in self.given:
             apart = self.held.least_clearances(one.q(np.linspace(0.0, one.duration, 1500)))[0]
             assert apart.min() >= min(apart[0], 0.0) - DEEP, line
@@ -149,7 +149,7 @@ class Arms:
             q = np.asarray(armkin.joints(self.arms[kind], counts))
             assert self.held.least_clearances(q)[0].min() >= -CLEARANCE, line
             self.made = float(np.ptp(q, axis=0).max())
-        return told
+        return completed
 
     def search(self) -> None:
         """What is counted before the last switch is found is a search, which nobody proves."""

@@ -64,12 +64,12 @@ def test_random_motions_are_free_when_proved_and_hit_when_not(kind: str, table: 
     held, q = guard(arm), _postures(arm, 400, 5)
     share, free = np.linspace(0.0, 1.0, 1500)[:, None], 0
     for a, b in zip(q[:60], q[-60:], strict=True):
-        found = prove_trajectory(plan_joint_moves(arm, a, b))
-        assert found is not None
+        proof = prove_trajectory(plan_joint_moves(arm, a, b))
+        assert proof is not None
         least = float(held.clearances(a + share * (b - a)).min())
-        assert least >= 0.0 if found.free else least < 0.05
-        assert found.postures < 2000
-        free += found.free
+        assert least >= 0.0 if proof.free else least < 0.05
+        assert proof.postures < 2000
+        free += proof.free
     assert 5 < free < 60
 
 
@@ -130,12 +130,12 @@ def test_a_path_through_the_table_is_refused_with_the_place(table: Path) -> None
 def test_the_first_hit_is_where_the_clearance_runs_out(table: Path) -> None:
     arm = armkin.load("three_dof", scene=table)
     way = plan_joint_moves(arm, np.deg2rad([0, 90, -90]), np.deg2rad([[30, 90, -90], [30, 0, -45]]))
-    found = prove_trajectory(way)
-    assert found is not None
-    assert (found.free, found.stretch, found.body, found.keep_out) == (False, 1, "q3", "table")
-    at = hit_time(way, found)
-    assert way.q(at) == pytest.approx(found.joints, abs=1e-6)
-    assert abs(float(armkin.clearance(arm, found.joints).mm)) < 0.02
+    proof = prove_trajectory(way)
+    assert proof is not None
+    assert (proof.free, proof.stretch, proof.body, proof.keep_out) == (False, 1, "q3", "table")
+    at = hit_time(way, proof)
+    assert way.q(at) == pytest.approx(proof.joints, abs=1e-6)
+    assert abs(float(armkin.clearance(arm, proof.joints).mm)) < 0.02
     with pytest.raises(NoSolutionError, match="q3 would hit table on the way to waypoint 2"):
         check_free(way)
 
@@ -144,10 +144,10 @@ def test_an_arm_in_a_hit_may_leave_it_and_not_go_deeper(table: Path) -> None:
     arm = armkin.load("three_dof", scene=table)
     inside, free = np.deg2rad([0, 20, -45]), np.deg2rad([0, 90, -90])
     assert armkin.clearance(arm, inside).mm < -5
-    found = prove_trajectory(plan_joint_moves(arm, inside, free))
-    assert found is not None
-    assert found.free
-    assert found.escaping == (("q3", "table"),)
+    proof = prove_trajectory(plan_joint_moves(arm, inside, free))
+    assert proof is not None
+    assert proof.free
+    assert proof.escaping == (("q3", "table"),)
     with pytest.raises(NoSolutionError, match="q3 would go deeper into table"):
         check_free(plan_joint_moves(arm, inside, np.deg2rad([0, 15, -45])))
     with pytest.raises(NoSolutionError, match="q3 would"):  # out, and in again

@@ -28,10 +28,10 @@ def table(tmp_path: Path) -> str:
 @pytest.mark.parametrize("robot", KINDS)
 def test_a_motion_through_the_table_is_refused_and_one_above_it_is_made(robot: str, table: str) -> None:
     words = [robot, "--port", "sim", "--scene", table]
-    got = run("send", *words, "0", "10", "-30")
-    assert (got.code, got.out) == (3, "")
-    assert "q3 would hit table" in got.err
-    assert "nothing was moved" in got.err
+    completed = run("send", *words, "0", "10", "-30")
+    assert (completed.code, completed.out) == (3, "")
+    assert "q3 would hit table" in completed.err
+    assert "nothing was moved" in completed.err
     assert run("send", *words, "40", "80", "-80").code == 0
     assert "q2, q3: 12.51 mm are assumed" in run("send", *words, "40", "80", "-80").err
     assert run("send", *words, "--target", "420,40,150").code == 3
@@ -41,10 +41,10 @@ def test_a_motion_through_the_table_is_refused_and_one_above_it_is_made(robot: s
 
 @pytest.mark.parametrize("robot", KINDS)
 def test_a_jog_stands_before_the_hit(robot: str, table: str) -> None:
-    got = run("jog", robot, "q3", "30", "--seconds", "60", "--port", "sim", "--scene", table, "--json")
+    completed = run("jog", robot, "q3", "30", "--seconds", "60", "--port", "sim", "--scene", table, "--json")
     free = run("jog", robot, "q2", "-30", "--seconds", "60", "--port", "sim", "--scene", table, "--json")
-    assert (got.code, free.code) == (0, 0), got.err + free.err
-    for answer in (got.json, free.json):
+    assert (completed.code, free.code) == (0, 0), completed.err + free.err
+    for answer in (completed.json, free.json):
         arm = armkin.load(robot, scene=table)
         assert armkin.clearance(arm, np.deg2rad(answer["joints"])).mm >= 0.0
     assert free.json["joints"][1] < 70.0  # it went until the table was near
@@ -91,9 +91,9 @@ def test_a_jog_of_coupled_motors_is_looked_at_as_whole_counts_make_it(
 
 def test_ignoring_is_told_and_lasts_for_one_command(table: str) -> None:
     words = ["send", "three_dof", "0", "10", "-30", "--port", "sim", "--scene", table]
-    got = run(*words, "--ignore-keep-out")
-    assert got.code == 0
-    assert "--ignore-keep-out: this motion hits table by" in got.err
+    completed = run(*words, "--ignore-keep-out")
+    assert completed.code == 0
+    assert "--ignore-keep-out: this motion hits table by" in completed.err
     assert run(*words).code == 3
     path = run(
         "path", "three_dof", "--via", "390,80,300", "--via", "390,-80,150", "--scene", table, "--ignore-keep-out"
@@ -141,6 +141,6 @@ def test_path_tells_its_clearance(table: str) -> None:
 
 def test_rows_that_stream_in_are_proved_one_by_one(table: str) -> None:
     rows = b"20,80,-80\n0,10,-30\n"
-    got = run("send", "three_dof", "--batch", "-", "--port", "sim", "--scene", table, stdin=rows)
-    assert got.code == 3
-    assert "row 2: q3 would hit table" in got.err
+    completed = run("send", "three_dof", "--batch", "-", "--port", "sim", "--scene", table, stdin=rows)
+    assert completed.code == 3
+    assert "row 2: q3 would hit table" in completed.err

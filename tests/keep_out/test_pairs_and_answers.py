@@ -66,12 +66,12 @@ def test_a_slides_body_is_as_long_as_it_is_out(tmp_path: Path) -> None:
 
 
 def test_fk_tells_clearance_and_hits() -> None:
-    got = run("fk", "three_dof", "0", "0", "-45", "--scene", BENCH, "--json")
-    answer = json.loads(got.out)
+    completed = run("fk", "three_dof", "0", "0", "-45", "--scene", BENCH, "--json")
+    answer = json.loads(completed.out)
     assert answer["scene"] == BENCH
     assert answer["clearance_mm"] == -answer["hits"][0]["depth_mm"]
     assert answer["hits"][0]["with"] == "table"
-    assert "this pose hits table by 47.5 mm (q3)" in got.err
+    assert "this pose hits table by 47.5 mm (q3)" in completed.err
     assert "clearance_mm" not in run("fk", "three_dof", "0", "0", "-45", "--json").json
 
 
@@ -86,10 +86,10 @@ def test_the_best_branch_is_free_and_stands_first(table: Path) -> None:
     assert second["hits"][0]["with"] == "table"
     assert (free["branches_within_limits"], free["branches_free"]) == (2, 1)
     arm = armkin.load("three_dof", scene=table)
-    found = armkin.ik(arm, [420.0, 40.0, 210.0], near=np.deg2rad([4, -19, 42]))
-    assert found.names[found.branch[found.best]] == "left, elbow up"
-    assert found.clear[found.best]
-    assert found.clear.shape == found.valid.shape
+    solutions = armkin.ik(arm, [420.0, 40.0, 210.0], near=np.deg2rad([4, -19, 42]))
+    assert solutions.names[solutions.branch[solutions.best]] == "left, elbow up"
+    assert solutions.clear[solutions.best]
+    assert solutions.clear.shape == solutions.valid.shape
     assert "table" in run("ik", "three_dof", *target, *words).out
 
 
@@ -105,10 +105,10 @@ def test_the_nearest_pair_is_the_least_of_all(robot: str, table: Path) -> None:
 
 
 def test_no_free_branch_is_no_solution_and_names_the_hits() -> None:
-    got = run("ik", "three_dof", "300", "0", "-100", "--scene", BENCH, "--json")
-    answer = json.loads(got.out)
-    assert (got.code, answer["best"], answer["closest"]) == (3, None, None)
-    assert "every branch within limits hits something: left, elbow up hits floor by 117.5 mm (q3)" in got.err
+    completed = run("ik", "three_dof", "300", "0", "-100", "--scene", BENCH, "--json")
+    answer = json.loads(completed.out)
+    assert (completed.code, answer["best"], answer["closest"]) == (3, None, None)
+    assert "every branch within limits hits something: left, elbow up hits floor by 117.5 mm (q3)" in completed.err
 
 
 def test_a_held_joint_keeps_its_body(table: Path) -> None:
@@ -120,8 +120,8 @@ def test_a_held_joint_keeps_its_body(table: Path) -> None:
 
 def test_an_arm_without_keep_outs_is_clear_of_everything() -> None:
     arm = armkin.load("three_dof")
-    found = armkin.ik(arm, [390.0, 80.0, 300.0])
-    assert found.clear.tolist() == found.valid.tolist()
+    solutions = armkin.ik(arm, [390.0, 80.0, 300.0])
+    assert solutions.clear.tolist() == solutions.valid.tolist()
     assert armkin.clearance(arm, arm.home).mm == np.inf
 
 

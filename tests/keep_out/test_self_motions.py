@@ -25,9 +25,9 @@ def arm(tmp_path: Path) -> armkin.Arm:
 def test_the_nearest_free_posture_of_a_self_motion_is_the_branch(arm: armkin.Arm) -> None:
     assert not hits_nothing(arm, JOINTS[None]).any()
     T = armkin.fk(arm, JOINTS)
-    found = armkin.ik(arm, T, near=JOINTS)
-    assert found.status == 2
-    best = found.q[found.best]
+    solutions = armkin.ik(arm, T, near=JOINTS)
+    assert solutions.status == 2
+    best = solutions.q[solutions.best]
     assert hits_nothing(arm, best[None]).all()
     assert np.abs(armkin.fk(arm, best) - T).max() < 1e-6
     every = followed(arm, task_for(arm), JOINTS, T)
@@ -41,8 +41,8 @@ def test_the_nearest_free_posture_of_a_self_motion_is_the_branch(arm: armkin.Arm
 
 def test_without_keep_outs_the_nearest_posture_stays() -> None:
     arm = armkin.load("ur5e")
-    found = armkin.ik(arm, armkin.fk(arm, JOINTS), near=JOINTS)
-    assert np.abs(found.q[found.best] - JOINTS).max() < 1e-6
+    solutions = armkin.ik(arm, armkin.fk(arm, JOINTS), near=JOINTS)
+    assert np.abs(solutions.q[solutions.best] - JOINTS).max() < 1e-6
 
 
 def test_the_whole_of_a_self_motion_is_followed() -> None:

@@ -67,8 +67,8 @@ def test_an_arm_without_a_task_says_what_to_ask_for() -> None:
     with pytest.raises(UsageError, match=r"no task fits .* 3 joints \(RRR\) by itself: ask for task pose"):
         armkin.ik(arm, [0, 0, 0])
     q = np.array([0.3, 0.4, 0.5])
-    found = armkin.ik(arm, armkin.fk(arm, q), "pose")
-    assert np.abs(found.q[found.valid] - q).max(axis=1).min() < 1e-9
+    solutions = armkin.ik(arm, armkin.fk(arm, q), "pose")
+    assert np.abs(solutions.q[solutions.valid] - q).max(axis=1).min() < 1e-9
     four = from_links(np.tile(np.eye(4) + 100.0 * np.eye(4, k=3), (5, 1, 1)), [False] * 4)  # in the x-y plane
     with pytest.raises(UsageError, match="move the tool in 3 of its six directions"):
         armkin.ik(four, [0, 0, 0])

@@ -41,9 +41,9 @@ def legal_copies(arm: Arm, q: np.ndarray) -> list[np.ndarray]:
 
 def nodes(arm: Arm, targets: np.ndarray) -> Nodes:
     """All legal joint values at all targets."""
-    found = armkin.ik(arm, targets)
+    solutions = armkin.ik(arm, targets)
     out = []
-    for row, valid in zip(found.q, found.valid, strict=True):
+    for row, valid in zip(solutions.q, solutions.valid, strict=True):
         rows = [copy for q in row[valid] for copy in legal_copies(arm, q)]
         out.append(np.array(rows).reshape(-1, arm.n))
     return Nodes(out)

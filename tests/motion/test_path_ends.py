@@ -111,9 +111,9 @@ def test_an_offset_in_the_tool_s_frame_takes_the_posture_that_carries_what_follo
         sums = np.rad2deg([q[1] + q[2] + q[3], q[4]]).tolist()
         moves = [{"point": [*tip, *sums]}, {"offset": {"xyz": [60, 0, 100], "frame": "tool"}}]
         carried = []
-        found = armkin.ik(arm, np.array([*tip, *np.deg2rad(sums)]))
-        for b in [b for b in found.order if found.within_limits[b] and found.valid[b]]:
-            start = {"joints": np.rad2deg(found.q[b]).tolist()}
+        solutions = armkin.ik(arm, np.array([*tip, *np.deg2rad(sums)]))
+        for b in [b for b in solutions.order if solutions.within_limits[b] and solutions.valid[b]]:
+            start = {"joints": np.rad2deg(solutions.q[b]).tolist()}
             try:
                 armkin.path(arm, {"start": start, "moves": moves[1:]})
                 carried.append(True)

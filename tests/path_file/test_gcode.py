@@ -252,9 +252,9 @@ def test_the_tool_points_against_the_drawing(robot: str) -> None:
     place = place_drawing(arm, [300, 0, 50])
     definition = task_for(arm, None)
     target = targets_in(definition.labels, [[*(0.25 * arm.reach, 0.0, 0.2 * arm.reach), *place.orientation]])
-    found = armkin.ik(arm, target[0])
-    assert found.valid.any()
-    assert armkin.fk(arm, found.q[found.valid][0])[:3, 2] == pytest.approx([0, 0, -1], abs=1e-6)
+    solutions = armkin.ik(arm, target[0])
+    assert solutions.valid.any()
+    assert armkin.fk(arm, solutions.q[solutions.valid][0])[:3, 2] == pytest.approx([0, 0, -1], abs=1e-6)
 
 
 def test_a_tilt_that_a_pitch_cannot_hold_is_refused() -> None:

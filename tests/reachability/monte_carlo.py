@@ -49,21 +49,21 @@ class Volume(NamedTuple):
 
 def cells(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, count: int, starts: int) -> Cells:
     """Random cells of a map with one orientation a cell, evenly in space."""
-    found = armkin.reach(arm, grid=grid, azimuths=24, rolls=1, tool_down=_down(arm), measures=False)
-    cell, rng = found.grid, np.random.default_rng(8)
+    reach_map = armkin.reach(arm, grid=grid, azimuths=24, rolls=1, tool_down=_down(arm), measures=False)
+    cell, rng = reach_map.grid, np.random.default_rng(8)
     weight = np.repeat(cell.rings[:, 0] + 0.5, cell.azimuths)
-    some = rng.choice(found.cells, count, p=weight / weight.sum())
+    some = rng.choice(reach_map.cells, count, p=weight / weight.sum())
     turn = np.asarray((some % cell.azimuths) * (TURN / cell.azimuths), dtype=float)
     target = cell.targets(cell.rings[some // cell.azimuths], turn, np.zeros(count, int), np.zeros(count))
     other = counted(cell, target, scene_of(scene, info), starts, seed=3)
-    differs = other.reached != (found.share[some] == 1.0)
+    differs = other.reached != (reach_map.share[some] == 1.0)
     return Cells(float(other.known.mean()), int((differs & other.known).sum()), float(other.reached.mean()))
 
 
 def volume(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, count: int, starts: int) -> Volume:
     """Random places of the ball, with the map's orientation."""
-    found = armkin.reach(arm, grid=grid, azimuths=36, rolls=1, tool_down=_down(arm), measures=False)
-    cell, rng = found.grid, np.random.default_rng(9)
+    reach_map = armkin.reach(arm, grid=grid, azimuths=36, rolls=1, tool_down=_down(arm), measures=False)
+    cell, rng = reach_map.grid, np.random.default_rng(9)
     place: Array = rng.normal(size=(count, 3))
     place *= (rng.uniform(size=count) ** (1 / 3) * arm.reach / np.linalg.norm(place, axis=1))[:, None]
     r, turn = np.hypot(place[:, 0], place[:, 1]), np.arctan2(place[:, 1], place[:, 0])
@@ -71,7 +71,7 @@ def volume(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, c
     target = cell.targets(ring, turn, np.zeros(count, int), np.zeros(count))
     share = float(counted(cell, target, scene_of(scene, info), starts, seed=4).reached.mean())
     ball = 4 / 3 * np.pi * arm.reach**3
-    return Volume(found.volume_mm3 / ball, share, float(np.sqrt(share * (1 - share) / count)))
+    return Volume(reach_map.volume_mm3 / ball, share, float(np.sqrt(share * (1 - share) / count)))
 
 
 def _down(arm: armkin.Arm) -> bool:

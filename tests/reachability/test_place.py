@@ -103,10 +103,10 @@ def test_the_command_tells_the_best_and_exits_3_where_none_reaches_all(tmp_path:
     path.write_text("x,y,z\n600,0,200\n600,300,200\n")
     far.write_text("x,y,z\n0,0,200\n9000,0,200\n")
     more = ("--step", 150, "--yaw", 90)
-    found = run("place", "three_dof", "roarm_m2", path, *more, "--plot", tmp_path / "floor.png", "--json")
-    assert found.code == 0
-    assert [robot["robot"] for robot in found.json["robots"]] == ["three_dof", "roarm_m2"]
-    assert {robot["best"]["reached"] for robot in found.json["robots"]} == {2}
+    completed = run("place", "three_dof", "roarm_m2", path, *more, "--plot", tmp_path / "floor.png", "--json")
+    assert completed.code == 0
+    assert [robot["robot"] for robot in completed.json["robots"]] == ["three_dof", "roarm_m2"]
+    assert {robot["best"]["reached"] for robot in completed.json["robots"]} == {2}
     assert (tmp_path / "floor.png").stat().st_size > 10_000
     none = run("place", "three_dof", far, *more, "--json", "--area", "-300,300,-300,300")
     assert none.code == 3
@@ -150,14 +150,14 @@ def test_places_are_a_file_that_goes_on_after_a_kill(tmp_path: Path, monkeypatch
     path.write_text("x,y,z\n600,0,200\n600,300,200\n")
     monkeypatch.setattr(places, "SOLVES", 40)
     words = ("place", "three_dof", "roarm_m2", path, "--step", 200, "--yaw", 90)
-    done = run(*words, "--out", whole)
+    completed = run(*words, "--out", whole)
     with monkeypatch.context() as patch:
         patch.setattr(places, "count_chunk", interrupted(places.count_chunk, 5))
         assert run(*words, "--out", out).code == 130
     other = run("place", "three_dof", path, "--step", 100, "--out", out)
     assert other.code == 2
     assert "belongs to another job" in other.err
-    assert run(*words, "--out", out) == done
+    assert run(*words, "--out", out) == completed
     assert out.read_bytes() == whole.read_bytes()
     assert {file.name for file in tmp_path.iterdir()} == {path.name, whole.name, out.name}
     if end == "csv":
@@ -244,9 +244,9 @@ def test_the_command_tells_where_the_redundant_joint_is_held(tmp_path: Path, mon
     best = run(*words, "--json").json["robots"][0]["best"]
     assert best["reached"] == best["of"]
     assert abs(best["held"]["J7"]) > 1.0
-    said = run(*words, "--scene", scene)  # which is not in the way
-    assert f"panda, held there: J7 at {best['held']['J7']:.4g}\n" in said.out
-    assert "have no max_accel" in said.err
+    completed = run(*words, "--scene", scene)  # which is not in the way
+    assert f"panda, held there: J7 at {best['held']['J7']:.4g}\n" in completed.out
+    assert "have no max_accel" in completed.err
 
 
 def test_a_path_in_a_scene_is_asked_yaw_by_yaw_and_planned_in_it(
@@ -271,13 +271,13 @@ def test_paths_that_say_nothing_of_a_place_are_told(tmp_path: Path) -> None:
     ):
         path = tmp_path / "path.yaml"
         path.write_text(f"moves:\n  {moves}\n")
-        done = run("place", "three_dof", path)
-        assert done.code == 2
-        assert said in done.err
+        completed = run("place", "three_dof", path)
+        assert completed.code == 2
+        assert said in completed.err
     path.write_text(PATH)
-    done = run("place", "ur5e", path, "--step", 500, "--yaw", 90)
-    assert done.code == 0
-    assert "the path is not planned from there: joints J1, J2, J3, J4, J5, J6 have no max_accel" in done.err
+    completed = run("place", "ur5e", path, "--step", 500, "--yaw", 90)
+    assert completed.code == 0
+    assert "the path is not planned from there: joints J1, J2, J3, J4, J5, J6 have no max_accel" in completed.err
     with pytest.raises(UsageError, match="a path to place an arm for"):
         armkin.place(armkin.load("ur5e"), "path.svg")
 

@@ -63,9 +63,9 @@ def test_arcs_are_what_each_pose_says(name: str) -> None:
 
 def test_rings_that_no_branch_reaches_are_counted_as_that() -> None:
     grid = Grid(armkin.load("moveo"), 60.0, 2, 4, 1, False)
-    found = cell_columns(Question(grid, measures=False), np.array([[11, 11]]))  # 930 mm away, of 761
-    assert found["share"].tolist() == found["share_any"].tolist() == [0.0, 0.0]
-    assert np.isnan(found["branches"]).all()
+    columns = cell_columns(Question(grid, measures=False), np.array([[11, 11]]))  # 930 mm away, of 761
+    assert columns["share"].tolist() == columns["share_any"].tolist() == [0.0, 0.0]
+    assert np.isnan(columns["branches"]).all()
 
 
 @pytest.mark.parametrize("name", ["puma560", "cobra600", "three_dof"])
@@ -83,20 +83,20 @@ def test_pose_by_pose_says_the_same_as_arcs(name: str) -> None:
 
 def test_cells_stand_where_the_contract_puts_them() -> None:
     arm = armkin.load("ur5e")
-    found = armkin.reach(arm, grid=300.0, azimuths=4, directions=3, rolls=2)
-    rings = found.grid.rings
-    assert found.cells == 4 * len(rings)
-    assert found.answers == found.cells * 6
-    first = found.grid.frame[:3, 3] + found.grid.frame[:3, :3] @ [150.0, 0.0, rings[0, 1] * 300.0]
-    assert np.allclose([found.x_mm[0], found.y_mm[0], found.z_mm[0]], first)
+    reach_map = armkin.reach(arm, grid=300.0, azimuths=4, directions=3, rolls=2)
+    rings = reach_map.grid.rings
+    assert reach_map.cells == 4 * len(rings)
+    assert reach_map.answers == reach_map.cells * 6
+    first = reach_map.grid.frame[:3, 3] + reach_map.grid.frame[:3, :3] @ [150.0, 0.0, rings[0, 1] * 300.0]
+    assert np.allclose([reach_map.x_mm[0], reach_map.y_mm[0], reach_map.z_mm[0]], first)
     r2 = (rings[:, 0] + 0.5) ** 2 * 9e4 + rings[:, 1] ** 2 * 9e4
     assert r2.max() <= arm.reach**2 * (1 + 1e-9)
     assert np.array_equal(rings, np.unique(rings, axis=0))
-    R = found.grid.targets(rings[:3], np.zeros(3), np.arange(3), np.zeros(3))[:, :3, :3]
+    R = reach_map.grid.targets(rings[:3], np.zeros(3), np.arange(3), np.zeros(3))[:, :3, :3]
     assert np.allclose(R @ np.swapaxes(R, 1, 2), np.eye(3))
     z = 1 - (2 * np.arange(3) + 1) / 3
-    assert np.allclose((found.grid.frame[:3, :3].T @ R[..., 2].T)[2], z)
-    assert found.units["x_mm"] == "mm"
+    assert np.allclose((reach_map.grid.frame[:3, :3].T @ R[..., 2].T)[2], z)
+    assert reach_map.units["x_mm"] == "mm"
 
 
 def test_keep_outs_take_orientations_away_and_are_asked_pose_by_pose() -> None:
@@ -135,23 +135,23 @@ def test_an_arm_of_seven_joints_is_asked_pose_by_pose() -> None:
 
 
 def test_a_voxel_takes_the_cell_that_its_centre_lies_in() -> None:
-    found = armkin.reach(armkin.load("puma560"), grid=150.0, azimuths=7, directions=3, rolls=2, measures=False)
-    grid, F = found.grid, found.grid.frame
-    centres = np.stack([found.x_mm, found.y_mm, found.z_mm], axis=1)
+    reach_map = armkin.reach(armkin.load("puma560"), grid=150.0, azimuths=7, directions=3, rolls=2, measures=False)
+    grid, F = reach_map.grid, reach_map.grid.frame
+    centres = np.stack([reach_map.x_mm, reach_map.y_mm, reach_map.z_mm], axis=1)
     local = (centres - F[:3, 3]) @ F[:3, :3]
     rng = np.random.default_rng(5)
     r, z = np.hypot(local[:, 0], local[:, 1]), local[:, 2]
     turn = np.arctan2(local[:, 1], local[:, 0]) + rng.uniform(-0.999, 0.999, len(r)) * np.pi / 7
     r, z = r + rng.uniform(-74.9, 74.9, len(r)), z + rng.uniform(-74.9, 74.9, len(r))
     inside = voxels.rows_at(grid, np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1))
-    assert np.array_equal(inside, np.arange(found.cells))
+    assert np.array_equal(inside, np.arange(reach_map.cells))
     assert (voxels.rows_at(grid, np.array([[5000.0, 0, 0], [0, 0, -5000.0]])) == -1).all()
     top, low = (float(end(local[:, 2])) for end in (np.max, np.min))  # of the cells, and the next ones beyond
     beyond = voxels.rows_at(grid, np.array([[1.0, 0, top + 150.0], [1.0, 0, low - 150.0]]))
     assert (beyond == -1).all()
     side = voxels.section_layer(grid)
     assert (side.row % 7 == np.where(side.places[:, 0] >= 0, 0, side.row % 7)).all()
-    assert side.table(found.share).shape == (np.ptp(side.places[:, 1]) + 1, np.ptp(side.places[:, 0]) + 1)
+    assert side.table(reach_map.share).shape == (np.ptp(side.places[:, 1]) + 1, np.ptp(side.places[:, 0]) + 1)
 
 
 def reach(*more: object) -> Result:
@@ -177,9 +177,9 @@ def test_engines_and_kills_change_no_byte(tmp_path: Path, monkeypatch: pytest.Mo
         patch.setattr(maps, "answer_chunk", interrupted(maps.answer_chunk, 4))
         assert reach("--out", three).code == 130
     assert (tmp_path / f"c.{end}.parts" / "00000002").exists()
-    other = run("reach", "puma560", "--grid", 200, "--out", three)
-    assert other.code == 2
-    assert "belongs to another job: " in other.err
+    completed = run("reach", "puma560", "--grid", 200, "--out", three)
+    assert completed.code == 2
+    assert "belongs to another job: " in completed.err
     assert reach("--out", three).code == 0
     assert digest(one) == digest(two) == digest(three)
     assert {path.name for path in tmp_path.iterdir()} == {f"{name}.{end}" for name in "abc"}
@@ -209,9 +209,9 @@ def test_bad_input_is_told(settings: dict[str, float], said: str) -> None:
 
 
 def test_tool_down_is_one_direction() -> None:
-    found = armkin.reach(armkin.load("ur5e"), grid=250.0, azimuths=4, rolls=3, tool_down=True)
-    assert found.orientations == 3
-    T = found.grid.targets(found.grid.rings[:1], np.zeros(1), np.zeros(1, int), np.zeros(1))
+    reach_map = armkin.reach(armkin.load("ur5e"), grid=250.0, azimuths=4, rolls=3, tool_down=True)
+    assert reach_map.orientations == 3
+    T = reach_map.grid.targets(reach_map.grid.rings[:1], np.zeros(1), np.zeros(1, int), np.zeros(1))
     assert np.allclose(T[0, :3, 2], [0, 0, -1])
     pitch = armkin.reach(armkin.load("so101"), grid=100.0, azimuths=4, rolls=1, tool_down=True)
     grid = pitch.grid

@@ -11,7 +11,7 @@ import pytest
 import armkin
 from armkin.errors import FileError
 from armkin.robot_file import catalogue
-from command_line import process
+from command_line import run_process
 
 ROOT = Path(__file__).parents[2]
 
@@ -31,8 +31,8 @@ def test_a_name_works_from_any_folder(tmp_path: Path, monkeypatch: pytest.Monkey
     arm = armkin.load("three_dof")
     assert (arm.path, arm.name) == ("three_dof", "three_dof")
     assert arm.sha256 == armkin.load(ROOT / "robots" / "three_dof.yaml").sha256
-    found = process("fk", "three_dof", -30, 5, -5, "--json", cwd=tmp_path)
-    assert (found.code, found.json["robot_file"]) == (0, "three_dof")
+    completed = run_process("fk", "three_dof", -30, 5, -5, "--json", cwd=tmp_path)
+    assert (completed.code, completed.json["robot_file"]) == (0, "three_dof")
 
 
 def test_a_path_wins_over_a_name_and_a_name_over_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

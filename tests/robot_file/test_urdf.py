@@ -22,8 +22,8 @@ from urdf_chains import text as as_urdf
 
 
 def imported(chain: dict[str, Any], **settings: Any) -> armkin.Arm:
-    found = urdf_reader.parse_urdf(as_urdf(chain).encode(), base=chain["base"], tip=chain["tip"], **settings)
-    return build(robot_file.parse_robot_file(format_robot_file(found.data, found.notes)))
+    imported = urdf_reader.parse_urdf(as_urdf(chain).encode(), base=chain["base"], tip=chain["tip"], **settings)
+    return build(robot_file.parse_robot_file(format_robot_file(imported.data, imported.notes)))
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -197,11 +197,11 @@ def test_axis_is_x_by_default_and_need_not_be_of_length_1() -> None:
 
 def test_limits_of_zero_none_and_away_from_zero() -> None:
     changes = (('lower="-2" upper="2"', 'lower="0" upper="0"'), ('lower="-2" upper="2"', 'lower="0.5" upper="1.5"'))
-    found = urdf_reader.parse_urdf(document(*changes))
-    assert "limits" not in found.data["joints"][0]
-    assert found.data["joints"][1]["home"] == pytest.approx(np.degrees(1.0))
-    assert len(found.notes) == 2
-    robot_file.parse_robot_file(format_robot_file(found.data))
+    imported = urdf_reader.parse_urdf(document(*changes))
+    assert "limits" not in imported.data["joints"][0]
+    assert imported.data["joints"][1]["home"] == pytest.approx(np.degrees(1.0))
+    assert len(imported.notes) == 2
+    robot_file.parse_robot_file(format_robot_file(imported.data))
     none = urdf_reader.parse_urdf(document(('<limit lower="-2" upper="2" velocity="1.5" effort="-1"/>', "")))
     assert none.notes == ("joint shoulder has no <limit>: read as no limits",)
 
@@ -214,11 +214,11 @@ def test_limits_lose_the_noise_of_radians() -> None:
 
 
 def test_names_that_a_robot_file_cannot_have_are_changed_and_said() -> None:
-    found = urdf_reader.parse_urdf(
+    imported = urdf_reader.parse_urdf(
         document(('name="shoulder"', 'name="/px100/1st joint"'), ('name="elbow"', 'name="2"'))
     )
-    assert [joint["name"] for joint in found.data["joints"]] == ["_px100_1st_joint", "_2", "wrist"]
-    assert found.notes == ("joint /px100/1st joint is named _px100_1st_joint", "joint 2 is named _2")
+    assert [joint["name"] for joint in imported.data["joints"]] == ["_px100_1st_joint", "_2", "wrist"]
+    assert imported.notes == ("joint /px100/1st joint is named _px100_1st_joint", "joint 2 is named _2")
 
 
 def test_a_joint_and_a_link_may_share_a_name_and_transmissions_do_not_count() -> None:
@@ -237,8 +237,8 @@ def test_an_empty_line_first_and_elements_of_simulators_do_no_harm() -> None:
 
 
 def test_base_and_tip_choose_a_part_of_the_chain() -> None:
-    found = urdf_reader.parse_urdf(document(), base="upper", tip="hand")
-    assert [joint["name"] for joint in found.data["joints"]] == ["elbow", "wrist"]
+    imported = urdf_reader.parse_urdf(document(), base="upper", tip="hand")
+    assert [joint["name"] for joint in imported.data["joints"]] == ["elbow", "wrist"]
     with pytest.raises(UsageError, match="there is no link hnd for the tip; the links are base, upper, lower, hand"):
         urdf_reader.parse_urdf(document(), tip="hnd")
     with pytest.raises(UsageError, match="tip base does not hang on base upper"):
@@ -247,10 +247,10 @@ def test_base_and_tip_choose_a_part_of_the_chain() -> None:
 
 def test_a_mimic_joint_off_the_chain_is_ignored() -> None:
     more = TWO_ENDS.replace("<limit", '<mimic joint="wrist"/><limit')
-    found = urdf_reader.parse_urdf(
+    imported = urdf_reader.parse_urdf(
         document(('</joint>\n<joint name="elbow', f'</joint>{more}\n<joint name="elbow')), tip="tcp"
     )
-    assert len(found.data["joints"]) == 3
+    assert len(imported.data["joints"]) == 3
 
 
 def test_nothing_but_the_file_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -319,11 +319,11 @@ def test_the_command_prints_a_robot_file_and_says_what_it_read(tmp_path: Path) -
     assert "--tip LINK" in several.err
     assert "--base" not in several.err
     assert "--" not in run("import", path, "--tip", "world", "--base", "tool0").err
-    done = run("import", path, "--tip", "tool0")
-    assert done.code == 0
-    assert "note: 6 joints from world to tool0" in done.err
+    completed = run("import", path, "--tip", "tool0")
+    assert completed.code == 0
+    assert "note: 6 joints from world to tool0" in completed.err
     screws = tmp_path / "screws.yaml"
-    screws.write_text(done.out)
+    screws.write_text(completed.out)
     table = tmp_path / "dh.yaml"
     assert run("import", path, "--tip", "tool0", "--dh", "--out", table).code == 0
     q = (10, -80, 70, -60, 50, 40)

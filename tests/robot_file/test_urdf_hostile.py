@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import armkin
-from command_line import process, run
+from command_line import run, run_process
 from quick import least
 
 WORDS = [
@@ -93,11 +93,11 @@ def test_it_ends_in_words_or_in_a_robot_file(name: str, tmp_path: Path) -> None:
 def test_what_looks_like_another_unit_is_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "x.urdf"
     path.write_text(urdf(xyz="0 0 250", limit='lower="-180" upper="180"'))
-    done = run("import", path)
-    assert done.code == 0
-    assert "l3 is 750 m from l0: a URDF is in metres, are these millimetres?" in done.err
-    assert "joint a turns -10313.2" in done.err
-    assert "a URDF is in radians, are these degrees?" in done.err
+    completed = run("import", path)
+    assert completed.code == 0
+    assert "l3 is 750 m from l0: a URDF is in metres, are these millimetres?" in completed.err
+    assert "joint a turns -10313.2" in completed.err
+    assert "a URDF is in radians, are these degrees?" in completed.err
     path.write_text(urdf(limit='lower="-1e16" upper="1e16"'))
     endless = run("import", path)
     assert "joint a has limits beyond 1000000 deg: read as no limits" in endless.err
@@ -111,8 +111,8 @@ def test_a_pipe_is_read_once(tmp_path: Path) -> None:
     os.mkfifo(fifo)
     writer = threading.Thread(target=lambda: fifo.write_text(rough))
     writer.start()
-    done = process("import", fifo)
+    completed = run_process("import", fifo)
     writer.join()
     piped = run("import", "-", stdin=rough.encode())
-    assert (done.code, piped.code) == (0, 0)
-    assert done.out.splitlines()[3:] == piped.out.splitlines()[3:]
+    assert (completed.code, piped.code) == (0, 0)
+    assert completed.out.splitlines()[3:] == piped.out.splitlines()[3:]

@@ -102,9 +102,9 @@ def _heard(events: http.client.HTTPResponse, topic: str, until: Callable[[Any], 
         if line.startswith("event: "):
             current = line[7:]
         elif line.startswith("data: ") and current == topic:
-            data = json.loads(line[6:])
-            if until(data):
-                return data
+            answer = json.loads(line[6:])
+            if until(answer):
+                return answer
     raise AssertionError(f"no such news of {topic} within a minute")
 
 

@@ -32,8 +32,8 @@ def test_the_interval_is_that_of_the_family(tmp_path: Path) -> None:
     (tmp_path / "ask.mjs").write_text(_ASK)
     asked = [scene_json(arm), units.joints_out(arm, np.concatenate([q, outside[None]])).tolist()]
     (tmp_path / "asked.json").write_text(json.dumps(asked))
-    said = subprocess.run([node, "ask.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300)
-    *found, none = json.loads(said.stdout)
+    completed = subprocess.run([node, "ask.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300)
+    *found, none = json.loads(completed.stdout)
     assert none is None
     s = armkin.ik(arm, armkin.fk(arm, q), near=q)
     assert s.interval is not None
