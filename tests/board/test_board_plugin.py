@@ -89,10 +89,12 @@ def test_both_arms_move_exactly_and_keep_to_their_path(tmp_path: Path) -> None:
             port.log.clear()
             board.machine.run([plan])
             assert list(board.machine.counts()) == plan.end.tolist()
-            at = np.array([list(shafts.values()) for shafts in port.log])
+            positions = np.array([list(shafts.values()) for shafts in port.log])
             way = np.array(plan.end - plan.start, dtype=float)
-            share = (at - plan.start) @ way / (way @ way)
-            assert np.abs(at - plan.start - share[:, None] * way).max() < 12  # a degree off the straight joint move
+            share = (positions - plan.start) @ way / (way @ way)
+            assert (
+                np.abs(positions - plan.start - share[:, None] * way).max() < 12
+            )  # a degree off the straight joint move
 
 
 @pytest.mark.usefixtures("installed")
@@ -107,8 +109,8 @@ def test_a_path_from_elsewhere_lost_and_damaged_answers(tmp_path: Path) -> None:
     path_run.follow_plan(
         board, plan, path_run.lay_parts(plan, board.machine.counts(), board.lay), lambda done, total: None
     )
-    off = np.array([servo.position for servo in port.servos.values()]) - armkin.pulses(arm, plan.motion.end)
-    assert np.abs(off).max() <= 12
+    distance = np.array([servo.position for servo in port.servos.values()]) - armkin.pulses(arm, plan.motion.end)
+    assert np.abs(distance).max() <= 12
 
 
 @pytest.mark.usefixtures("installed")
@@ -149,7 +151,7 @@ def test_it_conforms(case: Callable[..., None]) -> None:
 
 def test_the_command_line_knows_the_kind(packages: Path, tmp_path: Path) -> None:
     robot = robots(tmp_path)[1]
-    there = {**os.environ, "PYTHONPATH": str(packages)}
-    completed = run_process("send", robot, 10, -10, 10, 5, 5, 5, "--port", "sim", "--json", env=there)
+    environment = {**os.environ, "PYTHONPATH": str(packages)}
+    completed = run_process("send", robot, 10, -10, 10, 5, 5, 5, "--port", "sim", "--json", env=environment)
     assert completed.code == 0, completed.err
     assert completed.json["joints"] == pytest.approx([10, -10, 10, 5, 5, 5], abs=0.1)

@@ -34,19 +34,19 @@ def test_golden_conversations(path: Path) -> None:
     waiting: list[bytes] = []
     checked = 0
     for number, text in enumerate(path.read_text().splitlines(), 1):
-        word, _, rest = text.partition(" ")
+        word, _, argument = text.partition(" ")
         if not text or word == "#":
             continue
         if word == "board":
-            board = SimBoard(BOARDS[rest])
+            board = SimBoard(BOARDS[argument])
             continue
         assert board is not None
         if word == ">":
-            board.receive(protocol.encode_frame(bytes.fromhex(rest)))
+            board.receive(protocol.encode_frame(bytes.fromhex(argument)))
         elif word == "wire":
-            board.receive(bytes.fromhex(rest))
+            board.receive(bytes.fromhex(argument))
         elif word == "wait":
-            board.advance(int(rest) / 1000)
+            board.advance(int(argument) / 1000)
         elif word == "reset":
             board.reset()
         elif word == "silent":
@@ -56,9 +56,11 @@ def test_golden_conversations(path: Path) -> None:
         else:
             assert word == "<", f"{path.name}:{number}"
             waiting += splitter.feed(board.take())
-            got = waiting.pop(0).hex()
-            shown = "".join("??" if rest[i : i + 2] == "??" else got[i : i + 2] for i in range(0, len(got), 2))
-            assert shown == rest, f"{path.name}:{number}"
+            answer = waiting.pop(0).hex()
+            shown = "".join(
+                "??" if argument[i : i + 2] == "??" else answer[i : i + 2] for i in range(0, len(answer), 2)
+            )
+            assert shown == argument, f"{path.name}:{number}"
             checked += 1
     assert checked >= 2
     assert waiting == []
@@ -236,8 +238,8 @@ def test_the_abort_input_stops_and_blocks() -> None:
     assert host.status().error == Error.ABORT
     assert host.status().state == State.IDLE
     host.hello()
-    at = host.status().counts
-    assert host.move([0], at[:1], [whole_steps(10, 1600, 0, (1,))], at_rest=True) == Error.ABORT
+    counts = host.status().counts
+    assert host.move([0], counts[:1], [whole_steps(10, 1600, 0, (1,))], at_rest=True) == Error.ABORT
 
 
 def test_homing_finds_the_edge() -> None:
@@ -305,13 +307,13 @@ def test_a_lost_axis_jogs_slowly() -> None:
 def test_a_planned_line_runs_to_its_count() -> None:
     host = ready()
     segments = straight_line([0, 0, 0], [-1067, -10144, 5667], 1.2, 2.0).segments
-    at, done = [0, 0, 0], 0
-    while done < len(segments):
+    counts, sent = [0, 0, 0], 0
+    while sent < len(segments):
         free = host.status().free
-        for s in list(segments)[done : done + free]:
-            done += 1
-            assert host.move([0, 1, 2], at, [s], at_rest=done == len(segments)) == Error.OK
-            at = host.board.motors.queue.plan_counts()[:3]
+        for s in list(segments)[sent : sent + free]:
+            sent += 1
+            assert host.move([0, 1, 2], counts, [s], at_rest=sent == len(segments)) == Error.OK
+            counts = host.board.motors.queue.plan_counts()[:3]
         host.board.advance(0.01)
     while host.status().state == State.MOVING:
         host.board.advance(0.1)
@@ -342,14 +344,14 @@ def test_mutated_frames_move_nothing_that_was_not_sent() -> None:
         host.board.receive(protocol.encode_frame(bytes(frame)))
         list(host.splitter.feed(host.board.take()))
         host.board.advance(0.02)
-        now = list(host.status().counts)
-        if now != base:
+        counts = list(host.status().counts)
+        if counts != base:
             moved += 1
             host.board.advance(3)
-            now = list(host.status().counts)
+            counts = list(host.status().counts)
             # Only what leads from the true start to an end that the frame names.
             assert frame[0] == protocol.Type.MOTION
-            limits = [AXIS.lower <= c <= AXIS.upper for c in now[:3]]
+            limits = [AXIS.lower <= c <= AXIS.upper for c in counts[:3]]
             assert all(limits)
         while host.status().state != State.IDLE:
             host.board.advance(0.5)

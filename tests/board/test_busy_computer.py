@@ -48,18 +48,18 @@ def prepared() -> tuple[Suspended, FirmwareMachine]:
 
 
 def test_a_program_that_was_suspended_does_not_take_the_board_for_gone() -> None:
-    port, one = prepared()
+    port, machine = prepared()
     port.every = 0.3
-    one.run([one.plan(one.counts(), np.deg2rad(POSE)[None])])
+    machine.run([machine.plan(machine.counts(), np.deg2rad(POSE)[None])])
     assert port.paused > 5 * PAUSE
-    assert one.counts() == tuple(COUNTS)
+    assert machine.counts() == tuple(COUNTS)
 
 
 def test_a_board_that_is_gone_is_told_within_two_seconds() -> None:
-    port, one = prepared()
+    port, machine = prepared()
     port.silent, began = True, port.now()
     with pytest.raises(LinkError, match="does not answer any more"):
-        one.run([one.plan(one.counts(), np.deg2rad(POSE)[None])])
+        machine.run([machine.plan(machine.counts(), np.deg2rad(POSE)[None])])
     assert port.now() - began < 2.0
 
 
@@ -78,13 +78,13 @@ class SuspendedBus(ServoBus):
 
 def test_servos_go_on_where_they_were() -> None:
     port = SuspendedBus(bus().servos.values())
-    one = connect_servos(port)
-    start, began = np.array(one.counts()), port.now()
-    plan = one.plan(one.counts(), np.array([2.0, -1.5, 1.0]))
+    machine = connect_servos(port)
+    start, began = np.array(machine.counts()), port.now()
+    plan = machine.plan(machine.counts(), np.array([2.0, -1.5, 1.0]))
     port.due = port.now() + plan.duration / 2
-    one.run([plan])
+    machine.run([plan])
     assert port.now() - began > PAUSE
-    places = np.array([[at[k] for k in (1, 2, 3)] for _, at in port.log])
+    places = np.array([[position_of[k] for k in (1, 2, 3)] for _, position_of in port.log])
     way = plan.end - start
     share = ((places - start) @ way) / (way @ way)
     assert np.abs(places - start - share[:, None] * way).max() < 25  # 2 degrees, as without a pause

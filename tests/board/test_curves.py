@@ -43,7 +43,7 @@ def test_a_path_at_random_arrives_at_exact_counts(seed: int) -> None:
     laid = lay_parts(plan, machine.counts(), machine.lay)
     follow_plan(board, plan, laid, lambda done, total: None)
     assert machine.counts() == tuple(laid[-1].end.tolist())
-    assert sum(one.segments for one in laid) < 100 * plan.duration + 50
+    assert sum(part.segments for part in laid) < 100 * plan.duration + 50
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -71,8 +71,8 @@ def test_a_board_that_is_sent_positions_slows_down_gently_on_curves() -> None:
 
     ramp = braking_time(circle.motion)
     assert asked(ramp) <= 1.63 < asked(0.625 * ramp)
-    there = armkin.path(arm, {"moves": [{"joint": {"q1": 60}}]})
-    assert braking_time(there.motion) == pytest.approx(0.5)  # 60 deg/s at 120 deg/s2
+    plan = armkin.path(arm, {"moves": [{"joint": {"q1": 60}}]})
+    assert braking_time(plan.motion) == pytest.approx(0.5)  # 60 deg/s at 120 deg/s2
 
 
 def test_segments_follow_the_plan_in_time_and_place() -> None:
@@ -98,7 +98,7 @@ def test_chords_that_may_be_long_are_told_without_a_look(seed: int, monkeypatch:
     arm = armkin.load("three_dof")
     plan = armkin.path(arm, some_path(seed), tool_speed=20)
     looked: list[int] = []
-    at = armkin.pulses(arm, plan.motion.start)
+    counts = armkin.pulses(arm, plan.motion.start)
 
     def counted(arm: armkin.Arm, q: Array) -> Array:
         looked.append(len(q))
@@ -108,10 +108,10 @@ def test_chords_that_may_be_long_are_told_without_a_look(seed: int, monkeypatch:
 
     def bounds(arm: armkin.Arm) -> list[float]:
         ways = [s for s in plan.motion.stretches if isinstance(s, Curve)]
-        parts = [curve_segments.CurveSegments(arm, s, at, at, 16_000_000, 576, 0.05) for s in ways]
+        parts = [curve_segments.CurveSegments(arm, s, counts, counts, 16_000_000, 576, 0.05) for s in ways]
         return [t for part in parts for t in part.bounds().tolist()]
 
-    found, few = bounds(arm), sum(looked)
+    times, looks = bounds(arm), sum(looked)
     looked.clear()
-    assert bounds(replace(arm, reach=1e6)) == found
-    assert few < 0.7 * sum(looked)
+    assert bounds(replace(arm, reach=1e6)) == times
+    assert looks < 0.7 * sum(looked)

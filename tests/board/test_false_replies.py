@@ -127,8 +127,8 @@ COMMANDS: dict[str, Callable[[FirmwareMachine], object]] = {
 def switched() -> Arm:
     """With a limit switch on every joint, beside its home pose."""
     text = Path("robots/three_dof.yaml").read_text()
-    for axis, at in zip("XYZ", (-20, 75, -105), strict=True):
-        homing = f"homing: {{switch: {axis}, direction: -1, at: {at}, speed: 40, backoff: 3, normally: open}}"
+    for axis, switch_value in zip("XYZ", (-20, 75, -105), strict=True):
+        homing = f"homing: {{switch: {axis}, direction: -1, at: {switch_value}, speed: 40, backoff: 3, normally: open}}"
         text = text.replace(f"    drive: {{axis: {axis},", f"    {homing}\n    drive: {{axis: {axis},")
     return arms.build(parse_robot_file(text))
 

@@ -27,8 +27,8 @@ def patiently(ask: Callable[[], Any], right: Callable[[Any], bool]) -> Any:
     end = time.monotonic() + 60
     while time.monotonic() < end:
         with suppress(IndexError):  # what the library makes of half an answer
-            if right(found := ask()):
-                return found
+            if right(answer := ask()):
+                return answer
     raise AssertionError("no right answer in a minute")
 
 
@@ -39,20 +39,20 @@ def test_the_makers_library_drives_the_simulated_servos() -> None:
         assert port.openPort()
         port.setBaudRate(1_000_000)
         for number in SIX:  # a late answer to the question before is no right one
-            patiently(partial(maker.ping, port, number), lambda found: found == (777, 0, 0))
+            patiently(partial(maker.ping, port, number), lambda answer: answer == (777, 0, 0))
             patiently(partial(maker.read2ByteTxRx, port, number, 56), (1000 + number, 0, 0).__eq__)
         assert maker.ping(port, 9)[1] != 0
 
-        patiently(lambda: maker.write1ByteTxRx(port, 3, 40, 1), lambda found: found == (0, 0))
-        patiently(lambda: maker.write2ByteTxRx(port, 3, 46, 2000), lambda found: found == (0, 0))
+        patiently(lambda: maker.write1ByteTxRx(port, 3, 40, 1), lambda answer: answer == (0, 0))
+        patiently(lambda: maker.write2ByteTxRx(port, 3, 46, 2000), lambda answer: answer == (0, 0))
         goals = sdk.GroupSyncWrite(port, maker, 42, 2)
         goals.addParam(3, [2000 & 0xFF, 2000 >> 8])
         goals.txPacket()
-        patiently(lambda: maker.read2ByteTxRx(port, 3, 56), lambda found: found == (2000, 0, 0))
+        patiently(lambda: maker.read2ByteTxRx(port, 3, 56), lambda answer: answer == (2000, 0, 0))
         places = sdk.GroupSyncRead(port, maker, 56, 2)
         for number in SIX:
             places.addParam(number)
-        patiently(places.txRxPacket, lambda found: found == 0)
+        patiently(places.txRxPacket, lambda answer: answer == 0)
         assert [places.getData(number, 56, 2) for number in SIX] == [1001, 1002, 2000, 1004, 1005, 1006]
         port.closePort()
 
@@ -108,14 +108,14 @@ def test_a_servo_that_is_gone_is_named() -> None:
 
 def test_whole_packets_come_out_of_any_bytes() -> None:
     rng = random.Random(4)
-    whole = [packet.packet(rng.randrange(1, 253), 0, rng.randbytes(rng.randrange(9))) for _ in range(300)]
+    packets = [packet.packet(rng.randrange(1, 253), 0, rng.randbytes(rng.randrange(9))) for _ in range(300)]
     splitter = Splitter()
-    found: list[Any] = []
-    for one in whole:
-        data = rng.randbytes(rng.randrange(3)).replace(b"\xff", b"") + one
+    replies: list[Any] = []
+    for whole_packet in packets:
+        data = rng.randbytes(rng.randrange(3)).replace(b"\xff", b"") + whole_packet
         for k in range(0, len(data), 3):
-            found += splitter.feed(data[k : k + 3])
-    assert [packet.packet(reply.id, reply.errors, reply.data) for reply in found] == whole
+            replies += splitter.feed(data[k : k + 3])
+    assert [packet.packet(reply.id, reply.errors, reply.data) for reply in replies] == packets
 
 
 @pytest.mark.parametrize("value", [0, 1, 2047, -1, -2047])

@@ -30,7 +30,7 @@ HOME = armkin.pulses(ARM, ARM.home).tolist()
 
 
 def bus(noise: Noise | None = None) -> ServoBus:
-    return ServoBus((Servo(k + 1, at) for k, at in enumerate(HOME)), noise=noise)
+    return ServoBus((Servo(k + 1, position) for k, position in enumerate(HOME)), noise=noise)
 
 
 def connect_servos(port: ServoBus, stop: Callable[[], bool] = lambda: False) -> ServoMachine:
@@ -55,7 +55,7 @@ def test_random_moves_arrive_and_stay_near_their_line(noise: Noise | None) -> No
         plan = machine.plan(machine.counts(), goal)
         machine.run([plan])
         assert np.abs(np.array(machine.counts()) - armkin.pulses(ARM, goal)).max() <= SETTLED
-        places = np.array([[at[k] for k in (1, 2, 3)] for _, at in port.log])
+        places = np.array([[position_of[k] for k in (1, 2, 3)] for _, position_of in port.log])
         way = plan.end - start
         share = ((places - start) @ way) / (way @ way)
         aside = np.linalg.norm(places - start - share[:, None] * way, axis=1)
@@ -73,8 +73,8 @@ def test_nothing_moves_when_the_motors_go_on() -> None:
 
 def test_a_stop_slows_down_on_the_line() -> None:
     port = bus()
-    asked = iter(range(10_000))
-    machine = connect_servos(port, lambda: next(asked) > 40)
+    polls = iter(range(10_000))
+    machine = connect_servos(port, lambda: next(polls) > 40)
     goal = np.deg2rad([120, 60, -90])
     plan = machine.plan(machine.counts(), goal)
     with pytest.raises(StoppedError):
@@ -102,9 +102,9 @@ def test_a_servos_errors_are_told() -> None:
     port.servos[3].errors = 36
     with pytest.raises(LinkError, match=r"servo 3 \(j3\) reports overheating, overload"):
         machine.run([machine.plan(machine.counts(), np.deg2rad([20, 20, 20]))])
-    found = machine.report()["servos"][2]
-    assert found["errors"] == ["overheating", "overload"]
-    assert (found["voltage"], found["temperature"], found["torque"]) == (7.4, 31, True)
+    servo = machine.report()["servos"][2]
+    assert servo["errors"] == ["overheating", "overload"]
+    assert (servo["voltage"], servo["temperature"], servo["torque"]) == (7.4, 31, True)
 
 
 def test_servos_that_are_missing_are_named() -> None:
@@ -114,10 +114,10 @@ def test_servos_that_are_missing_are_named() -> None:
 
 def test_a_cable_that_is_pulled_in_motion_is_told() -> None:
     port = bus()
-    asked = iter(range(10_000))
+    polls = iter(range(10_000))
 
     def pull() -> bool:
-        if next(asked) == 20:
+        if next(polls) == 20:
             port.servos.clear()
         return False
 
@@ -159,21 +159,21 @@ def stuck(number: int, after: float) -> tuple[ServoBus, ServoMachine]:
 
 @pytest.mark.parametrize("number", [1, 3])
 def test_a_move_has_arrived_when_every_servo_has(number: int) -> None:
-    port, one = stuck(number, 100)
+    port, machine = stuck(number, 100)
     with pytest.raises(LinkError, match=rf"servo {number} \(j{number}\) stands 1[0-9][0-9] counts from its goal"):
-        one.run([one.plan(one.counts(), np.deg2rad([20, -20, 20]))])
+        machine.run([machine.plan(machine.counts(), np.deg2rad([20, -20, 20]))])
     blocked = port.servos[number]
     assert blocked.get(registers.GOAL_POSITION) == pytest.approx(blocked.position, abs=10)  # it pushes no longer
 
 
 def test_all_servos_are_held_where_they_stand_when_one_falls_behind() -> None:
-    port, one = stuck(1, 100)
+    port, machine = stuck(1, 100)
     with pytest.raises(LinkError, match=r"servo 1 \(j1\) is \d+ counts behind"):
-        one.run([one.plan(one.counts(), np.deg2rad([120, -120, 120]))])
-    there = [servo.position for servo in port.servos.values()]
-    assert [servo.get(registers.GOAL_POSITION) for servo in port.servos.values()] == pytest.approx(there, abs=40)
+        machine.run([machine.plan(machine.counts(), np.deg2rad([120, -120, 120]))])
+    positions = [servo.position for servo in port.servos.values()]
+    assert [servo.get(registers.GOAL_POSITION) for servo in port.servos.values()] == pytest.approx(positions, abs=40)
     port.advance(2.0)
-    assert [servo.position for servo in port.servos.values()] == pytest.approx(there, abs=40)
+    assert [servo.position for servo in port.servos.values()] == pytest.approx(positions, abs=40)
 
 
 def test_a_goal_outside_a_servo_s_own_limits_is_refused_before_anything_moves() -> None:

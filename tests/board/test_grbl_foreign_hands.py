@@ -28,12 +28,12 @@ _numbers = itertools.count()
 def port(request: pytest.FixtureRequest) -> Iterator[Grbl]:
     """A board whose port has a name of its own, so that its record is."""
     hal = bool(request.param)
-    found = Grbl(4, f"foreign-{os.getpid()}-{next(_numbers)}", FITS | ({384: 1} if hal else {}), hal=hal)
-    found.simulated = False
-    found.step = 0.01
-    yield found
-    if os.path.exists(record_path(found.name)):
-        os.unlink(record_path(found.name))
+    grbl = Grbl(4, f"foreign-{os.getpid()}-{next(_numbers)}", FITS | ({384: 1} if hal else {}), hal=hal)
+    grbl.simulated = False
+    grbl.step = 0.01
+    yield grbl
+    if os.path.exists(record_path(grbl.name)):
+        os.unlink(record_path(grbl.name))
 
 
 def connect_grbl(port: Grbl, stop: Callable[[], bool] = lambda: False) -> GrblMachine:
@@ -189,13 +189,13 @@ def test_a_line_that_another_program_feeds_into_a_motion_is_told_or_harmless(por
         {"start": {"joints": [10, 80, -70]}, "blend": 8, "moves": [{"joint": [40, 60, -50]}, {"joint": [0, 90, -90]}]},
     )
     plan = machine.lay(path.motion, np.array(machine.counts()))
-    said = "another program"
+    message = "another program"
     try:
         machine.run([plan])
     except LinkError as error:
-        said = str(error)
-    assert "another program" in said
-    assert port.steps[:3] == plan.end.tolist() or machine.position() == "lost" or said != "another program"
+        message = str(error)
+    assert "another program" in message
+    assert port.steps[:3] == plan.end.tolist() or machine.position() == "lost" or message != "another program"
     for _ in range(300):
         port.advance(0.02)
     assert machine.position() == "lost" or list(machine.counts()) == port.steps[:3]
@@ -208,10 +208,10 @@ def test_an_offset_that_is_set_in_a_motion_is_found_at_its_end_and_at_its_stop(p
         count, origin = itertools.count(), np.array(port.steps[:3]) - machine.counts()
 
         def stop(count: Iterator[int] = count, stopped: bool = stopped) -> bool:
-            now = next(count)
-            if now == 20:
+            poll = next(count)
+            if poll == 20:
                 port.write(line.encode() + b"\n")
-            return stopped and now > 40
+            return stopped and poll > 40
 
         two = connect_grbl(port, stop)
         with pytest.raises((LinkError, StoppedError)):
@@ -261,9 +261,9 @@ def test_no_record_a_damaged_one_or_another_arm_s_is_lost(port: Grbl) -> None:
     assert connect_grbl(port).position() == "known"
     from dataclasses import replace
 
-    others = replace(ARM, home=ARM.home + 0.1)
+    other_arm = replace(ARM, home=ARM.home + 0.1)
     with pytest.raises(PositionLostError, match="the robot file's drives or home pose are others"):
-        GrblMachine(port, others).prepare()
+        GrblMachine(port, other_arm).prepare()
 
 
 def test_more_than_a_turn_outside_a_limit_is_lost(port: Grbl) -> None:

@@ -30,9 +30,9 @@ FITS = {number: value for number, (_, value) in expected_settings(axes_of(ARM)).
 
 def board(**more: Any) -> Grbl:
     name = f"machine-{os.getpid()}"  # its record is no other worker's
-    found = Grbl(4, name, {**FITS, **more.pop("settings", {})}, **more)
-    found.simulated = False  # so that nobody vouches for the position by itself
-    return found
+    grbl = Grbl(4, name, {**FITS, **more.pop("settings", {})}, **more)
+    grbl.simulated = False  # so that nobody vouches for the position by itself
+    return grbl
 
 
 def connect_grbl(port: Grbl, stop: Callable[[], bool] = lambda: False) -> GrblMachine:
@@ -68,9 +68,9 @@ def test_the_position_outlives_the_command_but_no_reset() -> None:
     machine = connect_grbl(port)
     machine.prepare(assume=machine.arm.home)
     machine.run([machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))])
-    there = machine.counts()
+    counts = machine.counts()
     again = connect_grbl(port)
-    assert (again.position(), again.counts()) == ("known", there)
+    assert (again.position(), again.counts()) == ("known", counts)
     assert not again.prepare()
     with pytest.raises(LinkError, match="position is known"):
         again.prepare(assume=again.arm.home)
@@ -98,15 +98,15 @@ def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
     port = board()
     goal = np.deg2rad([60, 20, -60])
     for after in (5, 30, 60, 90):
-        asked = iter(range(10_000))
+        polls = iter(range(10_000))
         port.boot()
-        machine = connect_grbl(port, lambda asked=asked, after=after: next(asked) > after)  # type: ignore[misc]
+        machine = connect_grbl(port, lambda polls=polls, after=after: next(polls) > after)  # type: ignore[misc]
         machine.prepare(assume=machine.arm.home)
         plan = machine.plan(machine.counts(), goal)
         with pytest.raises(StoppedError):
             machine.run([plan])
         assert list(machine.counts()) == pins(port)
-        share = [at / end for at, end in zip(pins(port), plan.end.tolist(), strict=True) if end]
+        share = [count / end for count, end in zip(pins(port), plan.end.tolist(), strict=True) if end]
         assert max(share) - min(share) < 2e-3
         again = connect_grbl(port)
         assert again.position() == "known"
@@ -115,12 +115,12 @@ def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
         assert pins(port) == plan.end.tolist()
 
 
-def during(port: Grbl, what: Callable[[], None]) -> Callable[[], bool]:
-    asked = iter(range(10_000))
+def during(port: Grbl, act: Callable[[], None]) -> Callable[[], bool]:
+    polls = iter(range(10_000))
 
     def stop() -> bool:
-        if next(asked) == 40:
-            what()
+        if next(polls) == 40:
+            act()
         return False
 
     return stop
@@ -178,12 +178,12 @@ def test_a_noisy_line_never_gives_a_false_position(seed: int) -> None:
 
 def test_arms_that_grbl_cannot_drive_are_refused() -> None:
     text = (ROOT / THREE_DOF).read_text().replace("board: {kind: uno_cnc_shield, driver: A4988}", "")
-    for old, new, message in (
+    for before, after, message in (
         ("axis: X", "axis: Q", "motor q1 is on axis Q; GRBL has X, Y, Z, A, B, C"),
         ("microsteps: 16", "microsteps: 256", "enough for 500 steps a unit at most"),
     ):
         with pytest.raises(UsageError, match=message):
-            axes_of(build(parse_robot_file(text.replace(old, new))))
+            axes_of(build(parse_robot_file(text.replace(before, after))))
     with pytest.raises(UsageError, match="GRBL drives steppers alone"):
         axes_of(armkin.load("ra02"))
 
@@ -207,7 +207,7 @@ def test_damaged_answers_never_give_a_false_position(seed: int) -> None:
     machine = connect_grbl(port)
     machine.prepare(assume=machine.arm.home)
     machine.run([machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))])
-    port.mumbles, told = True, 0
+    port.mumbles, error_count = True, 0
     for _ in range(120):
         try:
             machine.refresh()
@@ -215,8 +215,8 @@ def test_damaged_answers_never_give_a_false_position(seed: int) -> None:
             continue
         assert machine.position() == "known"
         assert list(machine.counts()) == pins(port)
-        told += 1
-    assert told > 10
+        error_count += 1
+    assert error_count > 10
 
 
 def test_a_lost_answer_ends_the_wait_and_tells_where_the_arm_stands() -> None:
@@ -247,8 +247,8 @@ def test_a_lost_answer_ends_the_wait_and_tells_where_the_arm_stands() -> None:
 def test_what_the_gripper_holds_is_gripped_again_after_a_stop() -> None:
     """A stop clears GRBL's queue by a reset, which switches M3 off."""
     port = board()
-    asked = iter(range(10_000))
-    machine = connect_grbl(port, lambda: next(asked) > 30)
+    polls = iter(range(10_000))
+    machine = connect_grbl(port, lambda: next(polls) > 30)
     machine.prepare(assume=machine.arm.home)
     machine.grip(Gripper.model_validate({"kind": "spindle", "open": 0, "closed": 120}), 120)
     assert port.spindle == 120

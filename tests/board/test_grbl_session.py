@@ -40,8 +40,8 @@ def test_lines_arrive_at_their_steps_and_the_buffer_never_overflows() -> None:
 def test_a_hold_stands_on_the_line_and_a_reset_there_keeps_the_position() -> None:
     board = Grbl(axes=2, settings=QUICK)
     session = open_session(board)
-    asked = iter(range(1000))
-    assert not session.stream(["G53G1X40Y20F6000", "G4P0"], lambda: next(asked) > 20)
+    polls = iter(range(1000))
+    assert not session.stream(["G53G1X40Y20F6000", "G4P0"], lambda: next(polls) > 20)
     session.realtime(replies.HOLD)
     while session.status().detail or session.status().state != "Hold":
         board.advance(0.01)
@@ -72,8 +72,8 @@ def test_a_hold_that_nobody_asked_for_ends_in_words() -> None:
 def test_a_reset_in_motion_is_an_alarm() -> None:
     board = Grbl(axes=2, settings=QUICK)
     session = open_session(board)
-    asked = iter(range(1000))
-    session.stream(["G53G1X40Y20F6000"], lambda: next(asked) > 20)
+    polls = iter(range(1000))
+    session.stream(["G53G1X40Y20F6000"], lambda: next(polls) > 20)
     session.realtime(b"G4P1\n")
     with pytest.raises(GrblError, match="reset in motion") as caught:
         session.reset()
@@ -118,15 +118,15 @@ def test_a_cable_that_is_pulled_is_told() -> None:
 def test_settings_are_compared_and_only_what_is_wrong_is_serious() -> None:
     board = Grbl(axes=4)
     session = open_session(board)
-    found = dict(pair for line in session.ask("$$") if (pair := replies.parse_setting(line)))
-    odd = {difference.number: difference.serious for difference in settings.differences(AXES, found)}
+    actual = dict(pair for line in session.ask("$$") if (pair := replies.parse_setting(line)))
+    odd = {difference.number: difference.serious for difference in settings.differences(AXES, actual)}
     assert odd == {1: False, 3: True, 100: True, 102: True, 110: False, 112: False, 120: False, 122: False}
     for number, (_, value) in settings.expected_settings(AXES).items():
         session.ask(f"${number}={value:g}")
-    found = dict(pair for line in session.ask("$$") if (pair := replies.parse_setting(line)))
-    assert settings.differences(AXES, found) == []
-    assert found[101] == 250  # another axis is left alone
-    too_fast = settings.differences(AXES, found | {110: 9000.0})
+    actual = dict(pair for line in session.ask("$$") if (pair := replies.parse_setting(line)))
+    assert settings.differences(AXES, actual) == []
+    assert actual[101] == 250  # another axis is left alone
+    too_fast = settings.differences(AXES, actual | {110: 9000.0})
     assert [(d.number, d.serious) for d in too_fast] == [(110, True)]
     assert str(too_fast[0]) == "$110 (q1: greatest speed, units/min) is 9000: the robot file wants $110=3600"
 
@@ -137,8 +137,8 @@ NO_NUMBERS = ["nan", "inf", "-inf", "1e400", "1_0", "9" * 400, "\u0663", "", " 1
 
 @pytest.mark.parametrize("text", [*DAMAGED, *(f"<Idle|MPos:0.000,{text},0.000>" for text in NO_NUMBERS)])
 def test_damaged_reports_are_no_reports(text: str) -> None:
-    found = replies.parse_report(text)
-    assert found is None or found.position is None
+    report = replies.parse_report(text)
+    assert report is None or report.position is None
 
 
 @pytest.mark.parametrize("text", NO_NUMBERS)

@@ -47,8 +47,8 @@ def feed(value: float) -> Spoil:
     return lambda line: re.sub(r"F[\d.]+", f"F{value}", line)
 
 
-def target(old: str, new: str) -> Spoil:
-    return lambda line: line.replace(old, new)
+def target(before: str, after: str) -> Spoil:
+    return lambda line: line.replace(before, after)
 
 
 @pytest.mark.parametrize(

@@ -61,17 +61,17 @@ def test_a_sender_that_was_killed_goes_on_where_the_arm_stands(kind: str, after:
     )
     port.simulated = False  # so that nobody vouches for the position by itself
     board = board_of(arm)
-    one = board.attach(port, die)
-    assert one.prepare(assume=arm.home)
-    one.run([one.plan(one.counts(), GOAL)])
+    machine = board.attach(port, die)
+    assert machine.prepare(assume=arm.home)
+    machine.run([machine.plan(machine.counts(), GOAL)])
     path = armkin.path(arm, {"start": {"joints": [10, 80, -70]}, "blend": 8, "moves": MOVES})
-    plan = one.lay(path.motion, np.array(one.counts()))
+    plan = machine.lay(path.motion, np.array(machine.counts()))
     began = port.now()
     if after < plan.duration:
         with pytest.raises(Killed):
-            one.run([plan])
+            machine.run([plan])
     else:
-        one.run([plan])
+        machine.run([plan])
     for _ in range(500):
         port.advance(0.02)
     port.close()

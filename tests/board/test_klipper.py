@@ -118,14 +118,14 @@ def test_klipper_s_look_ahead_makes_the_plan_s_own_time_of_the_lines() -> None:
 
 @pytest.mark.parametrize("after", [3, 40, 90, 140])
 def test_a_stop_brakes_on_the_way_and_the_next_command_goes_on(after: int) -> None:
-    asked = iter(range(100_000))
-    port, machine = open_klipper(lambda: next(asked) > after)
+    polls = iter(range(100_000))
+    port, machine = open_klipper(lambda: next(polls) > after)
     plan = machine.plan(machine.counts(), np.deg2rad([60, 20, -60]), speed=0.4)
     with pytest.raises(StoppedError):
         machine.run([plan])
     assert machine.position() == "known"
     assert list(machine.counts()) == pins(port)
-    share = [at / end for at, end in zip(pins(port), plan.end.tolist(), strict=True)]
+    share = [count / end for count, end in zip(pins(port), plan.end.tolist(), strict=True)]
     assert max(share) - min(share) < 2e-3
     assert port.jumps == 0
     again = KlipperMachine(port, ARM)
@@ -144,10 +144,10 @@ def test_a_stop_brakes_on_the_way_and_the_next_command_goes_on(after: int) -> No
     ],
 )
 def test_what_loses_the_position_is_told(fault: Callable[[Klipper], None], message: str) -> None:
-    asked = iter(range(100_000))
+    polls = iter(range(100_000))
 
     def stop() -> bool:
-        if next(asked) == 40:
+        if next(polls) == 40:
             fault(port)
         return False
 
@@ -174,12 +174,12 @@ def test_another_program_s_move_is_found() -> None:
     port, machine = open_klipper()
     machine.run([machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))])
     for line in ("G1 A3 F600", "G91\nG1 B-2 F600"):
-        there = machine.counts()
+        counts = machine.counts()
         machine.api.run(f"{line}\nM400")
         with pytest.raises(PositionLostError, match="another program has moved it"):
             machine.prepare()
         assert machine.position() == KlipperMachine(port, ARM).position() == "lost"
-        assert machine.prepare(assume=armkin.joints(ARM, there))
+        assert machine.prepare(assume=armkin.joints(ARM, counts))
         machine.run([machine.plan(machine.counts(), np.deg2rad([12, 80, -70]))])
 
     class Meddled(Klipper):
@@ -245,7 +245,7 @@ def test_printer_cfg_is_compared() -> None:
     assert differences(AXES, fits | {"manual_stepper axis_b": geared}) == []
     wrong = fits | {"printer": {"kinematics": "cartesian"}, "manual_stepper axis_b": b | {"microsteps": 16}}
     del wrong["manual_stepper axis_c"]
-    assert [str(one) for one in differences(AXES, wrong)] == [
+    assert [str(difference) for difference in differences(AXES, wrong)] == [
         "[printer] kinematics is cartesian: the robot file wants none",
         "[printer] max_velocity is not there: the robot file wants at least 10",
         "[printer] max_accel is not there: the robot file wants at least 1000",

@@ -78,14 +78,14 @@ class NoisyPort(SimPort):
         return self._line(super().read(timeout))
 
     def _line(self, data: bytes) -> bytes:
-        out = bytearray()
+        damaged = bytearray()
         for byte in data:
             if self._random.random() < self._probability:
                 byte ^= 1 << self._random.randrange(8)
                 self.damaged += 1
             if self._random.random() >= self._probability:
-                out.append(byte)
-        return bytes(out)
+                damaged.append(byte)
+        return bytes(damaged)
 
 
 def connect_board(arm: Arm, port: SimPort | None = None) -> FirmwareMachine:
@@ -101,13 +101,15 @@ def test_a_noisy_line_ends_at_exact_counts(three_dof: Arm, seed: int) -> None:
     machine = connect_board(three_dof, port)
     machine.prepare(assume=machine.arm.home)
     rng = np.random.default_rng(seed)
-    plans, at = [], list(machine.counts())
+    plans, counts = [], list(machine.counts())
     for _ in range(5):
-        plans.append(plan_moves(three_dof, at, rng.uniform(np.deg2rad([-60, 20, -100]), np.deg2rad([60, 110, -10]))))
-        at = plans[-1].end.tolist()
+        plans.append(
+            plan_moves(three_dof, counts, rng.uniform(np.deg2rad([-60, 20, -100]), np.deg2rad([60, 110, -10])))
+        )
+        counts = plans[-1].end.tolist()
     status = machine.run(plans)
-    assert list(machine.counts()) == at
-    assert board.net[:3] == at
+    assert list(machine.counts()) == counts
+    assert board.net[:3] == counts
     assert status.state == State.IDLE
     assert port.damaged > 100
 
@@ -139,15 +141,15 @@ def test_lost_known_and_changed(three_dof: Arm) -> None:
     assert connect_board(three_dof, port).position() == "known"
     board.reset()
     assert connect_board(three_dof, port).position() == "retained"
-    other = arms.build(parse_robot_file(Path(ROBOT).read_text().replace("pulley: 4", "pulley: 5")))
-    changed = connect_board(other, port)
+    changed_arm = arms.build(parse_robot_file(Path(ROBOT).read_text().replace("pulley: 4", "pulley: 5")))
+    changed = connect_board(changed_arm, port)
     assert changed.position() == "lost"
     with pytest.raises(LinkError, match="configured for another arm"):
         changed.prepare()
     assert connect_board(three_dof, port).position() == "retained"  # nothing was changed by asking
     with pytest.raises(ReplacedError, match="another program has taken over the board"):
         changed.prepare(assume=changed.arm.home)
-    assert connect_board(other, port).prepare(assume=other.home)
+    assert connect_board(changed_arm, port).prepare(assume=changed_arm.home)
     assert connect_board(three_dof, port).position() == "lost"
 
 
@@ -168,18 +170,18 @@ def test_the_image_of_the_published_arm(three_dof: Arm) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("before", "after", "message"),
     [
         (", driver: A4988", "", "has no driver"),
         ("axis: Y, ", "", "motor q2 has no axis"),
         ("    max_accel: 120\n", "", "its joints have no max_accel"),
     ],
 )
-def test_what_is_missing_is_named(old: str, new: str, message: str) -> None:
+def test_what_is_missing_is_named(before: str, after: str, message: str) -> None:
     text = Path(ROBOT).read_text()
-    assert old in text
+    assert before in text
     with pytest.raises(UsageError, match=message):
-        configure(arms.build(parse_robot_file(text.replace(old, new))))
+        configure(arms.build(parse_robot_file(text.replace(before, after))))
 
 
 @settings(max_examples=200, deadline=None)
@@ -231,8 +233,8 @@ def test_coupled_joints_home_one_after_another(wrist: Arm) -> None:
     homing.home_joints(machine, announce=names.append)
     assert names == ["J1", "J2", "J3"]
     assert machine.position() == "known"
-    true = joints(wrist, pulses(wrist, start) + np.array([board.net[axis] for axis in axes]))
-    assert np.rad2deg(machine.joints()) == pytest.approx(np.rad2deg(true), abs=0.15)
+    real_joints = joints(wrist, pulses(wrist, start) + np.array([board.net[axis] for axis in axes]))
+    assert np.rad2deg(machine.joints()) == pytest.approx(np.rad2deg(real_joints), abs=0.15)
     # From behind its switches, outside the limits, the arm comes back.
     machine.prepare()
     machine.run([plan_moves(wrist, machine.counts(), np.zeros(3))])

@@ -24,15 +24,15 @@ GOLDEN = Path(__file__).parents[2] / "firmware" / "golden"
 
 def golden_frames() -> list[tuple[str, dict[str, str], bytes, bytes]]:
     lines = (GOLDEN / "frames.txt").read_text().splitlines()
-    found = []
+    frames = []
     for line in lines:
         if line.startswith("#"):
             continue
         text, payload, wire = (part.strip() for part in line.split("|"))
         name, *fields = text.split()
         pairs = dict(field.split("=", 1) for field in fields)
-        found.append((name, pairs, bytes.fromhex(payload), bytes.fromhex(wire)))
-    return found
+        frames.append((name, pairs, bytes.fromhex(payload), bytes.fromhex(wire)))
+    return frames
 
 
 def integers(text: str) -> tuple[int, ...]:
@@ -154,12 +154,12 @@ def test_cobs_decode_takes_nothing_that_encode_does_not_make(data: bytes) -> Non
 def test_a_stream_in_pieces_gives_its_payloads(payloads: list[bytes], data: st.DataObject) -> None:
     stream = b"\0".join([b"", *(protocol.encode_frame(p) for p in payloads)])
     splitter = protocol.Splitter()
-    found: list[bytes] = []
+    received: list[bytes] = []
     while stream:
         n = data.draw(st.integers(1, len(stream)))
-        found += splitter.feed(stream[:n])
+        received += splitter.feed(stream[:n])
         stream = stream[n:]
-    assert found == payloads
+    assert received == payloads
     assert splitter.bad == 0
 
 
@@ -181,9 +181,9 @@ def test_a_damaged_stream_yields_only_what_was_sent() -> None:
             byte ^= 1 << rng.randrange(8)
         if rng.random() >= 0.01:
             damaged.append(byte)
-    found = list(protocol.Splitter().feed(bytes(damaged)))
-    assert 0.1 < len(found) / len(sent) < 0.9
-    assert set(found) <= set(sent)
+    received = list(protocol.Splitter().feed(bytes(damaged)))
+    assert 0.1 < len(received) / len(sent) < 0.9
+    assert set(received) <= set(sent)
 
 
 def test_a_long_frame_is_skipped_to_its_end() -> None:

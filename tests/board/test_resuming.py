@@ -115,7 +115,7 @@ def test_a_motion_that_was_held_goes_on_and_ends_where_it_should(
     assert arm.send(0, 90, -90, "--assume-home")[0] == 0
     arm.track.clear()
     assert arm.send(*words)[0] == 0
-    whole, end = np.array(list(dict.fromkeys(arm.track)), dtype=float), arm.counts
+    full_track, end = np.array(list(dict.fromkeys(arm.track)), dtype=float), arm.counts
     assert arm.send(0, 90, -90)[0] == 0
     arm.track.clear()
     for pause in (0.45, 0.8, 1.1):  # held three times on its way
@@ -131,7 +131,7 @@ def test_a_motion_that_was_held_goes_on_and_ends_where_it_should(
     assert code == 0, err
     assert arm.counts == end
     assert len(arm.track) > 500
-    assert distance(arm.track, whole) <= 4  # the whole motion was sampled every few ms
+    assert distance(arm.track, full_track) <= 4  # the whole motion was sampled every few ms
 
 
 def test_a_motion_held_in_its_approach_goes_on_with_that(arm: Arm, tmp_path: Path) -> None:
@@ -155,8 +155,8 @@ def test_what_cannot_be_gone_on_with_is_refused_with_the_next_step(
 ) -> None:
     def refused(code: int, pattern: str, *words: object) -> None:
         before = arm.counts
-        found, err = arm.send(*words, "--resume")
-        assert (found, arm.counts) == (code, before), err
+        exit_code, err = arm.send(*words, "--resume")
+        assert (exit_code, arm.counts) == (code, before), err
         assert re.search(pattern, err), err
 
     refused(5, "position is lost.*\n?.*--assume-home", *motions["single"])
@@ -193,12 +193,12 @@ def test_a_sender_that_was_killed_leaves_a_note_that_is_enough(
     assert again.counts == [-1067, -10144, 5667]
 
 
-def _dies(monkeypatch: pytest.MonkeyPatch, now: Callable[[], bool]) -> None:
-    """The sender ends without a word once `now` says so."""
+def _dies(monkeypatch: pytest.MonkeyPatch, is_time: Callable[[], bool]) -> None:
+    """The sender ends without a word once `is_time` says so."""
     read = Wire.read
 
     def deadly(self: Wire, timeout: float) -> bytes:
-        if now():
+        if is_time():
             raise KeyboardInterrupt
         return read(self, timeout)
 
@@ -234,26 +234,26 @@ def _moves(way: Cut) -> list[int]:
 def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, ...]) -> None:
     """ACCEL was answered within the last two steps: whole steps are another direction there than the line's."""
     arm = armkin.load(ROOT / THREE_DOF)
-    whole = plan_moves(arm, [0, 0, 0], np.deg2rad(goal), min_interval=448)
-    at, stands = np.array(whole.start) * STEP + HALF, list[list[int]]()
-    for s in next(whole.moves()).segments:
-        stands += ((at + np.arange(1, s.ticks + 1)[:, None] * np.array(s.rates)) // STEP).tolist()
-        at += s.ticks * np.array(s.rates)
+    full_plan = plan_moves(arm, [0, 0, 0], np.deg2rad(goal), min_interval=448)
+    position, stands = np.array(full_plan.start) * STEP + HALF, list[list[int]]()
+    for s in next(full_plan.moves()).segments:
+        stands += ((position + np.arange(1, s.ticks + 1)[:, None] * np.array(s.rates)) // STEP).tolist()
+        position += s.ticks * np.array(s.rates)
     last = list(dict.fromkeys(map(tuple, stands)))[-14:-1]
     for counts in map(np.array, last):
-        place = next(places_on([whole], counts))
-        left = cut_trajectory(remaining_trajectory(whole, place, joints(arm, counts)), counts, min_interval=448)
-        assert _moves(left) == whole.end.tolist(), counts
+        place = next(places_on([full_plan], counts))
+        left = cut_trajectory(remaining_trajectory(full_plan, place, joints(arm, counts)), counts, min_interval=448)
+        assert _moves(left) == full_plan.end.tolist(), counts
 
 
 def test_a_way_of_less_than_a_step_is_taken() -> None:
     """An arm 0.55 steps before a path's start has a whole one to make: ACCEL was answered."""
     arm = armkin.load(ROOT / THREE_DOF)
-    here = joints(arm, [128, -1193, 1333])
+    standing = joints(arm, [128, -1193, 1333])
     for steps in ([0.55, -0.55, 0], [0, 0, 0.7], [-0.6, 0, 0.6], [1.51, -0.55, 2.6]):
-        goal = here + joints(arm, steps) - arm.home
+        goal = standing + joints(arm, steps) - arm.home
         way = cut_trajectory(
-            Trajectory(arm, here, (straight_move(arm, here, goal),)), [128, -1193, 1333], min_interval=448
+            Trajectory(arm, standing, (straight_move(arm, standing, goal),)), [128, -1193, 1333], min_interval=448
         )
         assert _moves(way) == way.end.tolist() != way.start.tolist()
 

@@ -44,7 +44,7 @@ class FakeLock:
 
 
 @pytest.mark.parametrize(
-    ("platform", "name", "reset", "done"),
+    ("platform", "name", "reset", "expected"),
     [
         ("win32", "COM3", False, ["dtr False", "rts False", "open"]),
         ("win32", "COM3", True, ["open"]),
@@ -58,7 +58,7 @@ class FakeLock:
     ],
 )
 def test_no_reset_leaves_dtr_low_before_the_port_opens(
-    monkeypatch: pytest.MonkeyPatch, platform: str, name: str, reset: bool, done: list[str]
+    monkeypatch: pytest.MonkeyPatch, platform: str, name: str, reset: bool, expected: list[str]
 ) -> None:
     import serial
 
@@ -67,7 +67,7 @@ def test_no_reset_leaves_dtr_low_before_the_port_opens(
     monkeypatch.setattr("armkin.board.ports.serial_port.sys.platform", platform)
     monkeypatch.setattr(serial_port, "Lock", FakeLock)
     SerialPort(name, reset=reset).close()
-    assert fake.done == [*done, "close"]
+    assert fake.done == [*expected, "close"]
 
 
 WORDS = {"home": "q1", "send": "0 90 -90", "jog": "q1 5", "grip": "open", "path": "--via 390,80,300 --via 390,90,300"}

@@ -44,9 +44,9 @@ class Stalling(SimPort):
 
 def payload_of(data: bytes) -> bytes:
     """The payload of the first frame on the wire."""
-    whole = framing.cobs_decode(data.strip(b"\0").split(b"\0")[0])
-    assert whole is not None
-    return whole[:-4]
+    unstuffed = framing.cobs_decode(data.strip(b"\0").split(b"\0")[0])
+    assert unstuffed is not None
+    return unstuffed[:-4]
 
 
 def machine_on(port: SimPort) -> FirmwareMachine:
@@ -85,12 +85,12 @@ def test_a_stall_before_the_first_step_begins_again() -> None:
 def test_a_stall_in_the_beginning_goes_on_from_there(rows: list[list[float]]) -> None:
     port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 4, 0.08)
     machine = machine_on(port)
-    plans, at = list[Any](), machine.counts()
+    plans, counts = list[Any](), machine.counts()
     for row in rows:
-        plans.append(machine.plan(at, np.deg2rad([row])))
-        at = tuple(plans[-1].end.tolist())
+        plans.append(machine.plan(counts, np.deg2rad([row])))
+        counts = tuple(plans[-1].end.tolist())
     assert machine.run(plans).error == 0
-    assert machine.counts() == at
+    assert machine.counts() == counts
     again = next(payload_of(data) for data in port.sent if payload_of(data)[1] == 0)  # of a new session
     assert again[6:18] != bytes(12), "what is left, not all of it"
 
@@ -100,12 +100,12 @@ def test_two_stalls_lose_none_of_several_moves(again: int) -> None:
     """The second one comes before the board has heard of all that was left at the first."""
     port, shown = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 4, 0.4, again), list[float]()
     machine = machine_on(port)
-    plans, at = list[Any](), machine.counts()
+    plans, counts = list[Any](), machine.counts()
     for row in [[20, 90, -90], [20, 70, -90], [0, 90, -90], [-20, 60, -60]]:
-        plans.append(machine.plan(at, np.deg2rad([row])))
-        at = tuple(plans[-1].end.tolist())
+        plans.append(machine.plan(counts, np.deg2rad([row])))
+        counts = tuple(plans[-1].end.tolist())
     machine.run(iter(plans), lambda done, total: shown.append(done))
-    assert machine.counts() == at
+    assert machine.counts() == counts
     assert shown == sorted(shown)
     assert sum(payload_of(data)[1] == 0 for data in port.sent) == 2  # sessions
     late = shown[-1] - sum(plan.duration for plan in plans)
@@ -116,11 +116,11 @@ def test_two_stalls_lose_none_of_several_moves(again: int) -> None:
 def test_a_stall_where_the_arm_turns_back(monkeypatch: pytest.MonkeyPatch, load: float, sessions: int) -> None:
     """A beginning behind a rest is begun anew, too; a busy computer fills the queue first, for it may stall there."""
     monkeypatch.setattr(streaming, "_processor_load", lambda session: load)
-    out = ARM.home + np.deg2rad([5, -5, 5])
+    turning_pose = ARM.home + np.deg2rad([5, -5, 5])
     for frame in (11, 12, 13):  # the first two behind the rest, on a quiet computer
         port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, 0.1)
         machine = machine_on(port)
-        machine.run([machine.plan(machine.counts(), np.array([out, ARM.home]), speed=0.1)])
+        machine.run([machine.plan(machine.counts(), np.array([turning_pose, ARM.home]), speed=0.1)])
         assert machine.counts() == (0, 0, 0)
         assert sum(payload_of(data)[1] == 0 for data in port.sent) == sessions
 
@@ -178,21 +178,21 @@ def test_two_frames_fit_the_line() -> None:
 def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     machine = machine_on(SimPort(SimBoard(BOARDS["uno_cnc_shield"])))
     session = machine.session
-    found = []
+    leads = []
     frames = [(0.01, 2, 70), (0.01, 3, 90), (0.02, 6, 140), (0.04, 6, 140), (0.08, 6, 140)]
     for slowest in (0.0005, 0.002, 0.016, 0.2):
         session.line.slowest = slowest
-        found.append(streaming.lead_time(session, frames))
-    assert found == sorted(found)
-    assert found[-1] - found[-2] > 0.3  # two answers are waited for
+        leads.append(streaming.lead_time(session, frames))
+    assert leads == sorted(leads)
+    assert leads[-1] - leads[-2] > 0.3  # two answers are waited for
     session.line.slowest = 1.0
     assert streaming.lead_time(session, frames) == 0.6
     assert streaming.lead_time(session, frames, 0.7) == 0.7
     session.port.simulated, session.line.slowest = False, 0.0
     cores = os.cpu_count() or 1
-    for mean, now, seconds in ((1.5, 0, 0.25), (0.7, 0, 0.1), (0.09, 0, 0.0015), (0.0, 0.5, 0.1), (0.1, 1.5, 0.25)):
+    for mean, running, seconds in ((1.5, 0, 0.25), (0.7, 0, 0.1), (0.09, 0, 0.0015), (0.0, 0.5, 0.1), (0.1, 1.5, 0.25)):
         monkeypatch.setattr("os.getloadavg", lambda mean=mean: (mean * cores, 0.0, 0.0))
-        monkeypatch.setattr(streaming, "_others_running", lambda now=now: now * cores)
+        monkeypatch.setattr(streaming, "_others_running", lambda running=running: running * cores)
         assert streaming.lead_time(session, []) == seconds
     session.line.resent = 1
     assert streaming.lead_time(session, []) == 0.25
@@ -203,20 +203,20 @@ def test_the_arm_stands_longer_where_answers_take_longer(monkeypatch: pytest.Mon
 @pytest.mark.parametrize("bad", [0, 1])
 def test_the_end_of_a_motion_is_asked_for_every_10_ms(bad: int) -> None:
     """On a line that had lost a byte the host asked as fast as it was answered: 2,000 questions a motion."""
-    asked: list[float] = []
+    ask_times: list[float] = []
 
     class Asked(SimPort):
         def write(self, data: bytes) -> None:
             super().write(data)
             if payload_of(data)[0] == Type.STATUS_QUERY:
-                asked.append(self.now())
-                assert len(asked) < 1000
+                ask_times.append(self.now())
+                assert len(ask_times) < 1000
 
     machine = machine_on(Asked(SimBoard(BOARDS["uno_cnc_shield"])))
     machine.session.line.splitter.bad += bad
     plan = machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))
     began = machine.port.now()
     machine.run([plan])
-    during = [at for at in asked if began < at < machine.port.now()]
+    during = [time for time in ask_times if began < time < machine.port.now()]
     assert len(during) < 110 * plan.duration
     assert min(np.diff(during)) > 0.009

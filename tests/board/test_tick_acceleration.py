@@ -57,33 +57,33 @@ def leaders_limits(cut: list[Segment], law: Profile, steps: int, axis: int, cloc
     """
     top, accel = law.peak * steps / law.length, law.accel * steps / law.length
     first = math.sqrt(1 / accel)  # half a step from rest
-    now = unheard(cut)
+    cycle = unheard(cut)
     before, speed, most, jump = 0.0, 0.0, 0.0, 0.0
     for s in cut:
         cycles, rate = intervals(s), abs(s.rates[axis])
         v = rate / STEP / cycles * clock
-        begin = (now + np.concatenate([[0], np.cumsum(cycles)[:-1]])) / clock
-        on = (begin > first) & (begin < law.duration - first)
-        speed = max(speed, float(v[on].max(initial=0.0)) / top)
+        begin = (cycle + np.concatenate([[0], np.cumsum(cycles)[:-1]])) / clock
+        cruising = (begin > first) & (begin < law.duration - first)
+        speed = max(speed, float(v[cruising].max(initial=0.0)) / top)
         change = np.abs(np.diff(v)) / (cycles[1:] + cycles[:-1]) * 2 * clock
         if s.ticks > 2 and abs(s.add) * s.ticks > 3 << 16:  # less spreads whole cycles over a cruise
-            most = max(most, float(change[on[1:]].max(initial=0.0)) / accel)
-        if on[0] and before:
+            most = max(most, float(change[cruising[1:]].max(initial=0.0)) / accel)
+        if cruising[0] and before:
             bound = 4 / cycles[0] + (256 if rate >= 1 << 15 else 2) / max(rate, 1) + 0.008
             jump = max(jump, abs(v[0] / before - 1) / bound)
-        now, before = now + float(cycles.sum()), float(v[-1])
+        cycle, before = cycle + float(cycles.sum()), float(v[-1])
     return speed, most, jump
 
 
 def edges(cut: list[Segment], axis: int, clock: int) -> NDArray[np.float64]:
     """Seconds at which an axis steps."""
-    out, now, place = [], 0, HALF
+    edge_times, cycle, place = [], 0, HALF
     for s in cut:
-        at = now + np.cumsum(np.floor(intervals(s)).astype(np.int64))
+        tick_cycles = cycle + np.cumsum(np.floor(intervals(s)).astype(np.int64))
         counts = (place + s.rates[axis] * np.arange(s.ticks + 1)) // STEP
-        out.append(at[np.diff(counts) != 0])
-        now, place = int(at[-1]), place + s.ticks * s.rates[axis]
-    return np.concatenate(out) / clock
+        edge_times.append(tick_cycles[np.diff(counts) != 0])
+        cycle, place = int(tick_cycles[-1]), place + s.ticks * s.rates[axis]
+    return np.concatenate(edge_times) / clock
 
 
 def windows(made: NDArray[np.float64], seconds: float) -> tuple[float, float]:

@@ -37,44 +37,44 @@ def three_dof() -> Arm:
 
 def tick_times(cut: Iterable[Segment]) -> list[int]:
     """Cycle of every tick, as the device adds intervals up (PROTOCOL.md, section 6)."""
-    out, now = [], 0
+    times, cycle = [], 0
     for s in cut:
         interval, add = s.interval << 16, s.add << 8
         for left in range(s.ticks - 1, -1, -1):
-            now += interval >> 16
-            out.append(now)
+            cycle += interval >> 16
+            times.append(cycle)
             interval += add >> 8
             if s.quick:
                 add += s.bend << 7
             elif left % 16 == 0:
                 add += s.bend << 2
-    return out
+    return times
 
 
 def made(cut: Iterable[Segment], axis: int) -> list[int]:
     """Net steps of an axis after every tick: the device's phases."""
-    out, place = [], 1 << 22
+    counts, place = [], 1 << 22
     for s in cut:
-        out += [(place + j * s.rates[axis]) >> 23 for j in range(1, s.ticks + 1)]
+        counts += [(place + j * s.rates[axis]) >> 23 for j in range(1, s.ticks + 1)]
         place += s.ticks * s.rates[axis]
-    return out
+    return counts
 
 
 def unheard(segments: Iterable[Segment]) -> float:
     """Seconds by which a line is ahead of its law, as nobody can tell before its first step."""
     first = next(iter(segments))
-    told = first.add or any(first.steps)
-    return 0.0 if told else counts_to_segments.cycles_of(first) / CLOCK * (1 / straight_lines.UNHEARD - 1)
+    is_heard = first.add or any(first.steps)
+    return 0.0 if is_heard else counts_to_segments.cycles_of(first) / CLOCK * (1 / straight_lines.UNHEARD - 1)
 
 
 def trapezoid(t: np.ndarray, length: float, top: float, accel: float) -> np.ndarray:
     """Distance at time t, written down independently of the code under test."""
     peak = min(top, math.sqrt(accel * length))
-    rise, whole = peak / accel, length / peak + peak / accel
-    t = np.clip(t, 0, whole)
+    rise, duration = peak / accel, length / peak + peak / accel
+    t = np.clip(t, 0, duration)
     cruise = peak * (t - rise / 2)
-    up, down = accel * t**2 / 2, length - accel * (whole - t) ** 2 / 2
-    return np.where(t < rise, up, np.where(t > whole - rise, down, cruise))
+    up, down = accel * t**2 / 2, length - accel * (duration - t) ** 2 / 2
+    return np.where(t < rise, up, np.where(t > duration - rise, down, cruise))
 
 
 @settings(max_examples=12)
@@ -103,8 +103,8 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     peak = min(rate, math.sqrt(accel * n))
     ahead = unheard(move.segments)
     ideal = trapezoid(ahead + times / CLOCK, n, rate, accel) / n
-    whole = n / peak + peak / accel
-    assert ahead + move.cycles / CLOCK == pytest.approx(whole, rel=2e-3, abs=1e-4)
+    duration = n / peak + peak / accel
+    assert ahead + move.cycles / CLOCK == pytest.approx(duration, rel=2e-3, abs=1e-4)
     for k, (a, b) in enumerate(zip(start, end, strict=True)):
         counts_made = np.array(made(move.segments, k), dtype=np.int64)
         assert counts_made[-1] == b - a
@@ -296,13 +296,13 @@ def test_a_piece_at_rest_has_one_speed() -> None:
 
 def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     law = profile.trapezoid(1.0, 0.06, 2.0)
-    whole = straight_lines.LineSegments(
+    line = straight_lines.LineSegments(
         np.array([0, 5]), np.array([90_001, -700]), law, CLOCK, MIN_INTERVAL, straight_lines.Pieces.FINE
     )
-    once = list(whole)
-    assert len(once) == len(whole) == straight_lines.segment_count(law, 90_001) > 40
+    once = list(line)
+    assert len(once) == len(line) == straight_lines.segment_count(law, 90_001) > 40
     monkeypatch.setattr(straight_lines, "_AT_ONCE", 3)
-    assert list(whole) == once
+    assert list(line) == once
 
 
 def test_a_move_of_hours_is_planned_at_once_in_bounded_memory() -> None:

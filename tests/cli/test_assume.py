@@ -29,8 +29,8 @@ def parked(tmp_path: Path) -> Path:
 def test_an_arm_stands_where_it_is_said_to(
     words: tuple[str, ...], stands: list[float], command: str, parked: Path
 ) -> None:
-    there = ("home",) if command == "send" else ("--via", "390,80,300", "--via", "390,100,300")
-    completed = run(command, parked, *there, "--port", "sim", *words, "--json")
+    goal = ("home",) if command == "send" else ("--via", "390,80,300", "--via", "390,100,300")
+    completed = run(command, parked, *goal, "--port", "sim", *words, "--json")
     assert completed.code == 0, completed.err
     began = completed.json["start_joints"] if command == "send" else None
     assert "the board takes the arm to stand" in completed.err

@@ -164,16 +164,16 @@ def test_at_a_terminal_a_joint_moves_while_its_key_comes_again_and_again(tmp_pat
 
     def hold(key: bytes, words: str) -> None:
         """Send a key again and again until something is said."""
-        done = threading.Event()
+        finished = threading.Event()
 
         def again() -> None:
-            while not done.wait(0.03):
+            while not finished.wait(0.03):
                 os.write(master, key)
 
         thread = threading.Thread(target=again)
         thread.start()
         until(words)
-        done.set()
+        finished.set()
         thread.join()
 
     def press(key: bytes) -> None:

@@ -22,34 +22,34 @@ from command_line import ROOT, run
 DOF = "three_dof"
 
 
-def check(value: Any, hint: Any, where: str) -> None:
+def check(value: Any, hint: Any, context: str) -> None:
     """Hold a JSON value to a type: no key more, none less, no number that is not finite."""
     origin, parts = get_origin(hint), get_args(hint)
     if is_typeddict(hint):
         hints = get_type_hints(hint)
-        assert isinstance(value, dict), where
-        assert not value.keys() - hints.keys(), f"{where}: keys without a type"
-        assert not hint.__required_keys__ - value.keys(), f"{where}: keys missing"
+        assert isinstance(value, dict), context
+        assert not value.keys() - hints.keys(), f"{context}: keys without a type"
+        assert not hint.__required_keys__ - value.keys(), f"{context}: keys missing"
         for key, inner in value.items():
-            check(inner, hints[key], f"{where}.{key}")
+            check(inner, hints[key], f"{context}.{key}")
     elif origin is NotRequired:
-        check(value, parts[0], where)
+        check(value, parts[0], context)
     elif origin is Literal:
-        assert value in parts, where
+        assert value in parts, context
     elif origin in (Union, types.UnionType):
         kinds = [part for part in parts if _fits(value, part)]
-        assert kinds, f"{where}: {value!r}"
-        check(value, kinds[0], where)
+        assert kinds, f"{context}: {value!r}"
+        check(value, kinds[0], context)
     elif origin is list:
-        assert isinstance(value, list), where
+        assert isinstance(value, list), context
         for i, inner in enumerate(value):
-            check(inner, parts[0], f"{where}[{i}]")
+            check(inner, parts[0], f"{context}[{i}]")
     elif origin is dict:
-        assert isinstance(value, dict), where
+        assert isinstance(value, dict), context
         for key, inner in value.items():
-            check(inner, parts[1], f"{where}.{key}")
+            check(inner, parts[1], f"{context}.{key}")
     elif hint is not Any:
-        assert _fits(value, hint), f"{where}: {value!r}"
+        assert _fits(value, hint), f"{context}: {value!r}"
 
 
 def _fits(value: Any, hint: Any) -> bool:
@@ -134,8 +134,8 @@ def targets(folder: Path) -> Path:
 def switched(folder: Path) -> Path:
     """The arm with a limit switch on every joint."""
     text = (ROOT / "robots" / "three_dof.yaml").read_text()
-    for axis, at in zip("XYZ", (-20, 75, -105), strict=True):
-        homing = f"homing: {{switch: {axis}, direction: -1, at: {at}, speed: 40, backoff: 3, normally: open}}"
+    for axis, switch_value in zip("XYZ", (-20, 75, -105), strict=True):
+        homing = f"homing: {{switch: {axis}, direction: -1, at: {switch_value}, speed: 40, backoff: 3, normally: open}}"
         text = text.replace(f"    drive: {{axis: {axis},", f"    {homing}\n    drive: {{axis: {axis},")
     (folder / "switched.yaml").write_text(text)
     return folder / "switched.yaml"

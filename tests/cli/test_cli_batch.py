@@ -191,8 +191,8 @@ def test_out_spares_the_robot_file(tmp_path: Path, command: list[Any]) -> None:
     robot, link = tmp_path / "arm.yaml", tmp_path / "link.yaml"
     robot.write_bytes((ROOT / THREE_DOF).read_bytes())
     link.symlink_to(robot)
-    for out in (robot, link):
-        completed = run(command[0], robot, *command[1:], "--out", out)
+    for target in (robot, link):
+        completed = run(command[0], robot, *command[1:], "--out", target)
         assert (completed.code, completed.out) == (2, "")
         assert "is a robot file" in completed.err
     assert robot.read_bytes() == (ROOT / THREE_DOF).read_bytes()

@@ -105,11 +105,11 @@ def test_relaxed_rows_are_played_back(bus: str, tmp_path: Path) -> None:
 
 
 def test_zero_writes_counts_and_leaves_the_rest_of_the_file(bus: str, tmp_path: Path) -> None:
-    new = tmp_path / "new.yaml"
+    written = tmp_path / "new.yaml"
     with PtyPort(ServoBus([Servo(1, 2100), Servo(2, 1600)])) as pty:
-        assert run("zero", bus, "--port", pty.name, "--pose", "0,45", "--out", new).code == 0
+        assert run("zero", bus, "--port", pty.name, "--pose", "0,45", "--out", written).code == 0
     text = BUS.replace("zero: 2058", "zero: 2100").replace("zero: 2068", "zero: 2112")
-    assert new.read_text() == text
+    assert written.read_text() == text
     assert Path(bus).read_text() == BUS
 
 
@@ -144,8 +144,8 @@ ENDS = {"q1": (1, 120), "q2": (-1, -20), "q3": (1, 120)}
 def homed(grbl: str) -> str:
     """The GRBL arm with a switch on every joint, and a gripper on M3."""
     text = Path(grbl).read_text()
-    for name, (direction, at) in ENDS.items():
-        text = text.replace(f"  - name: {name}\n", f"  - name: {name}\n    {HOMING % (direction, at)}\n")
+    for name, (direction, switch_value) in ENDS.items():
+        text = text.replace(f"  - name: {name}\n", f"  - name: {name}\n    {HOMING % (direction, switch_value)}\n")
     begin, end = text.index("gripper:"), text.index("# The paper has no limit switches")
     text = text[:begin] + "gripper: {kind: spindle, open: 40, closed: 200}\n" + text[end:]
     Path(grbl).write_text(text)
@@ -166,12 +166,12 @@ def test_home_ends_in_the_home_pose_and_stays_at_the_switches_when_told(homed: s
     assert "moving to the home pose" in rehearsed.err
     board = fitted(homed)
     with PtyPort(board) as pty:
-        there = run("home", homed, "--port", pty.name, "--stay", "--json").json
-        assert there["joints"] == pytest.approx([119, -19, 119], abs=0.03)  # $27 = 1 deg off the switches
-        at = board.steps[:3]
+        at_switches = run("home", homed, "--port", pty.name, "--stay", "--json").json
+        assert at_switches["joints"] == pytest.approx([119, -19, 119], abs=0.03)  # $27 = 1 deg off the switches
+        steps_before = board.steps[:3]
         home = run("home", homed, "--port", pty.name, "--json").json
         assert (home["position"], home["pulses"]) == ("known", [0, 0, 0])
-        assert [a - b for a, b in zip(board.steps, at, strict=True)] == [-n for n in there["pulses"]]
+        assert [a - b for a, b in zip(board.steps, steps_before, strict=True)] == [-n for n in at_switches["pulses"]]
 
 
 def test_home_refuses_a_board_that_would_look_at_the_other_end(homed: str) -> None:
@@ -201,23 +201,23 @@ def test_a_gripper_on_m3_is_given_its_word_and_told_to_be_unmeasured(homed: str)
 
 def test_a_spindle_is_for_grbl_s_gripper_alone(homed: str, tmp_path: Path) -> None:
     text, path = Path(homed).read_text(), tmp_path / "wrong.yaml"
-    for old, new, says in (
+    for before, after, says in (
         ("kind: spindle, open: 40", "kind: spindle, axis: X, open: 40", "a spindle has none"),
         ("closed: 200", "closed: -200", "is an S word of M3"),
         ("axis: X, full_steps: 200, microsteps: 16, gear: 1, pulley: 4", "kind: spindle", "which turns no joint"),
         ("board: {kind: grbl}", "board: {kind: uno_cnc_shield}", "which uno_cnc_shield has not"),
     ):
-        path.write_text(text.replace(old, new))
+        path.write_text(text.replace(before, after))
         refused = run("info", path)
         assert (refused.code, says in refused.err) == (4, True), refused.err
 
 
 def test_zero_records_the_jaw_too(bus: str, tmp_path: Path) -> None:
-    new = tmp_path / "new.yaml"
+    written = tmp_path / "new.yaml"
     with PtyPort(ServoBus([Servo(1, 2100), Servo(2, 1600), Servo(6, 1900)])) as pty:
-        completed = run("zero", bus, "--port", pty.name, "--pose", "0,45", "--gripper", "open", "--out", new)
+        completed = run("zero", bus, "--port", pty.name, "--pose", "0,45", "--gripper", "open", "--out", written)
     assert completed.code == 0
-    assert armkin.load(new).gripper == armkin.load(bus).gripper.model_copy(update={"zero": 1217})  # type: ignore[union-attr]
+    assert armkin.load(written).gripper == armkin.load(bus).gripper.model_copy(update={"zero": 1217})  # type: ignore[union-attr]
 
 
 def test_the_jaws_of_the_so_arms_move_as_far_as_their_urdf_says() -> None:
@@ -227,8 +227,10 @@ def test_the_jaws_of_the_so_arms_move_as_far_as_their_urdf_says() -> None:
 
 def test_values_are_replaced_where_they_stand() -> None:
     text = "a:\n  - {b: 1, c: [2, 3]}  # one\n  - b: 4\n    d: x\ne: 5\n"
-    found = with_values(text, {("a", 0, "b"): 10, ("a", 0, "z"): 11, ("a", 1, "d"): 12, ("a", 1, "z"): 13, ("e",): 14})
-    assert found == "a:\n  - {b: 10, c: [2, 3], z: 11}  # one\n  - b: 4\n    d: 12\n    z: 13\ne: 14\n"
+    replaced = with_values(
+        text, {("a", 0, "b"): 10, ("a", 0, "z"): 11, ("a", 1, "d"): 12, ("a", 1, "z"): 13, ("e",): 14}
+    )
+    assert replaced == "a:\n  - {b: 10, c: [2, 3], z: 11}  # one\n  - b: 4\n    d: 12\n    z: 13\ne: 14\n"
 
 
 def test_a_path_grips_with_grbl_s_output_between_its_moves(homed: str, tmp_path: Path) -> None:

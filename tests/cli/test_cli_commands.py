@@ -59,11 +59,11 @@ def test_fk() -> None:
 
 
 def test_fk_for_people() -> None:
-    out = run("fk", THREE_DOF, -30, 5, -5).out
-    assert out.startswith("three_dof: q1 = -30, q2 = 5, q3 = -5 deg\n")
+    text = run("fk", THREE_DOF, -30, 5, -5).out
+    assert text.startswith("three_dof: q1 = -30, q2 = 5, q3 = -5 deg\n")
     for word in ("398.3923", "-218.4649", "187.1697", "mm", "deg"):
-        assert word in out
-    assert "-0.0000" not in out
+        assert word in text
+    assert "-0.0000" not in text
 
 
 def test_fk_outside_limits_warns_and_is_done() -> None:
@@ -83,11 +83,16 @@ def test_fk_frames() -> None:
 
 
 def test_ik_lists_the_best_branch_or_all() -> None:
-    one = run("ik", THREE_DOF, 390, 80, 300, "--json").json
+    best_alone = run("ik", THREE_DOF, 390, 80, 300, "--json").json
     all_of_them = run("ik", THREE_DOF, 390, 80, 300, "--json", "--all-branches").json
-    assert (one["status"], one["complete"], one["best"], one["closest"]) == ("exact", True, 0, None)
-    assert one["branches"] == all_of_them["branches"][:1]
-    assert len(all_of_them["branches"]) == one["branch_count"] == 4
+    assert (best_alone["status"], best_alone["complete"], best_alone["best"], best_alone["closest"]) == (
+        "exact",
+        True,
+        0,
+        None,
+    )
+    assert best_alone["branches"] == all_of_them["branches"][:1]
+    assert len(all_of_them["branches"]) == best_alone["branch_count"] == 4
     legal = [branch["within_limits"] for branch in all_of_them["branches"]]
     assert legal == sorted(legal, reverse=True)
     for part in (True, False):
@@ -214,8 +219,8 @@ def test_pulses_of_servos() -> None:
 def test_pulses_of_a_differential() -> None:
     answer = run("pulses", "tests/robots/differential_wrist.yaml", "home", "--json").json
     assert all(count == 0 for count in answer["pulses"])
-    out = run("info", "tests/robots/differential_wrist.yaml").out
-    assert "2 " in out.partition("motor ")[2]
+    text = run("info", "tests/robots/differential_wrist.yaml").out
+    assert "2 " in text.partition("motor ")[2]
 
 
 @pytest.mark.parametrize("robot", ALL_ROBOTS)
@@ -235,9 +240,9 @@ def test_info_of_every_arm(robot: str) -> None:
 
 
 def test_info_says_the_step_chain() -> None:
-    out = run("info", THREE_DOF).out
+    text = run("info", THREE_DOF).out
     for word in ("42962", "26.85125", "0.028125", "-120 .. 120", "-90", "uno_cnc_shield", "xyz"):
-        assert word in out
+        assert word in text
 
 
 def test_schema(tmp_path: Path) -> None:

@@ -25,13 +25,13 @@ def failed(*words: object, stdin: bytes = b"") -> dict[str, Any]:
     """The error of a command line under --json, whose stdout must be empty."""
     completed = run(*words, "--json", stdin=stdin)
     assert completed.out == ""
-    found: dict[str, Any] = json.loads(completed.err)
-    assert found["exit_code"] == completed.code
-    return found
+    error: dict[str, Any] = json.loads(completed.err)
+    assert error["exit_code"] == completed.code
+    return error
 
 
 @pytest.mark.parametrize(
-    ("words", "found"),
+    ("words", "expected"),
     [
         (("fk", "nope"), {"kind": "file", "exit_code": 1, "file": "nope"}),
         (("fk", DOF, 1, 2), {"kind": "usage", "exit_code": 2, "names": ["q1", "q2", "q3"], "got": 2}),
@@ -44,10 +44,10 @@ def failed(*words: object, stdin: bytes = b"") -> dict[str, Any]:
         (("fk", DOF, "--batch", "-", "--out", "/no/such/folder/x"), {"kind": "file", "exit_code": 1}),
     ],
 )
-def test_an_error_is_one_object(words: tuple[object, ...], found: dict[str, Any]) -> None:
+def test_an_error_is_one_object(words: tuple[object, ...], expected: dict[str, Any]) -> None:
     answer = failed(*words)
     assert answer["error"]
-    assert {key: answer[key] for key in found} == found
+    assert {key: answer[key] for key in expected} == expected
 
 
 def test_an_invalid_robot_file_names_its_line(tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_every_kind_that_has_advice_is_raised_somewhere() -> None:
 
 def test_no_text_of_the_core_names_an_option() -> None:
     options = {word for name in COMMANDS for p in load_command(name).params for word in p.opts if word.startswith("--")}
-    found = [
+    naming = [
         f"{path.relative_to(SOURCE)}:{node.lineno}: {word}"
         for path in sorted(SOURCE.rglob("*.py"))
         if path.relative_to(SOURCE).parts[0] != "cli"
@@ -114,4 +114,4 @@ def test_no_text_of_the_core_names_an_option() -> None:
         for word in re.findall(r"(?<![\w-])--[a-z][a-z-]*", node.value)
         if word in options
     ]
-    assert not found
+    assert not naming

@@ -190,9 +190,9 @@ def shown(text: str) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def block(name: str, result: Result) -> str:
+def block(name: str, completed: Result) -> str:
     quoted = (repr(w) if not w or " " in w or not w.isprintable() else shown(w) for w in CASES[name][1])
-    return f"[{name}]\n$ armkin {shown(' '.join(quoted))}\nexit {result.code}\n{result.err.strip()}"
+    return f"[{name}]\n$ armkin {shown(' '.join(quoted))}\nexit {completed.code}\n{completed.err.strip()}"
 
 
 def snapshots() -> dict[str, str]:
@@ -205,26 +205,26 @@ def test_hostile(name: str, folder: Path) -> None:
     run("info", DOF)  # the imports are not the command line's time
     results: list[Result] = []
     seconds = least(lambda: results.append(outcome(name, folder)), 2, time.monotonic)
-    result = results[0]
+    completed = results[0]
     code = CASES[name][0]
-    assert result.code == code, result.err
-    assert "Traceback" not in result.err
-    assert "internal error" not in result.err
+    assert completed.code == code, completed.err
+    assert "Traceback" not in completed.err
+    assert "internal error" not in completed.err
     if "--json" in CASES[name][1]:  # one object that says the same
-        answer = json.loads(result.err)
+        answer = json.loads(completed.err)
         assert (answer["exit_code"], bool(answer["kind"])) == (code, True)
-        result = result._replace(err="error: " + answer["error"].replace("\n", "\n  ") + "\n")
-    assert result.err.startswith("error: ")
-    assert 1 <= result.err.count("\n") <= 2
-    assert all(len(line) < 250 for line in result.err.splitlines())
+        completed = completed._replace(err="error: " + answer["error"].replace("\n", "\n  ") + "\n")
+    assert completed.err.startswith("error: ")
+    assert 1 <= completed.err.count("\n") <= 2
+    assert all(len(line) < 250 for line in completed.err.splitlines())
     if code != 3:
-        assert result.out == ""
+        assert completed.out == ""
     assert seconds < 2
     assert [path.name for path in (folder / "here").iterdir()] == ["robots"]
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
-        blocks = {**snapshots(), name: block(name, result)}
+        blocks = {**snapshots(), name: block(name, completed)}
         SNAPSHOT.write_text("\n\n".join(blocks[key] for key in CASES if key in blocks) + "\n")
-    assert block(name, result) == snapshots()[name]
+    assert block(name, completed) == snapshots()[name]
 
 
 def test_every_snapshot_belongs_to_a_case() -> None:

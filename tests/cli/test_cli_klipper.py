@@ -34,8 +34,8 @@ def test_a_new_klipper_is_told_where_the_arm_stands_then_moved(tmp_path: Path) -
         assert moved.code == 0, moved.err
         assert moved.json["pulses"] == pins(board) == [-107, -597, 333]
         assert "a stop takes effect when Klipper has carried out what it holds" in lost.err  # once a day
-        told = run("status", ROBOT, "--port", port.name, "--json").json
-        assert (told["position"], told["state"], told["settings"]) == ("known", "ready", [])
+        status = run("status", ROBOT, "--port", port.name, "--json").json
+        assert (status["position"], status["state"], status["settings"]) == ("known", "ready", [])
         assert "position is known" in run("send", ROBOT, 0, 90, -90, "--port", port.name, "--assume-home").err
         assert "fit the robot file" in run("setup", ROBOT, "--port", port.name).out
         assert run("setup", ROBOT, "--port", port.name, "--json").json["differences"] == []
@@ -72,9 +72,9 @@ def test_setup_prints_what_printer_cfg_needs() -> None:
     for axis, name in zip("abc", ("q1", "q2", "q3"), strict=True):
         assert f"[manual_stepper axis_{axis}]\n# {name}\nstep_pin: ?\n" in completed.out
     assert "not compared" in completed.out
-    found = run("setup", ROBOT, "--json").json
-    assert (found["port"], found["differences"]) == (None, None)
-    assert found["printer_cfg"] + "\n# not compared" in completed.out
+    answer = run("setup", ROBOT, "--json").json
+    assert (answer["port"], answer["differences"]) == (None, None)
+    assert answer["printer_cfg"] + "\n# not compared" in completed.out
 
 
 @pytest.mark.parametrize(

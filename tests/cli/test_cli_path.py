@@ -38,21 +38,21 @@ def pick(tmp_path: Path) -> Path:
 def test_a_plan_is_told_drawn_and_written(pick: Path, tmp_path: Path) -> None:
     completed = run("path", THREE_DOF, pick, "--json", "--out", tmp_path / "o.csv", "--plot", tmp_path / "o.png")
     assert completed.code == 0, completed.err
-    found = completed.json
-    assert found["robot"] == "three_dof"
-    assert len(found["robot_sha256"]) == 64
-    assert found["length_mm"] == pytest.approx(134.628, abs=0.001)
-    assert [run["s_mm"] for run in found["runs"]] == [[0.0, found["length_mm"]]]
-    assert found["runs"][0]["branches"] == [{"s_mm": 0.0, "name": "left, elbow up"}]
-    assert found["reconfigurations"] == []
-    assert found["branches"][0]["carries_mm"] == found["length_mm"]
-    assert max(found["limits"]["speed"].values()) <= 1.002
-    assert max(found["limits"]["accel"].values()) <= 1.002
-    assert found["deviation_mm"] <= found["tolerance_mm"] == 0.05
-    assert found["segments"] < 100 * found["duration_s"]
+    plan = completed.json
+    assert plan["robot"] == "three_dof"
+    assert len(plan["robot_sha256"]) == 64
+    assert plan["length_mm"] == pytest.approx(134.628, abs=0.001)
+    assert [run["s_mm"] for run in plan["runs"]] == [[0.0, plan["length_mm"]]]
+    assert plan["runs"][0]["branches"] == [{"s_mm": 0.0, "name": "left, elbow up"}]
+    assert plan["reconfigurations"] == []
+    assert plan["branches"][0]["carries_mm"] == plan["length_mm"]
+    assert max(plan["limits"]["speed"].values()) <= 1.002
+    assert max(plan["limits"]["accel"].values()) <= 1.002
+    assert plan["deviation_mm"] <= plan["tolerance_mm"] == 0.05
+    assert plan["segments"] < 100 * plan["duration_s"]
     rows = list(csv.DictReader((tmp_path / "o.csv").read_text().splitlines()))
-    assert float(rows[-1]["time_s"]) == found["duration_s"]
-    assert float(rows[-1]["s_mm"]) == pytest.approx(found["length_mm"])
+    assert float(rows[-1]["time_s"]) == plan["duration_s"]
+    assert float(rows[-1]["s_mm"]) == pytest.approx(plan["length_mm"])
     q = np.deg2rad([float(rows[300][name]) for name in ("q1", "q2", "q3")])
     tip = armkin.fk(armkin.load(THREE_DOF), q)[:3, 3]
     assert tip == pytest.approx([float(rows[300][f"{axis}_mm"]) for axis in "xyz"])
@@ -79,22 +79,22 @@ def test_a_closed_path_moves_although_it_ends_where_it_starts(tmp_path: Path) ->
 def test_corners_from_options_and_from_csv(tmp_path: Path) -> None:
     rows = tmp_path / "rows.csv"
     rows.write_text("z,x,y,blend\n300,390,80,0\n300,390,140,10\n300,330,140,0\n")
-    one = run("path", THREE_DOF, rows, "--json").json
+    from_csv = run("path", THREE_DOF, rows, "--json").json
     two = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,140,300", "--via", "330,140,300",
               "--blend", 10, "--json").json  # fmt: skip
-    assert one["length_mm"] == pytest.approx(two["length_mm"])
-    assert one["length_mm"] < 120
-    assert run("path", THREE_DOF, "-", "--json", stdin=rows.read_bytes()).json["length_mm"] == one["length_mm"]
+    assert from_csv["length_mm"] == pytest.approx(two["length_mm"])
+    assert from_csv["length_mm"] < 120
+    assert run("path", THREE_DOF, "-", "--json", stdin=rows.read_bytes()).json["length_mm"] == from_csv["length_mm"]
 
 
 def test_what_is_not_carried_is_exit_3_with_the_verdict() -> None:
     completed = run("path", THREE_DOF, "--via", "390,80,300", "--via", "390,-400,300", "--json", "--port", "sim")
     assert completed.code == 3
-    found = completed.json
-    assert found["duration_s"] is None
-    assert found["reconfigurations"][0]["why"] == "reach"
-    assert found["reconfigurations"][0]["status_beyond"] == "unreachable"
-    assert [branch["ends_because"] for branch in found["branches"]][-1] == "q1 meets its limit -120 deg"
+    plan = completed.json
+    assert plan["duration_s"] is None
+    assert plan["reconfigurations"][0]["why"] == "reach"
+    assert plan["reconfigurations"][0]["status_beyond"] == "unreachable"
+    assert [branch["ends_because"] for branch in plan["branches"]][-1] == "q1 meets its limit -120 deg"
 
 
 AT = "moves:\n  - point: [390, 80, 300]\n"
@@ -155,9 +155,9 @@ def test_a_million_rows_are_refused_without_being_read() -> None:
 def test_corners_of_half_a_turn_and_points_given_twice_are_no_errors(tmp_path: Path) -> None:
     path = tmp_path / "p.yaml"
     path.write_text("blend: 5\n" + AT + 2 * "  - line: [390, 160, 300]\n" + "  - line: [390, 80, 300]\n")
-    found = run("path", THREE_DOF, path, "--json").json
-    assert found["length_mm"] == pytest.approx(160)
-    assert found["deviation_mm"] <= 0.05
+    plan = run("path", THREE_DOF, path, "--json").json
+    assert plan["length_mm"] == pytest.approx(160)
+    assert plan["deviation_mm"] <= 0.05
 
 
 def test_the_robot_file_is_not_written_over(tmp_path: Path, pick: Path) -> None:

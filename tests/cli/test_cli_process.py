@@ -90,7 +90,7 @@ def on_a_terminal(words: list[str], stdin: bytes, **environment: str) -> str:
     ) as p:
         os.close(slave)
         p.communicate(stdin)
-    seen = b""
+    shown = b""
     while True:
         try:
             part = os.read(master, 65536)
@@ -98,20 +98,20 @@ def on_a_terminal(words: list[str], stdin: bytes, **environment: str) -> str:
             break
         if not part:
             break
-        seen += part
+        shown += part
     os.close(master)
-    return seen.decode()
+    return shown.decode()
 
 
 def test_colours_and_progress_on_a_terminal_only() -> None:
     batch = ["fk", THREE_DOF, "--batch", "-"]
     plain = run_process(*batch, input=MANY, env={**os.environ, "NO_COLOR": ""})
     assert plain.err == ""
-    seen = on_a_terminal(batch, 10 * MANY, NO_COLOR="")
-    assert " rows" in seen
+    shown = on_a_terminal(batch, 10 * MANY, NO_COLOR="")
+    assert " rows" in shown
     assert "100 %  8 of 8 samples" in on_a_terminal(["workspace", "robots/pan_tilt.yaml", "--grid", "2,4"], b"")
     moving = on_a_terminal(["send", THREE_DOF, "-30", "5", "-5", "--port", "sim"], b"")
-    percent = [int(found) for found in re.findall(r"(\d+) %", moving)]
+    percent = [int(figure) for figure in re.findall(r"(\d+) %", moving)]
     assert percent == sorted(percent)
     assert percent[-1] == 100  # what takes less than 0.2 s shows no more
     assert "\x1b[31merror:" in on_a_terminal(["fk", THREE_DOF, "1"], b"", NO_COLOR="")

@@ -118,8 +118,8 @@ def test_a_file_with_one_row_outside_moves_nothing(tmp_path: Path) -> None:
 def test_streamed_waypoints_stand_up_to_the_first_wrong_one(last: bytes, code: int, message: str) -> None:
     completed = run("send", THREE_DOF, "--batch", "-", "--port", "sim", "--json", stdin=b"10,80,-80\n-30,5,-5\n" + last)
     assert completed.code == code, completed.err
-    told = json.loads(completed.err)["sent"] if code == 2 else completed.json
-    assert told["pulses"] == COUNTS
+    answer = json.loads(completed.err)["sent"] if code == 2 else completed.json
+    assert answer["pulses"] == COUNTS
     assert (completed.out == "") == (code == 2)
     assert message in completed.err
 

@@ -84,8 +84,12 @@ def test_ordinary_numbers_are_not_noted(line: str) -> None:
 
 def test_a_robot_file_in_metres_and_radians_is_noted(tmp_path: Path) -> None:
     text = (ROOT / THREE_DOF).read_text()
-    for old, new in {"d: 170": "d: 0.17", "a: 197, d: -10": "a: 0.197, d: -0.01", "a: 258": "a: 0.258"}.items():
-        text = text.replace(old, new)
+    for millimetres, metres in {
+        "d: 170": "d: 0.17",
+        "a: 197, d: -10": "a: 0.197, d: -0.01",
+        "a: 258": "a: 0.258",
+    }.items():
+        text = text.replace(millimetres, metres)
     path = tmp_path / "metres.yaml"
     path.write_text(text.replace("alpha: 90", "alpha: 1.5708"))
     completed = run("fk", path, 0, 0, 0)

@@ -40,20 +40,20 @@ def test_workspace_of_a_planar_arm_has_an_area() -> None:
 
 
 def test_workspace_for_people() -> None:
-    out = run("workspace", THREE_DOF, "--samples", "1e4").out
-    assert out.startswith("three_dof: 10,000 samples\n")
+    text = run("workspace", THREE_DOF, "--samples", "1e4").out
+    assert text.startswith("three_dof: 10,000 samples\n")
     for word in ("reach", "mm from the base", "volume 2.45412e+08 mm3 +- 0.85 %"):
-        assert word in out
+        assert word in text
 
 
 def test_the_homeworks_sweep_is_one_command(tmp_path: Path) -> None:
-    out, picture = tmp_path / "sweep.csv", tmp_path / "sweep.png"
-    words = ["workspace", "robots/pan_tilt.yaml", "--grid", "50,200", "--out", out, "--plot", picture]
+    cloud, picture = tmp_path / "sweep.csv", tmp_path / "sweep.png"
+    words = ["workspace", "robots/pan_tilt.yaml", "--grid", "50,200", "--out", cloud, "--plot", picture]
     completed = run(*words, "--color", "z", "--json")
     assert (completed.code, completed.err) == (0, "")
     assert completed.json["samples"] == 10_000
     assert completed.json["volume_mm3"] == 0.0
-    lines = out.read_text().splitlines()
+    lines = cloud.read_text().splitlines()
     assert lines[:2] == ["q1,q2,x,y,z", "-180,-180,1500,-1000,0"]
     assert len(lines) == 10_001
     assert picture.read_bytes().startswith(PNG)
@@ -88,12 +88,12 @@ def test_workspace_usage(words: list[str], message: str) -> None:
 
 
 def test_plot_one_pose(tmp_path: Path) -> None:
-    out = tmp_path / "arm.png"
-    assert run("plot", THREE_DOF, -30, 5, -5, "--out", out, "--view", "-10,-60") == (0, "", "")
-    first = out.read_bytes()
+    picture = tmp_path / "arm.png"
+    assert run("plot", THREE_DOF, -30, 5, -5, "--out", picture, "--view", "-10,-60") == (0, "", "")
+    first = picture.read_bytes()
     assert first.startswith(PNG)
-    assert run("plot", THREE_DOF, -30, 5, -5, "--out", out, "--no-frames") == (0, "", "")
-    assert out.read_bytes() != first
+    assert run("plot", THREE_DOF, -30, 5, -5, "--out", picture, "--no-frames") == (0, "", "")
+    assert picture.read_bytes() != first
 
 
 def test_plot_warns_of_a_pose_outside_the_limits(tmp_path: Path) -> None:
@@ -103,9 +103,9 @@ def test_plot_warns_of_a_pose_outside_the_limits(tmp_path: Path) -> None:
 
 
 def test_plot_all_branches(tmp_path: Path) -> None:
-    out = tmp_path / "branches.svg"
-    assert run("plot", THREE_DOF, "--target", "390,80,300", "--out", out) == (0, "", "")
-    assert b"<svg" in out.read_bytes()
+    picture = tmp_path / "branches.svg"
+    assert run("plot", THREE_DOF, "--target", "390,80,300", "--out", picture) == (0, "", "")
+    assert b"<svg" in picture.read_bytes()
 
 
 def test_plot_the_homeworks_path(tmp_path: Path) -> None:
@@ -115,10 +115,10 @@ def test_plot_the_homeworks_path(tmp_path: Path) -> None:
     x, y = 400 * np.cos(t), 400 * np.sin(t)
     s = armkin.ik(arm, np.stack([np.cos(-np.pi / 4) * x, y, 660 - np.sin(-np.pi / 4) * x], axis=1))
     rows = np.rad2deg(s.q[:, s.names.index("left, elbow up")])
-    path, out = tmp_path / "path.csv", tmp_path / "path.png"
+    path, picture = tmp_path / "path.csv", tmp_path / "path.png"
     np.savetxt(path, rows, delimiter=",", header="q1,q2,q3", comments="")
-    assert run("plot", "robots/yaw_two_link.yaml", "--path", path, "--out", out) == (0, "", "")
-    assert out.read_bytes().startswith(PNG)
+    assert run("plot", "robots/yaw_two_link.yaml", "--path", path, "--out", picture) == (0, "", "")
+    assert picture.read_bytes().startswith(PNG)
 
 
 @pytest.mark.parametrize(
@@ -205,8 +205,8 @@ def test_plot_without_out_opens_a_window(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_without_matplotlib(tmp_path: Path, words: list[str]) -> None:
     """One line that says what to install, exit code 1, at once, and no file."""
     code = "import sys; sys.modules['matplotlib'] = None; from armkin.cli import main; main()"
-    out = str(tmp_path / "a.png")
-    command = [sys.executable, "-c", code, words[0], THREE_DOF, *words[1:], out]
+    picture = str(tmp_path / "a.png")
+    command = [sys.executable, "-c", code, words[0], THREE_DOF, *words[1:], picture]
     completed = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
     assert (completed.returncode, completed.stdout) == (1, "")
     assert completed.stderr.startswith("error: pictures need matplotlib, which cannot be imported (")

@@ -23,7 +23,7 @@ def offered(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("line", "wanted"),
+    ("line", "expected"),
     [
         ("armkin ", list(COMMANDS)),
         ("armkin pu", ["pulses"]),
@@ -43,9 +43,13 @@ def offered(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
         ("armkin nonsense --", []),
     ],
 )
-def test_tab(line: str, wanted: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    found = offered(monkeypatch, line)
-    assert sorted(found) == sorted(wanted) if wanted else not set(found) - {"--help", "--version"} - _GROUP
+def test_tab(line: str, expected: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    words_offered = offered(monkeypatch, line)
+    assert (
+        sorted(words_offered) == sorted(expected)
+        if expected
+        else not set(words_offered) - {"--help", "--version"} - _GROUP
+    )
 
 
 _GROUP = {"--install-completion", "--show-completion"}

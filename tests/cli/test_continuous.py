@@ -42,11 +42,11 @@ def test_the_same_across_chunks_and_unreachable_rows(winding: np.ndarray, monkey
     lines = targets_of(winding).splitlines()
     lines.insert(30, b"9000,0,0,0,0,0")
     words = ("ik", "ur5e", "--batch", "-", "--continuous", "--near", start)
-    whole = run(*words, "--json", stdin=b"\n".join(lines))
+    in_one_chunk = run(*words, "--json", stdin=b"\n".join(lines))
     monkeypatch.setattr("armkin.cli.csv_to_numbers.ROWS", 7)
     parts = run(*words, "--json", stdin=b"\n".join(lines))
-    assert whole.code == parts.code == 3
-    assert [line["best"] for line in parts.lines] == [line["best"] for line in whole.lines]
+    assert in_one_chunk.code == parts.code == 3
+    assert [line["best"] for line in parts.lines] == [line["best"] for line in in_one_chunk.lines]
     joints = [line["branches"][0]["joints"] for line in parts.lines if line["best"] is not None]
     assert np.allclose(joints, winding, atol=1e-6)
 

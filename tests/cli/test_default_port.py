@@ -15,10 +15,10 @@ from pty_port import PtyPort
 
 def plugged_in(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
     """What the operating system says is there."""
-    found = [ports.Found(name, "a board", "USB", "Arduino Uno") for name in names]
-    found.append(ports.Found("/dev/modem", "a modem", "USB", ""))
+    ports_found = [ports.Found(name, "a board", "USB", "Arduino Uno") for name in names]
+    ports_found.append(ports.Found("/dev/modem", "a modem", "USB", ""))
     for module in ("armkin.board.ports", "armkin.board.backend.board", "armkin.board.firmware.wire.find_boards"):
-        monkeypatch.setattr(f"{module}.list_ports", lambda: found)
+        monkeypatch.setattr(f"{module}.list_ports", lambda: ports_found)
 
 
 def test_the_environment_names_a_port(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -27,14 +27,14 @@ def test_the_environment_names_a_port(monkeypatch: pytest.MonkeyPatch) -> None:
     assert run("status", THREE_DOF, "--json").json["port"] == "sim"
     assert run("jog", THREE_DOF, "q1", 5).code == 0
     assert run("grip", THREE_DOF, "closed").code == 0
-    given = run("send", THREE_DOF, 0, 90, -90, "-p", "/dev/ttyNOWHERE")
-    assert given.code == 5
-    assert "/dev/ttyNOWHERE" in given.err
+    completed = run("send", THREE_DOF, 0, 90, -90, "-p", "/dev/ttyNOWHERE")
+    assert completed.code == 5
+    assert "/dev/ttyNOWHERE" in completed.err
 
 
 def test_the_only_board_that_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    with PtyBoard("uno_servos") as other, PtyBoard() as board:
-        plugged_in(monkeypatch, other.port, board.port)
+    with PtyBoard("uno_servos") as servo_board, PtyBoard() as board:
+        plugged_in(monkeypatch, servo_board.port, board.port)
         completed = run("status", THREE_DOF, "--json")
         assert completed.json["port"] == board.port
         assert completed.err == f"note: using {board.port}, the only port where an uno_cnc_shield answers\n"
@@ -59,14 +59,14 @@ def test_boards_of_others_are_looked_for_as_the_robot_file_says(monkeypatch: pyt
     robot, bus_arm = ("tests/robots/three_dof_grbl.yaml", "tests/robots/bus_arm.yaml")
     settings = {number: value for number, (_, value) in expected_settings(axes_of(armkin.load(ROOT / robot))).items()}
     servos = ServoBus([Servo(1, 2058), Servo(2, 2068)])
-    with PtyPort(Grbl(settings=settings)) as grbl, PtyPort(servos) as bus, PtyPort(ServoBus([Servo(1)])) as other:
-        plugged_in(monkeypatch, grbl.name, bus.name, other.name)
+    with PtyPort(Grbl(settings=settings)) as grbl, PtyPort(servos) as bus, PtyPort(ServoBus([Servo(1)])) as other_bus:
+        plugged_in(monkeypatch, grbl.name, bus.name, other_bus.name)
         completed = run("status", bus_arm, "--json")
         assert completed.json["port"] == bus.name
         assert f"using {bus.name}, the only port where a feetech board answers" in completed.err
-        plugged_in(monkeypatch, grbl.name, other.name)
+        plugged_in(monkeypatch, grbl.name, other_bus.name)
         assert run("status", robot, "--json").json["port"] == grbl.name
-        plugged_in(monkeypatch, other.name)
+        plugged_in(monkeypatch, other_bus.name)
         assert "no port where a feetech board answers was found" in run("status", bus_arm).err
 
 

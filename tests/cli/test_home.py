@@ -28,9 +28,11 @@ WRIST = """  - name: q4
 def arm_with_switches(folder: Path, *, four: bool, normally: str = "closed", upper: bool = False) -> str:
     """The three-axis arm with a switch on every axis; four: and a wrist that has none."""
     text = (ROOT / THREE_DOF).read_text().replace("task: xyz\n", "")
-    for axis, at in zip("XYZ", UPPER if upper else LOWER, strict=True):
+    for axis, switch_value in zip("XYZ", UPPER if upper else LOWER, strict=True):
         way = 1 if upper else -1
-        homing = f"{{switch: {axis}, direction: {way}, at: {at}, speed: 40, backoff: 3, normally: {normally}}}"
+        homing = (
+            f"{{switch: {axis}, direction: {way}, at: {switch_value}, speed: 40, backoff: 3, normally: {normally}}}"
+        )
         text = text.replace(f"    drive: {{axis: {axis},", f"    homing: {homing}\n    drive: {{axis: {axis},")
     head, joints, tail = text.partition("\n# The paper has a gripper")
     path = folder / "switched.yaml"
@@ -56,9 +58,9 @@ def test_homing_is_rehearsed_and_ends_in_the_home_pose(tmp_path: Path, normally:
         f"note: homing q{i}" for i in (1, 2, 3)
     ]
     stays = run("home", path, "--port", "sim", "--stay", "--json").json["joints"]
-    at = UPPER if upper else LOWER
+    switch_values = UPPER if upper else LOWER
     step = np.rad2deg(armkin.load(path).motor_gain.max(axis=1) ** -1)
-    assert np.all(np.abs(np.subtract(stays, at)) < 1.0 + 2 * step)  # stops behind the edge, within a degree
+    assert np.all(np.abs(np.subtract(stays, switch_values)) < 1.0 + 2 * step)  # stops behind the edge, within a degree
 
 
 def test_a_joint_without_a_switch_rests_at_home(tmp_path: Path) -> None:
@@ -74,10 +76,10 @@ def test_a_joint_without_a_switch_rests_at_home(tmp_path: Path) -> None:
 
 def test_homing_that_leaves_a_joint_lost_fails_and_says_the_next_step(tmp_path: Path) -> None:
     path = arm_with_switches(tmp_path, four=True)
-    some = run("home", path, "q1", "q2", "q3", "--port", "sim")
-    assert (some.code, some.out) == (5, "")
-    assert "homed q1, q2, q3; the position of q4 is still lost" in some.err
-    assert f"armkin home {path} --rest-at-home" in some.err
+    three_homed = run("home", path, "q1", "q2", "q3", "--port", "sim")
+    assert (three_homed.code, three_homed.out) == (5, "")
+    assert "homed q1, q2, q3; the position of q4 is still lost" in three_homed.err
+    assert f"armkin home {path} --rest-at-home" in three_homed.err
     completed = run("home", arm_with_switches(tmp_path, four=False), "q2", "--port", "sim")
     assert completed.code == 5
     assert f"armkin home {path} q1 q3" in completed.err
@@ -100,8 +102,8 @@ def test_the_order_of_the_file_is_kept(tmp_path: Path) -> None:
     for switch, order in (("X", 3), ("Y", 1), ("Z", 2)):
         text = text.replace(f"{{switch: {switch},", f"{{switch: {switch}, order: {order},")
     Path(path).write_text(text)
-    said = run("home", path, "--port", "sim").err
-    assert [line[-2:] for line in said.splitlines() if "homing" in line] == ["q2", "q3", "q1"]
+    messages = run("home", path, "--port", "sim").err
+    assert [line[-2:] for line in messages.splitlines() if "homing" in line] == ["q2", "q3", "q1"]
 
 
 def test_a_wrong_board_is_called_by_its_name() -> None:
@@ -116,9 +118,13 @@ def test_homing_again_reports_the_steps_that_were_lost(tmp_path: Path, monkeypat
     path = arm_with_switches(tmp_path, four=False)
     board = behind_a_port(path, monkeypatch)
     first = run("home", path, "--port", "COM3", "--json")
-    assert [one["steps"] for one in first.json["lost_steps"]] == [None, None, None]  # nothing was known before
+    assert [joint_loss["steps"] for joint_loss in first.json["lost_steps"]] == [
+        None,
+        None,
+        None,
+    ]  # nothing was known before
     again = run("home", path, "--port", "COM3", "--json")
-    assert all(abs(one["steps"]) <= 1 for one in again.json["lost_steps"]), again.json["lost_steps"]
+    assert all(abs(joint_loss["steps"]) <= 1 for joint_loss in again.json["lost_steps"]), again.json["lost_steps"]
     assert "lost" not in again.err
     board.motors.axes.net[0] -= 40
     pushed = run("home", path, "--port", "COM3", "--json")

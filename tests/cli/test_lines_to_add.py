@@ -32,8 +32,8 @@ def pasted(text: str, lines: list[str]) -> str:
 def test_pasted_lines_make_a_file_that_moves(robot: str, tmp_path: Path) -> None:
     copy = tmp_path / f"my_{robot}.yaml"
     assert run("export", robot, "--dh", "-o", copy).code == 0
-    found = run("info", copy, "--json").json
-    lines, lacks = found["lines_to_add"], found["lacks"]
+    summary = run("info", copy, "--json").json
+    lines, lacks = summary["lines_to_add"], summary["lacks"]
     assert lines
     assert lacks["simulate"]
     refused = run("send", copy, "home", "--dry-run", "--json")
@@ -43,10 +43,10 @@ def test_pasted_lines_make_a_file_that_moves(robot: str, tmp_path: Path) -> None
     rehearsal.write_text(pasted(copy.read_text(), json.loads(refused.err)["lines_to_add"]))
     assert run("send", rehearsal, "home", "--dry-run").code == 0
 
-    whole = tmp_path / "whole.yaml"
-    whole.write_text(pasted(copy.read_text(), lines))
-    assert run("info", whole, "--json").json["lacks"]["send"] == []
-    assert run("send", whole, "home", "--port", "sim").code == 0
+    complete = tmp_path / "whole.yaml"
+    complete.write_text(pasted(copy.read_text(), lines))
+    assert run("info", complete, "--json").json["lacks"]["send"] == []
+    assert run("send", complete, "home", "--port", "sim").code == 0
 
 
 def test_info_shows_the_lines() -> None:
@@ -69,9 +69,9 @@ def test_an_arm_without_published_accelerations_is_rehearsed_with_one_that_is_gi
     assert slow["pulses"] == quick["pulses"]
     if "duration_s" in slow:
         assert slow["duration_s"] > quick["duration_s"]
-    given = run("send", "three_dof", -30, 5, -5, *how, "--accel", 1, "--json").json  # its own are not replaced
-    assert given["pulses"] == [-1067, -10144, 5667]
-    assert given.get("duration_s", 1.917) == pytest.approx(1.917, abs=0.01)
+    answer = run("send", "three_dof", -30, 5, -5, *how, "--accel", 1, "--json").json  # its own are not replaced
+    assert answer["pulses"] == [-1067, -10144, 5667]
+    assert answer.get("duration_s", 1.917) == pytest.approx(1.917, abs=0.01)
 
 
 def test_an_acceleration_for_a_real_arm_stands_in_its_file() -> None:

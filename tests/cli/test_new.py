@@ -66,9 +66,9 @@ def test_a_csv_table() -> None:
 
 
 def test_the_comments_become_keys_when_they_are_taken_out() -> None:
-    out = run("new", "arm", *TABLE, "--convention", "standard", "--out", "-").out
+    text = run("new", "arm", *TABLE, "--convention", "standard", "--out", "-").out
     lines = []
-    for line in out.splitlines():
+    for line in text.splitlines():
         bare = line.strip().removeprefix("# ")
         is_key = line.strip().startswith("# ") and bare.split(":")[0].isidentifier() and "`" not in bare.split("#")[0]
         lines.append(line.replace("# ", "", 1) if is_key else line)
@@ -110,11 +110,11 @@ def test_the_questions_of_a_terminal(tmp_path: Path) -> None:
         os.close(slave)
         os.write(master, "".join(f"{answer}\n" for answer in answers).encode())
         assert process.stderr is not None
-        said = process.stderr.read().decode()
-        assert process.wait(30) == 0, said
+        messages = process.stderr.read().decode()
+        assert process.wait(30) == 0, messages
     os.close(master)
-    assert "d: 'a lot' is not a number" in said
-    assert "floor is hit in every posture" in said
+    assert "d: 'a lot' is not a number" in messages
+    assert "floor is hit in every posture" in messages
     assert [entry.floor for entry in robot_file.read_robot_file(tmp_path / "asked.yaml").keep_out] == [-20]
     first, second = robot_file.read_robot_file(tmp_path / "asked.yaml").joints
     assert first.dh is not None
@@ -129,16 +129,16 @@ def keys(part: Any) -> set[str]:
         return {key for item in part for key in keys(item)}
     if not isinstance(part, dict):
         return set()
-    found = set(part.get("properties", ()))
-    return found | {key for value in part.values() for key in keys(value)}
+    names = set(part.get("properties", ()))
+    return names | {key for value in part.values() for key in keys(value)}
 
 
 def test_the_example_shows_every_key() -> None:
     path = ROOT / "examples/every_key.yaml"
     text = path.read_text()
     schema = json.loads(run("schema").out)
-    wanted = keys(schema["properties"]) | keys(schema["$defs"])
-    missing = {key for key in wanted if f"{key}:" not in text}
-    assert len(wanted) > 45
+    expected = keys(schema["properties"]) | keys(schema["$defs"])
+    missing = {key for key in expected if f"{key}:" not in text}
+    assert len(expected) > 45
     assert not missing
     assert run("send", path, "show", "--port", "sim").code == 0

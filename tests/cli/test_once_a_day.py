@@ -13,7 +13,7 @@ def test_the_notes_of_a_port_come_once_a_day(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    for port, words, said in (
+    for port, words, notes in (
         ("/dev/one", ["no checksum"], "note: no checksum"),
         ("/dev/one", ["no checksum"], ""),
         ("/dev/two", ["no checksum"], "note: no checksum"),
@@ -21,4 +21,4 @@ def test_the_notes_of_a_port_come_once_a_day(
         ("/dev/one", [], ""),
     ):
         board_link._once_a_day(port, words)
-        assert capsys.readouterr().err.strip() == said
+        assert capsys.readouterr().err.strip() == notes

@@ -49,8 +49,8 @@ ASKED: dict[str, tuple[list[Any], str]] = {
 def test_an_unknown_ending_is_refused_with_those_allowed(tmp_path: Path, command: str, name: str) -> None:
     words, allowed = ASKED[command]
     (tmp_path / "poses.csv").write_bytes(POSES)
-    known = {"POSES": tmp_path / "poses.csv", "FILE": tmp_path / name}
-    words = [known.get(word, word) for word in words]
+    path_of = {"POSES": tmp_path / "poses.csv", "FILE": tmp_path / name}
+    words = [path_of.get(word, word) for word in words]
     completed = run(*words, *(() if "--trace" in words else ("--out", tmp_path / name)), stdin=POSES)
     assert (completed.code, completed.out) == (2, "")
     assert f"written as {allowed}; end the file's name with" in completed.err

@@ -29,28 +29,30 @@ def planar(tmp_path: Path) -> Path:
 def test_a_held_joint_goes_to_its_value_first_and_stays(planar: Path, tmp_path: Path) -> None:
     path = tmp_path / "way.yaml"
     path.write_text(MOVES)
-    out = tmp_path / "way.csv"
-    completed = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--port", "sim", "--json", "--out", out)
+    samples = tmp_path / "way.csv"
+    completed = run(
+        "path", planar, path, "--lock", "q3=20", "--task", "xy", "--port", "sim", "--json", "--out", samples
+    )
     assert completed.code == 0, completed.err
     arm = armkin.load(planar)
     assert completed.json["task"] == "xy"
     assert completed.json["joints"][2] == pytest.approx(20, abs=0.1)  # what the servo makes of it
     assert completed.json["pulses"] == armkin.pulses(arm, np.deg2rad(completed.json["joints"])).tolist()
     assert list(completed.json["limits"]["speed"]) == ["q1", "q2", "q3"]
-    rows = list(csv.DictReader(out.read_text().splitlines()))
+    rows = list(csv.DictReader(samples.read_text().splitlines()))
     q = np.deg2rad([[float(row[name]) for name in ("q1", "q2", "q3")] for row in rows])
-    on = np.array([float(row["s_mm"]) for row in rows]) > 0
+    on_path = np.array([float(row["s_mm"]) for row in rows]) > 0
     assert completed.json["approach"]["from_joints"][2] == 0
     assert "first a joint move to where the path starts" in completed.err
     assert np.allclose(q[:, 2], np.deg2rad(20))
-    tips = armkin.fk(arm, q[on])[:, :2, 3]
+    tips = armkin.fk(arm, q[on_path])[:, :2, 3]
     assert np.abs(tips.sum(axis=1) - 650).max() < 0.05 * np.sqrt(2)  # on the line
     assert tips[-1] == pytest.approx([350, 300], abs=1e-6)
     planned = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--json").json
     assert planned["duration_s"] == pytest.approx(completed.json["duration_s"], abs=0.01)
-    there = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--start", "0,0,20", "--json").json
-    assert "approach" not in there
-    assert there["duration_s"] == pytest.approx(planned["duration_s"], abs=1e-9)
+    planned_there = run("path", planar, path, "--lock", "q3=20", "--task", "xy", "--start", "0,0,20", "--json").json
+    assert "approach" not in planned_there
+    assert planned_there["duration_s"] == pytest.approx(planned["duration_s"], abs=1e-9)
 
 
 def test_a_held_joint_outside_its_limits_or_a_way_beyond_the_reach_moves_nothing(planar: Path, tmp_path: Path) -> None:
@@ -130,15 +132,15 @@ def test_joint_moves_say_where_the_redundant_joint_is_held_and_agree() -> None:
     completed = run("path", "panda", "-", "--json", stdin=(SEVEN + joint + down).encode())
     assert completed.code == 0, completed.err
     assert completed.json["held"] == {"J7": pytest.approx(30.0)}
-    other = joint.replace("30]", "31]")
-    refused = run("path", "panda", "-", stdin=(SEVEN + joint + other + down).encode())
+    second_joint = joint.replace("30]", "31]")
+    refused = run("path", "panda", "-", stdin=(SEVEN + joint + second_joint + down).encode())
     assert refused.code == 2
     assert (
         "standard input:7: move 4: J7 is redundant and held along a path: it cannot be at 30 and then at 31 deg"
         in refused.err
     )
-    some = run("path", "panda", "-", "--json", stdin=(SEVEN + "  - joint: {J1: 30}\n").encode())
-    assert some.json["held"] == {"J7": pytest.approx(45.0)}
+    one_joint = run("path", "panda", "-", "--json", stdin=(SEVEN + "  - joint: {J1: 30}\n").encode())
+    assert one_joint.json["held"] == {"J7": pytest.approx(45.0)}
     moves = run("path", "panda", "-", "--json", stdin=b"moves:\n  - joint: [0, -17, 0, -120, 0, 110, 30]\n")
     assert moves.code == 0
     assert "held" not in moves.json  # joint moves alone hold nothing

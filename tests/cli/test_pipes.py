@@ -86,12 +86,12 @@ def test_a_trace_goes_into_fk_and_ik() -> None:
     assert trace.code == 0
     assert "dry run" in trace.err
     table = list(csv.DictReader(io.StringIO(trace.out)))
-    where = [[float(row[f"tool_{axis}_mm"]) for axis in "xyz"] for row in table]
+    tips = [[float(row[f"tool_{axis}_mm"]) for axis in "xyz"] for row in table]
     poses = piped(trace, "fk", THREE_DOF, "--batch", "-", "--json").lines
     assert len(poses) == len(table) > 100
-    assert [pose["position_mm"] for pose in poses] == [pytest.approx(point, abs=1e-9) for point in where]
+    assert [pose["position_mm"] for pose in poses] == [pytest.approx(point, abs=1e-9) for point in tips]
     targets = piped(trace, "ik", THREE_DOF, "--batch", "-", "--json").lines
-    assert [answer["target"] for answer in targets] == where
+    assert [answer["target"] for answer in targets] == tips
 
 
 @pytest.mark.parametrize(

@@ -64,8 +64,8 @@ def test_poses_in_python(arm_file: str) -> None:
     assert list(arm.poses) == ["home", "park", "up"]
     assert np.allclose(np.rad2deg(arm.poses["park"]), [30, 60, -45])
     assert np.allclose(np.rad2deg(armkin.lock(arm, {"q2": 0.0}).poses["park"]), [30, -45])
-    for other in (pickle.loads(pickle.dumps(arm)), copy.deepcopy(arm)):
-        assert np.array_equal(other.poses["up"], arm.poses["up"])
+    for copied in (pickle.loads(pickle.dumps(arm)), copy.deepcopy(arm)):
+        assert np.array_equal(copied.poses["up"], arm.poses["up"])
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ class _Told:
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def update(self, done: int, total: int | None, seconds: float) -> None:
-        self.lines.append(progress_bar.progress_text("bytes", done, total, seconds))
+    def update(self, count: int, total: int | None, seconds: float) -> None:
+        self.lines.append(progress_bar.progress_text("bytes", count, total, seconds))
 
     def end(self) -> None:
         pass
@@ -31,14 +31,14 @@ class _Told:
 
 def _told(monkeypatch: pytest.MonkeyPatch, steps: list[tuple[float, int]]) -> list[str]:
     """What is said at ticks (seconds since the command began, done) of 10,000."""
-    now, bar = 0.0, _Told()
+    present, bar = 0.0, _Told()
     monkeypatch.setattr(sys, "stderr", _Terminal())
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(time, "monotonic", lambda: now)
+    monkeypatch.setattr(time, "monotonic", lambda: present)
     monkeypatch.setattr(progress_bar, "start_bar", lambda task: bar)
     with output.progress("bytes", 10_000) as tick:
-        for now, done in steps:  # noqa: B007  (the clock reads it)
-            tick(done)
+        for present, count in steps:  # noqa: B007  (the clock reads it)
+            tick(count)
     return bar.lines
 
 

@@ -162,8 +162,8 @@ class Talker:
 
     name, baud, simulated = "COM9", 250_000, True
 
-    def __init__(self, said: bytes) -> None:
-        self.said, self.time = said, 0.0
+    def __init__(self, reply: bytes) -> None:
+        self.said, self.time = reply, 0.0
 
     def now(self) -> float:
         return self.time
@@ -180,7 +180,7 @@ class Talker:
 
 
 @pytest.mark.parametrize(
-    ("said", "says"),
+    ("reply", "says"),
     [
         (b"", "no board answers on COM9 (250000 baud): is"),
         (b"junk\0\1\2", "something answers on COM9 (250000 baud), but not in this protocol: is"),
@@ -190,9 +190,9 @@ class Talker:
         ),
     ],
 )
-def test_what_does_not_speak_the_protocol_is_told_apart(said: bytes, says: str) -> None:
+def test_what_does_not_speak_the_protocol_is_told_apart(reply: bytes, says: str) -> None:
     with pytest.raises(LinkError) as caught:
-        Session(Talker(said)).open()
+        Session(Talker(reply)).open()
     assert says in str(caught.value)
 
 

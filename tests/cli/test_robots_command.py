@@ -11,19 +11,19 @@ from command_line import ROOT, run
 
 
 def test_every_shipped_robot_is_listed_with_what_it_can_do() -> None:
-    found = {entry["robot_file"]: entry for entry in run("robots", "--json").json["robots"]}
-    assert list(found) == list(catalogue.robot_names())
-    assert found["three_dof"]["can"] == {"ik": True, "pulses": True, "simulate": True, "send": True, "home": False}
-    assert found["panda"]["can"]["ik"]
-    assert found["ur5e"]["target_labels"] == ["x", "y", "z", "roll", "pitch", "yaw"]
+    entry_of = {entry["robot_file"]: entry for entry in run("robots", "--json").json["robots"]}
+    assert list(entry_of) == list(catalogue.robot_names())
+    assert entry_of["three_dof"]["can"] == {"ik": True, "pulses": True, "simulate": True, "send": True, "home": False}
+    assert entry_of["panda"]["can"]["ik"]
+    assert entry_of["ur5e"]["target_labels"] == ["x", "y", "z", "roll", "pitch", "yaw"]
     lines = run("robots").out.splitlines()
     can = ["ik", "pulses", "simulate", "send", "home"]
     assert lines[0].split() == ["robot", "joints", "task", "target", *can, "compared"]
-    assert [name for name in found if found[name]["compared"].startswith("only its own URDF")] == [
+    assert [name for name in entry_of if entry_of[name]["compared"].startswith("only its own URDF")] == [
         line.split()[0] for line in lines[1:] if line.endswith("URDF only")
     ]
-    assert found["fanuc_crx10ia"]["compared"].startswith("the maker's reach of 1249 mm")
-    assert [line.split()[0] for line in lines[1:]] == list(found)
+    assert entry_of["fanuc_crx10ia"]["compared"].startswith("the maker's reach of 1249 mm")
+    assert [line.split()[0] for line in lines[1:]] == list(entry_of)
 
 
 @cache

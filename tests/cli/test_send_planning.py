@@ -44,12 +44,12 @@ def test_a_trace_is_the_path_as_csv(tmp_path: Path) -> None:
 
 def _movable() -> list[Path]:
     """Shipped and test robots with drives and rates, whatever their board."""
-    found = []
+    robots = []
     for path in sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests" / "robots").glob("*.yaml")):
         text = path.read_text("utf-8")
         if "full_steps" in text or "kind: servo" in text:
-            found.append(path)
-    return found
+            robots.append(path)
+    return robots
 
 
 @pytest.mark.parametrize("path", _movable(), ids=lambda path: path.stem)

@@ -25,8 +25,8 @@ def test_status_says_that_a_power_cut_cannot_be_seen(monkeypatch: pytest.MonkeyP
     assert "motor power  not sensed\n" in lost
     assert "--power-cut" not in lost
     assert run("send", THREE_DOF, 10, 80, -80, "--port", "COM3", "--assume-home").code == 0
-    known = run("status", THREE_DOF, "--port", "COM3").out
-    assert "motor power  not sensed: after a cut the position above is wrong; armkin stop --power-cut" in known
+    text = run("status", THREE_DOF, "--port", "COM3").out
+    assert "motor power  not sensed: after a cut the position above is wrong; armkin stop --power-cut" in text
     assert run("status", THREE_DOF, "--port", "COM3", "--json").json["motor_power"] is None
 
 
@@ -57,18 +57,18 @@ def test_watch_tells_each_change_once_and_ends_with_ctrl_c(monkeypatch: pytest.M
     plug_in(board, monkeypatch)
     assert run("send", THREE_DOF, 10, 80, -80, "--port", "COM3", "--assume-home").code == 0
     monkeypatch.setattr("armkin.cli.commands.status._EVERY", 0.001)
-    asked = 0
+    count = 0
 
     def refresh(machine: FirmwareMachine) -> None:
-        nonlocal asked
-        asked += 1
+        nonlocal count
+        count += 1
         machine.status = machine.session.status()
-        if asked == 5:
+        if count == 5:
             os.kill(os.getpid(), signal.SIGINT)
 
     monkeypatch.setattr(FirmwareMachine, "refresh", refresh)
     watched = run("status", THREE_DOF, "--port", "COM3", "--watch", "--json")
-    assert (watched.code, watched.err, asked) == (0, "", 5)
+    assert (watched.code, watched.err, count) == (0, "", 5)
     assert [line["position"] for line in watched.lines] == ["known"]
 
 

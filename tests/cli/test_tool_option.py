@@ -38,9 +38,9 @@ def _bare(answer: dict[str, Any]) -> dict[str, Any]:
     ids=lambda words: words[0],
 )
 def test_answers_are_those_of_a_file_with_that_tool(words: tuple[str, ...], other: Path) -> None:
-    command, *rest = words
-    completed = run(command, "puma560", *rest, GIVEN, "--json")
-    want = run(command, other, *rest, "--json")
+    command, *arguments = words
+    completed = run(command, "puma560", *arguments, GIVEN, "--json")
+    want = run(command, other, *arguments, "--json")
     assert completed.code == want.code == 0, completed.err + want.err
     assert completed.json["tool"] == TOOL
     assert "tool" not in want.json
@@ -71,7 +71,7 @@ def test_what_is_no_tool_is_refused(tool: str) -> None:
 
 def test_a_batch_is_made_with_it() -> None:
     rows = b"q1,q2,q3\n0,0,0\n10,20,30\n"
-    got = run("fk", "three_dof", "--batch", "-", "--tool", "0,0,9", "--json", stdin=rows).lines
+    answers = run("fk", "three_dof", "--batch", "-", "--tool", "0,0,9", "--json", stdin=rows).lines
     want = [run("fk", "three_dof", *q, "--tool", "0,0,9", "--json").json for q in ((0, 0, 0), (10, 20, 30))]
-    for row, one in zip(got, want, strict=True):
-        assert row["position_mm"] == pytest.approx(one["position_mm"], abs=1e-9)
+    for row, expected_row in zip(answers, want, strict=True):
+        assert row["position_mm"] == pytest.approx(expected_row["position_mm"], abs=1e-9)

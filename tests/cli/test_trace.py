@@ -39,8 +39,8 @@ def test_the_logger_tells_motions_and_states(caplog: pytest.LogCaptureFixture) -
     with caplog.at_level(logging.INFO, "armkin.board"), open_board(board_of(arm), "sim") as machine:
         machine.prepare()
         machine.run([machine.plan(machine.counts(), arm.home + 0.1)])
-    said = [record.getMessage() for record in caplog.records]
-    assert any(text.startswith("motion from [0, 0, 0] to [") for text in said)
-    assert {"GRBL: Idle", "GRBL: Run"} <= set(said)
-    assert said[-1].startswith("left: position known, counts [")
+    messages = [record.getMessage() for record in caplog.records]
+    assert any(text.startswith("motion from [0, 0, 0] to [") for text in messages)
+    assert {"GRBL: Idle", "GRBL: Run"} <= set(messages)
+    assert messages[-1].startswith("left: position known, counts [")
     assert not any(record.levelno < logging.INFO for record in caplog.records)

@@ -53,8 +53,8 @@ class Batch:
         self.end = tuple(p // STEP for p in self.end_places)
 
     def payload(self, tag: int) -> bytes:
-        rest, brake = self.at_rest, self.brake
-        return motion_frame.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=rest, brake=brake)
+        at_rest, brake = self.at_rest, self.brake
+        return motion_frame.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=at_rest, brake=brake)
 
 
 def batches(
@@ -66,15 +66,15 @@ def batches(
     brake: float = 1.0,
 ) -> list[Batch]:
     """One motion cut into batches of `size` segments, the last one with END."""
-    out: list[Batch] = []
-    at: tuple[int, ...] = tuple(start)
+    made: list[Batch] = []
+    counts: tuple[int, ...] = tuple(start)
     places: tuple[int, ...] = ()
     for i in range(0, len(segments), size):
-        out.append(Batch(tuple(axes), at, tuple(segments[i : i + size]), places=places, brake=brake))
-        at, places = out[-1].end, out[-1].end_places
+        made.append(Batch(tuple(axes), counts, tuple(segments[i : i + size]), places=places, brake=brake))
+        counts, places = made[-1].end, made[-1].end_places
     if at_rest:
-        out[-1].at_rest = True
-    return out
+        made[-1].at_rest = True
+    return made
 
 
 class BareHost:
@@ -98,10 +98,10 @@ class BareHost:
         """Put `data` on the line, let time pass, return what came."""
         if data:
             self._line_free = max(self._line_free, self.time) + 10 * len(data) / self.baud
-        out = self.board.run(seconds, data, until=until)
+        received = self.board.run(seconds, data, until=until)
         self.time += seconds  # an upper bound if `until` ended it early
         replies = []
-        for payload in self._splitter.feed(out):
+        for payload in self._splitter.feed(received):
             if payload[0] == CREDIT:
                 payload = bytes([protocol.Type.ACK]) + payload[1:]
             if (reply := protocol.parse_reply(payload)) is not None:
@@ -138,8 +138,8 @@ class BareHost:
         info = self.hello(nonce)
         data = image.pack()
         room = info.frame - 8
-        for at in range(0, len(data), room):
-            self.order(protocol.config(0, at, data[at : at + room]))
+        for offset in range(0, len(data), room):
+            self.order(protocol.config(0, offset, data[offset : offset + room]))
         self.order(protocol.commit(0, len(data), image.crc()))
         self.order(protocol.set_position(0, counts))
 
@@ -166,7 +166,7 @@ class BareHost:
         `bytes_ahead`: that may follow the oldest frame without an answer (what the board promises to keep).
         """
         first = self.sequence
-        done = sent = 0  # batches
+        acknowledged = sent = 0  # batches
 
         def size(number: int) -> int:  # on the line
             return len(work[number].payload(0)) + 6
@@ -176,53 +176,53 @@ class BareHost:
         deadline = self.time + give_up
         state = State.MOVING
         error = 0
-        asked = False  # a STATUS is under way: a second one would only queue behind it
+        is_asked = False  # a STATUS is under way: a second one would only queue behind it
         while self.time < deadline:
-            out = b""
-            waiting = sent < len(work) and sent == done  # for credit, which only answers bring
-            pause = poll if asked or not waiting else self.credit_poll
+            frames = b""
+            waiting = sent < len(work) and sent == acknowledged  # for credit, which only answers bring
+            pause = poll if is_asked or not waiting else self.credit_poll
             if self.time - last_poll >= pause:
-                asked = True
-                out += protocol.encode_frame(protocol.status_query(1))
+                is_asked = True
+                frames += protocol.encode_frame(protocol.status_query(1))
                 last_poll = self.time
-            if sent > done and self.time - last_progress > resend:
-                self.resent += sent - done
-                sent = done
+            if sent > acknowledged and self.time - last_progress > resend:
+                self.resent += sent - acknowledged
+                sent = acknowledged
                 last_progress = self.time
-            under_way = sum(len(b.segments) for b in work[done:sent])
-            room = (bytes_ahead or RECEIVE[self.board.board] - 12) - sum(map(size, range(done + 1, sent)))
+            under_way = sum(len(b.segments) for b in work[acknowledged:sent])
+            room = (bytes_ahead or RECEIVE[self.board.board] - 12) - sum(map(size, range(acknowledged + 1, sent)))
             while (
                 sent < len(work)
-                and sent - done < window
-                and self._line_free + 10 * len(out) / self.baud < self.time + 2 * slice_s
+                and sent - acknowledged < window
+                and self._line_free + 10 * len(frames) / self.baud < self.time + 2 * slice_s
                 and under_way + len(work[sent].segments) <= free
-                and (sent == done or size(sent) <= room)
+                and (sent == acknowledged or size(sent) <= room)
             ):
-                out += protocol.encode_frame(work[sent].payload((first + sent) % 256))
+                frames += protocol.encode_frame(work[sent].payload((first + sent) % 256))
                 under_way += len(work[sent].segments)
-                if sent == done:
+                if sent == acknowledged:
                     last_progress = self.time
                 else:
                     room -= size(sent)
                 sent += 1
-            for reply in self.run(slice_s, out):
+            for reply in self.run(slice_s, frames):
                 if isinstance(reply, Info):
                     continue
                 if isinstance(reply, Ack):
                     self.acks.append(reply)
                 else:
-                    asked = False
-                advance = (reply.next - (first + done)) % 256
+                    is_asked = False
+                advance = (reply.next - (first + acknowledged)) % 256
                 if 0 < advance <= 100:
-                    done += advance
-                    sent = max(sent, done)
+                    acknowledged += advance
+                    sent = max(sent, acknowledged)
                     last_progress = self.time
                 if advance <= 100:
                     free = reply.free
                 state, error = State(reply.state), reply.error
-            if error or (done == len(work) and state == State.IDLE):
+            if error or (acknowledged == len(work) and state == State.IDLE):
                 break
-        self.sequence = (first + done) % 256
+        self.sequence = (first + acknowledged) % 256
         return self.rest()
 
     def rest(self) -> Status:

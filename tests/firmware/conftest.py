@@ -12,8 +12,8 @@ from probing import PROBE
 
 @pytest.fixture
 def board() -> Iterator[EmulatedBoard]:
-    with EmulatedBoard() as one:
-        yield one
+    with EmulatedBoard() as emulated:
+        yield emulated
 
 
 @pytest.fixture(scope="session")

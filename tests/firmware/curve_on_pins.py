@@ -46,14 +46,14 @@ class Laid:
         """Distance [mm] of the tip at counts (N, motors) from the curve."""
         tip = armkin.fk(self.arm, armkin.joints(self.arm, counts))[:, :3, 3]
         way = armkin.fk(self.arm, self.curve.evaluate(np.linspace(0.0, self.curve.duration, 2000)))[:, :3, 3]
-        out = np.full(len(tip), np.inf)
+        distance = np.full(len(tip), np.inf)
         near = np.array([((way - p) ** 2).sum(axis=1).argmin() for p in tip])
         for a in (np.maximum(near - 1, 0), np.minimum(near, len(way) - 2)):  # the chords on either side
             along = way[a + 1] - way[a]
             f = ((tip - way[a]) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)
             foot = way[a] + np.clip(f, 0.0, 1.0)[:, None] * along
-            out = np.minimum(out, np.linalg.norm(tip - foot, axis=1))
-        return out
+            distance = np.minimum(distance, np.linalg.norm(tip - foot, axis=1))
+        return distance
 
 
 def lay(moves: dict[str, Any], size: int = 4) -> Laid:
@@ -85,22 +85,22 @@ def ready(board: EmulatedBoard, laid: Laid) -> BareHost:
 
 def predicted(segments: Sequence[Segment], start: Sequence[int]) -> list[Array]:
     """When every motor steps by PROTOCOL.md's arithmetic: cycles since the motion's begin, for each motor."""
-    at = 0
+    cycle = 0
     places = np.array([count * STEP + HALF for count in start])
-    out: list[list[Array]] = [[] for _ in start]
+    rises: list[list[Array]] = [[] for _ in start]
     for s in segments:
         j = np.arange(1, s.ticks + 1)
         bends = 128 * s.bend * (j[:-1] > 0) if s.quick else 4 * s.bend * ((s.ticks - j[:-1]) % 16 == 0)
         grown = np.concatenate([[0], np.cumsum(bends)])
         change = (256 * s.add + grown) >> 8
         interval = np.concatenate([[s.interval << 16], (s.interval << 16) + np.cumsum(change[:-1])])
-        ticks = at + np.cumsum(interval >> 16)
+        ticks = cycle + np.cumsum(interval >> 16)
         for k, rate in enumerate(s.rates):
             count = (places[k] + rate * np.arange(s.ticks + 1)) // STEP
-            out[k].append(ticks[np.diff(count) != 0])
+            rises[k].append(ticks[np.diff(count) != 0])
         places += s.ticks * np.array(s.rates)
-        at = int(ticks[-1])
-    return [np.concatenate(steps) for steps in out]
+        cycle = int(ticks[-1])
+    return [np.concatenate(steps) for steps in rises]
 
 
 @dataclass(frozen=True)
@@ -136,12 +136,12 @@ def whole_run(laid: Laid) -> Run:
         )
 
 
-def late_us(trace: Trace, wanted: Sequence[Array]) -> float:
+def late_us(trace: Trace, expected: Sequence[Array]) -> float:
     """A step's distance [us] from when it is wanted, at most; infinite if there are more steps or fewer."""
-    seen = [trace.rises(f"{name}.STEP") for name in "XYZ"]
-    if [len(x) for x in seen] != [len(x) for x in wanted]:
+    measured = [trace.rises(f"{name}.STEP") for name in "XYZ"]
+    if [len(x) for x in measured] != [len(x) for x in expected]:
         return float(np.inf)
-    apart = np.concatenate([a - b for a, b in zip(seen, wanted, strict=True)])
+    apart = np.concatenate([a - b for a, b in zip(measured, expected, strict=True)])
     return float(np.ptp(apart)) / 2 / CLOCK * 1e6  # the motion's begin is that which makes it least
 
 
@@ -150,10 +150,10 @@ def counts_of(trace: Trace, start: Sequence[int]) -> tuple[Array, Array]:
     steps = [trace.steps(name) for name in "XYZ"]
     cycle = np.concatenate([c for c, _ in steps])
     change = np.zeros((len(cycle), 3), np.int64)
-    at = 0
+    begin = 0
     for k, (c, direction) in enumerate(steps):
-        change[at : at + len(c), k] = direction
-        at += len(c)
+        change[begin : begin + len(c), k] = direction
+        begin += len(c)
     order = np.argsort(cycle, kind="stable")
     return cycle[order], np.asarray(start) + np.cumsum(change[order], axis=0)
 
@@ -183,18 +183,18 @@ def held(laid: Laid, share: float, *, cable: bool = False) -> Held:
         status = host.rest()
         trace = board.trace()
         cycle, counts = counts_of(trace, laid.start)
-        rest = np.array(status.counts[:3])
+        rest_counts = np.array(status.counts[:3])
         if cable:  # the board notices 500 ms after the last byte
             begin = int(trace.edges("uart.in")[0][trace.edges("uart.in")[0] <= begin][-1]) + CLOCK // 2
-        known = bool((rest == counts[-1]).all()) and (status.known & 0b111) == 0b111
+        is_known = bool((rest_counts == counts[-1]).all()) and (status.known & 0b111) == 0b111
         accel = _accelerations(laid.arm, trace, laid.start, begin)
         host.hello(77)
         host.order(protocol.enable(0, 3))
-        goal = laid.start if (rest != laid.start).any() else [count + 200 for count in laid.start]
-        after = host.stream(_straight(rest.tolist(), goal))
+        goal = laid.start if (rest_counts != laid.start).any() else [count + 200 for count in laid.start]
+        after = host.stream(_straight(rest_counts.tolist(), goal))
         return Held(
-            known,
-            float(laid.off(rest[None])[0]),
+            is_known,
+            float(laid.off(rest_counts[None])[0]),
             float(laid.off(counts[::7]).max()),
             accel,
             list(after.counts[:3]) == goal and after.error == 0,
@@ -205,26 +205,26 @@ def held(laid: Laid, share: float, *, cable: bool = False) -> Held:
 def _until(host: BareHost, work: Sequence[Batch], moment: float) -> None:
     """Stream batches as `BareHost.stream` does, and stop talking so long [s] after the motion began."""
     begun: float | None = None
-    free, sent, done = host.status().free, 0, 0
+    free, sent, acknowledged = host.status().free, 0, 0
     first = host.sequence
-    asked = host.time
+    time_asked = host.time
     while begun is None or host.time < begun + moment:
-        out = b""
-        under_way = sum(len(b.segments) for b in work[done:sent])
-        if sent < len(work) and sent == done and under_way + len(work[sent].segments) <= free:
-            out = protocol.encode_frame(work[sent].payload((first + sent) % 256))
+        frame = b""
+        under_way = sum(len(b.segments) for b in work[acknowledged:sent])
+        if sent < len(work) and sent == acknowledged and under_way + len(work[sent].segments) <= free:
+            frame = protocol.encode_frame(work[sent].payload((first + sent) % 256))
             sent += 1
-        elif host.time > asked + 0.01:
-            out, asked = protocol.encode_frame(protocol.status_query(1)), host.time
-        for reply in host.run(0.5e-3, out):
+        elif host.time > time_asked + 0.01:
+            frame, time_asked = protocol.encode_frame(protocol.status_query(1)), host.time
+        for reply in host.run(0.5e-3, frame):
             if isinstance(reply, protocol.Info):
                 continue
-            done += (reply.next - (first + done)) % 256
+            acknowledged += (reply.next - (first + acknowledged)) % 256
             free = reply.free
             assert reply.error == 0, reply
             if begun is None and reply.state == State.MOVING:
                 begun = host.time
-    host.sequence = (first + done) % 256
+    host.sequence = (first + acknowledged) % 256
 
 
 def _straight(start: list[int], end: list[int]) -> list[Batch]:

@@ -29,8 +29,8 @@ def start(board: EmulatedBoard) -> Start:
         axes = configure(kind.arm).axes
 
         def pins() -> Sequence[float]:
-            now = list(board.net().values())
-            return [now[axis] - base[axis] for axis in axes]
+            counts = list(board.net().values())
+            return [counts[axis] - base[axis] for axis in axes]
 
         resets = random.Random(1)
 

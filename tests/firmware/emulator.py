@@ -174,7 +174,7 @@ class EmulatedBoard:
         baud: int | None = None,
         trace: bool = False,
         seed: int = 1,
-        by: Literal["uart", "usb"] = "uart",
+        link: Literal["uart", "usb"] = "uart",
     ) -> None:
         self.board = board
         self.clock_hz = CYCLES_HZ.get(board, CLOCK_HZ)
@@ -192,8 +192,8 @@ class EmulatedBoard:
             self._options.append("--no-reset-on-open")
         if baud is not None:
             self._options += ["--baud", str(baud)]
-        if by != "uart":
-            self._options += ["--by", by]
+        if link != "uart":
+            self._options += ["--by", link]
         for command in commands:
             self._options += ["--do", command]
         self._traced = trace
@@ -223,7 +223,7 @@ class EmulatedBoard:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if error is None and self._warm and self._process is not None:
             _WARM.append(self._process)

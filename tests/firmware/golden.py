@@ -31,37 +31,39 @@ class Talk:
 
         run(0.02)
         for number, line in enumerate(self.lines, 1):
-            word, _, rest = line.partition("#")[0].strip().partition(" ")
-            where = f"{self.name}:{number}"
+            word, _, argument = line.partition("#")[0].strip().partition(" ")
+            context = f"{self.name}:{number}"
             if word == ">":
-                run(0.1, protocol.encode_frame(bytes.fromhex(rest)), until=b"\0")
+                run(0.1, protocol.encode_frame(bytes.fromhex(argument)), until=b"\0")
             elif word == "wire":
-                run(0.03, bytes.fromhex(rest))
+                run(0.03, bytes.fromhex(argument))
             elif word == "<":
-                assert answers, f"{where}: no answer"
-                got = answers.pop(0).hex()
-                same = len(got) == len(rest) and all(w in ("?", g) for g, w in zip(got, rest, strict=True))
-                assert same, f"{where}\n want {rest}\n got  {got}"
+                assert answers, f"{context}: no answer"
+                answer = answers.pop(0).hex()
+                same = len(answer) == len(argument) and all(
+                    w in ("?", g) for g, w in zip(answer, argument, strict=True)
+                )
+                assert same, f"{context}\n want {argument}\n got  {answer}"
                 compared += 1
             elif word == "wait":
-                run(float(rest) / 1000)
+                run(float(argument) / 1000)
             elif word == "silent":
                 run(0.02)
-                assert not answers, f"{where}: {answers[0].hex()}"
+                assert not answers, f"{context}: {answers[0].hex()}"
             elif word == "reset":
                 board.control("reset external")
                 run(0.02)
             else:
-                assert word in ("", "board"), f"{where}: {line}"
+                assert word in ("", "board"), f"{context}: {line}"
         assert not answers
         return compared
 
 
 def talks() -> list[Talk]:
     """All conversations of firmware/golden."""
-    out = []
+    conversations = []
     for path in sorted((FIRMWARE / "golden").glob("*.talk")):
         lines = tuple(path.read_text().splitlines())
         board = next(line.split()[1] for line in lines if line.startswith("board "))
-        out.append(Talk(path.name, board, lines))
-    return out
+        conversations.append(Talk(path.name, board, lines))
+    return conversations

@@ -44,9 +44,9 @@ class BrokenError(Exception):
     """A promise is broken."""
 
 
-def promise(kept: bool, what: str) -> None:
-    if not kept:
-        raise BrokenError(what)
+def promise(is_kept: bool, law: str) -> None:
+    if not is_kept:
+        raise BrokenError(law)
 
 
 def load(s: State) -> State:
@@ -91,9 +91,9 @@ def free(s: State) -> int:
     return SLOTS - (s.head - s.settled) % (2 * SLOTS)
 
 
-def out(s: State, now: int, left: int) -> int:
+def out(s: State, running: int, left: int) -> int:
     """motion_counts(): ticks that are out."""
-    return s.counts + (s.slots[now - 1] - left - 1 if now else 0)
+    return s.counts + (s.slots[running - 1] - left - 1 if running else 0)
 
 
 # The main loop's calls, step by step; a step returns the next state, and None ends the call.
@@ -166,9 +166,9 @@ def read_running_then(s: State) -> State:
 
 
 def tell(s: State) -> State:
-    tail, now, left, edges = s.seen
+    tail, running, left, edges = s.seen
     s = settle_to(s, tail)
-    promise(out(s, now, left) == edges, "a count is told that the pins never had")
+    promise(out(s, running, left) == edges, "a count is told that the pins never had")
     return replace(s, seen=())
 
 
@@ -242,14 +242,14 @@ def successors(s: State, calls: dict[str, tuple[Step, ...]]) -> Iterator[State]:
 def explore(calls: dict[str, tuple[Step, ...]]) -> tuple[int, str]:
     """States that any interleaving reaches, and the promise that one of them breaks ("": none)."""
     waiting = [State()]
-    known = set(waiting)
+    reached = set(waiting)
     while waiting:
         state = waiting.pop()
         try:
             for after in successors(state, calls):
-                if after not in known:
-                    known.add(after)
+                if after not in reached:
+                    reached.add(after)
                     waiting.append(after)
         except BrokenError as broken:
-            return len(known), str(broken)
-    return len(known), ""
+            return len(reached), str(broken)
+    return len(reached), ""

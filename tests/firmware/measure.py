@@ -55,7 +55,7 @@ def stepping(board: str, rate: float, seconds: float = 0.6) -> Stepping:
     steppers = STEPPERS[board]
     axes = tuple(range(steppers + 1))
     share = [(-1.0) ** i for i in range(steppers)] + [100 / (rate * seconds)]
-    there = cruise(rate, seconds, share)
+    segments_out = cruise(rate, seconds, share)
     back = cruise(rate, seconds, [-s for s in share])
     image = image_for(board, replace(WIDE, max_rate=60_000))
     row = protocol.RowImage(-(1 << 28), 1 << 28, (1, 1) + (0,) * (AXES[board] - 2))
@@ -67,7 +67,7 @@ def stepping(board: str, rate: float, seconds: float = 0.6) -> Stepping:
         host.setup(image, counts_at_home(board))
         emulated.control("clear")
         start = [0] * steppers + [1500]
-        plan = batches(axes, start, there, 4)
+        plan = batches(axes, start, segments_out, 4)
         plan += batches(axes, plan[-1].end, back, 4)
         status = host.stream(plan, poll=0.01)
         stats = emulated.stats()
@@ -97,10 +97,16 @@ def ceiling(board: str, rates: range, jitter_us: float = 10.0) -> float:
     """The highest of the rates at which `stepping` is still without fault."""
     best = 0.0
     for rate in rates:
-        got = stepping(board, rate, seconds=1.0)
-        if not got.exact or got.error or got.overruns or got.violations or got.jitter_us > jitter_us:
+        measured = stepping(board, rate, seconds=1.0)
+        if (
+            not measured.exact
+            or measured.error
+            or measured.overruns
+            or measured.violations
+            or measured.jitter_us > jitter_us
+        ):
             break
-        best = got.rate
+        best = measured.rate
     return best
 
 
@@ -193,10 +199,14 @@ def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold
         y_cycle, y = trace.positions("Y")
         # wherever Y steps: X's count just then, and what Y's share of it is
         x_then = x[np.searchsorted(x_cycle, y_cycle, side="right") - 1]
-        off = np.abs(y + x_then / 2).max()
+        deviation = np.abs(y + x_then / 2).max()
         exact = status.counts[:2] == (int(x[-1]), int(y[-1]))
         return Hold(
-            float(x_cycle[-1] - begin) / CLOCK * 1e3, rate / accel * 1e3, float(off), exact, status.known == 0b11111
+            float(x_cycle[-1] - begin) / CLOCK * 1e3,
+            rate / accel * 1e3,
+            float(deviation),
+            exact,
+            status.known == 0b11111,
         )
 
 
@@ -289,20 +299,20 @@ def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
         image = image_for("uno_cnc_shield", replace(WIDE, max_accel=1_000_000))
         host.setup(image, counts_at_home("uno_cnc_shield"), nonce=seed + 1)
         emulated.control(f"noise flip {rate} drop {rate} seed {seed} dir both")
-        at = (0, 0, 0)
+        counts = (0, 0, 0)
         end = tuple(segments * s for s in share)
         sessions = 0
-        while at != end and sessions < 500:
+        while counts != end and sessions < 500:
             sessions += 1
             host.hello(1000 * (seed + 1) + sessions)
-            left = (end[0] - at[0]) // share[0]
+            left = (end[0] - counts[0]) // share[0]
             work = [whole_steps(12, 16_000, 0, share)] * left
             # first what a hold in mid-segment, and the rounding of rates, left over of the one step ratio
-            rest = tuple(e - a - left * s for e, a, s in zip(end, at, share, strict=True))
-            if any(rest):
-                work.insert(0, whole_steps(20, 16_000, 0, rest))
-            status = host.stream(batches((0, 1, 2), at, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05)
-            at = (status.counts[0], status.counts[1], status.counts[2])
+            remainder = tuple(e - a - left * s for e, a, s in zip(end, counts, share, strict=True))
+            if any(remainder):
+                work.insert(0, whole_steps(20, 16_000, 0, remainder))
+            status = host.stream(batches((0, 1, 2), counts, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05)
+            counts = (status.counts[0], status.counts[1], status.counts[2])
         emulated.control("restore")
         trace = emulated.trace()
         x_cycle, x = trace.positions("X")
@@ -313,7 +323,7 @@ def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
             on_path &= bool((np.abs(count - ratio * x_then) <= abs(ratio) + 1.5).all())
             on_path &= bool((np.diff(count) * np.sign(ratio) > 0).all())
         net = emulated.stats()["axes"]
-        exact = at == end and tuple(net[a]["net"] for a in "XYZ") == end
+        exact = counts == end and tuple(net[a]["net"] for a in "XYZ") == end
         return Noise(exact, on_path and bool((np.diff(x) > 0).all()), sessions, host.resent, host.time)
 
 
@@ -363,11 +373,11 @@ def _smooth(name: str, seconds: NDArray[np.float64], steps: int, law: Profile) -
             ramp + (share - way) / law.peak,
         ),
     )
-    off, period = np.diff(seconds) - np.diff(exact), np.diff(exact)
+    lateness, period = np.diff(seconds) - np.diff(exact), np.diff(exact)
     cruise = (exact[:-1] > ramp) & (exact[1:] < law.duration - ramp)
     return Smooth(
         name,
-        float(np.ptp(off[cruise])) * 1e6,
+        float(np.ptp(lateness[cruise])) * 1e6,
         float(np.median(period[cruise])) * 1e6,
-        float((np.abs(off) / np.maximum(60e-6, 0.02 * period)).max()),
+        float((np.abs(lateness) / np.maximum(60e-6, 0.02 * period)).max()),
     )

@@ -35,11 +35,11 @@ def net(board: EmulatedBoard) -> tuple[int, ...]:
 
 def edges_by_the_protocol(segments: list[Segment], axis: int) -> NDArray[np.int64]:
     """Clock cycles from the start at which an axis's STEP rises: PROTOCOL.md, section 6, word for word."""
-    out, now, place = [], 0, HALF
+    edges, cycle, place = [], 0, HALF
     for segment in segments:
         interval, add = segment.interval << 16, segment.add * 256
         for tick in range(1, segment.ticks + 1):
-            now += interval >> 16
+            cycle += interval >> 16
             interval += add >> 8
             if segment.quick:
                 add += 128 * segment.bend
@@ -48,8 +48,8 @@ def edges_by_the_protocol(segments: list[Segment], axis: int) -> NDArray[np.int6
             before = place // STEP
             place += segment.rates[axis]
             if place // STEP != before:
-                out.append(now)
-    return np.array(out, dtype=np.int64)
+                edges.append(cycle)
+    return np.array(edges, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -71,27 +71,27 @@ def stepping(interval: int, ticks: int = 2000, held_off_us: float = 0.0) -> Step
     """Up to one tick in `interval` cycles, there and back; every interrupt comes `held_off_us` later."""
     ramp = [i for i in (1000, 500, 333) if i > 1.1 * interval]
     pairs = [(100, i) for i in ramp] + [(ticks, interval)] + [(100, i) for i in reversed(ramp)]
-    there = [whole_steps(n, i, 0, tuple((-1) ** k * n for k in SIX)) for n, i in pairs]
-    back = [replace(s, rates=tuple(-r for r in s.rates)) for s in there]
+    segments_out = [whole_steps(n, i, 0, tuple((-1) ** k * n for k in SIX)) for n, i in pairs]
+    back = [replace(s, rates=tuple(-r for r in s.rates)) for s in segments_out]
     with EmulatedBoard(PICO, speed="step", trace=True, driver="drv8825") as board:
         host = ready(board)
         board.control(f"hold-off {held_off_us}us")
         board.control("clear")
-        work = batches(SIX, (0,) * 6, there, 4)
+        work = batches(SIX, (0,) * 6, segments_out, 4)
         work += batches(SIX, work[-1].end, back, 4)
         status = host.stream(work, poll=0.002)
         trace, figures = board.trace(), board.stats()["axes"].values()
-        first, off = trace.rises("X.STEP")[0], 0.0
-        begin = edges_by_the_protocol(there, 0)[0]
+        first, lateness = trace.rises("X.STEP")[0], 0.0
+        begin = edges_by_the_protocol(segments_out, 0)[0]
         for axis, name in enumerate("XYZABC"):
-            wanted = edges_by_the_protocol(there, axis) - begin
-            came = trace.rises(f"{name}.STEP")[: len(wanted)] - first
-            off = max(off, float(np.abs(came - CYCLES * wanted[: len(came)]).max()) / 125)
+            expected = edges_by_the_protocol(segments_out, axis) - begin
+            came = trace.rises(f"{name}.STEP")[: len(expected)] - first
+            lateness = max(lateness, float(np.abs(came - CYCLES * expected[: len(came)]).max()) / 125)
         exact = status.error == 0 and status.counts[:6] == work[-1].end == net(board)
         exact = exact and all(f["positive"] == f["negative"] > ticks // 2 for f in figures)
         return Stepping(
             CLOCK / interval,
-            off,
+            lateness,
             exact,
             status.overruns,
             sum(sum(f["violations"].values()) for f in figures),
@@ -119,17 +119,17 @@ def asleep_at(interval: int, held_off_us: float) -> float:
 
 
 def segments_per_second(
-    by: Literal["uart", "usb"], axes: tuple[int, ...], rate: float, batch: int, count: int = 600, ticks: int = 2
+    link: Literal["uart", "usb"], axes: tuple[int, ...], rate: float, batch: int, count: int = 600, ticks: int = 2
 ) -> tuple[float, bool]:
     """Streams short segments; what came out at the pins a second, and whether all of it was exact."""
-    with EmulatedBoard(PICO, speed="step", by=by) as board:
-        host = ready(board, baud=250_000 if by == "uart" else 12_000_000)
+    with EmulatedBoard(PICO, speed="step", link=link) as board:
+        host = ready(board, baud=250_000 if link == "uart" else 12_000_000)
         board.control("clear")
         interval = round(CLOCK / rate / ticks)
         # a pause in front, so that the queue is full when it matters
-        work = [whole_steps(100, 60_000 if by == "uart" else 6000, 0, (0,) * len(axes))]
-        one = whole_steps(ticks, interval, 0, tuple((-1) ** k for k in range(len(axes))))
-        plan = batches(axes, (0,) * len(axes), work + [one] * count, batch)
+        work = [whole_steps(100, 60_000 if link == "uart" else 6000, 0, (0,) * len(axes))]
+        segment = whole_steps(ticks, interval, 0, tuple((-1) ** k for k in range(len(axes))))
+        plan = batches(axes, (0,) * len(axes), work + [segment] * count, batch)
         status = host.stream(plan, slice_s=0.25e-3)
         x = board.stats()["axes"]["X"]
         seconds = (x["last_step_cycle"] - x["first_step_cycle"]) / board.clock_hz
@@ -137,14 +137,14 @@ def segments_per_second(
         return (count - 1) / seconds, exact
 
 
-def first_step_ms(by: Literal["uart", "usb"]) -> float:
+def first_step_ms(link: Literal["uart", "usb"]) -> float:
     """From the end of the first batch's last byte to the first edge, at rest."""
-    with EmulatedBoard(PICO, speed="step", trace=True, by=by) as board:
+    with EmulatedBoard(PICO, speed="step", trace=True, link=link) as board:
         host = ready(board)
         work = (whole_steps(50, 2500, 0, (50,) * 6),)
         before = int(board.control("cycles")["cycle"])
         payload = Batch(SIX, (0,) * 6, work, at_rest=True).payload(0)
         host.order(payload)
         step = int(board.trace().rises("X.STEP")[0])
-        line = 10 * len(protocol.encode_frame(payload)) / 250_000 if by == "uart" else 0.0
+        line = 10 * len(protocol.encode_frame(payload)) / 250_000 if link == "uart" else 0.0
         return (step - before) / board.clock_hz * 1e3 - line * 1e3

@@ -11,8 +11,8 @@ from emulator import CLOCK_HZ, EmulatedBoard
 
 def net(board: EmulatedBoard) -> list[int]:
     """Net steps on the pins of X, Y, Z."""
-    found = board.net()
-    return [found[axis] for axis in "XYZ"]
+    net_of = board.net()
+    return [net_of[axis] for axis in "XYZ"]
 
 
 def at_rest(board: EmulatedBoard) -> list[int]:
@@ -21,18 +21,20 @@ def at_rest(board: EmulatedBoard) -> list[int]:
     before = net(board)
     while time.monotonic() < end:
         board.wait(0.15)
-        now = net(board)
-        if now == before:
-            return now
-        before = now
+        counts = net(board)
+        if counts == before:
+            return counts
+        before = counts
     raise AssertionError("the arm does not come to rest")
 
 
-def on_the_line(now: Sequence[int], start: Sequence[int], end: Sequence[int]) -> bool:
+def on_the_line(counts: Sequence[int], start: Sequence[int], end: Sequence[int]) -> bool:
     """Within two steps of the straight line between two counts."""
     far = int(np.argmax(np.abs(np.subtract(end, start))))
-    share = (now[far] - start[far]) / (end[far] - start[far])
-    return 0 <= share <= 1 and all(abs(n - a - share * (b - a)) <= 2 for n, a, b in zip(now, start, end, strict=True))
+    share = (counts[far] - start[far]) / (end[far] - start[far])
+    return 0 <= share <= 1 and all(
+        abs(n - a - share * (b - a)) <= 2 for n, a, b in zip(counts, start, end, strict=True)
+    )
 
 
 def rests_within(board: EmulatedBoard, seconds: float) -> None:
@@ -40,9 +42,9 @@ def rests_within(board: EmulatedBoard, seconds: float) -> None:
     begin = board.control("cycles")["cycle"]
     before, since = net(board), begin
     while True:
-        now, at = board.control("cycles")["cycle"], net(board)
-        if at != before:
-            before, since = at, now
-        if now - since > 0.2 * CLOCK_HZ:
+        cycle, counts = board.control("cycles")["cycle"], net(board)
+        if counts != before:
+            before, since = counts, cycle
+        if cycle - since > 0.2 * CLOCK_HZ:
             break
     assert (since - begin) / CLOCK_HZ < seconds

@@ -52,9 +52,9 @@ class Program:
         command = ["avr-objdump", "-d", "--no-show-raw-insn", str(elf)]
         text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         self.names: dict[int, str] = {int(address, 16): name for address, name in SYMBOL.findall(text)}
-        found = [(int(a, 16), n, o, t) for a, n, o, t in LINE.findall(text)]
+        listed = [(int(a, 16), n, o, t) for a, n, o, t in LINE.findall(text)]
         self.code: dict[int, Instruction] = {}
-        for (address, name, operands, target), (after, *_) in zip(found, [*found[1:], (-1,)], strict=True):
+        for (address, name, operands, target), (after, *_) in zip(listed, [*listed[1:], (-1,)], strict=True):
             parts = tuple(part.strip() for part in operands.split(",") if part.strip())
             goes = int(target, 16) if target else int(parts[0], 16) if name in ("call", "jmp") else -1
             if name in ("rjmp", "rcall") or BRANCH.fullmatch(name):
@@ -70,7 +70,7 @@ class Program:
         return 3 if "avr:6" in header else 2
 
     def symbol(self, name: str) -> int:
-        return next(address for address, one in self.names.items() if one == name)
+        return next(address for address, symbol_name in self.names.items() if symbol_name == name)
 
     def name(self, address: int) -> str:
         return self.names.get(address, f"{address:x}")
@@ -82,69 +82,73 @@ class Program:
         if entry in self.open:
             raise ValueError(f"{self.name(entry)} calls itself")
         self.open.append(entry)
-        best, seen, left = Deepest(0, ()), dict[int, At](), [(entry, At(0))]
+        best, visited, left = Deepest(0, ()), dict[int, At](), [(entry, At(0))]
         while left:
-            address, at = left.pop()
-            if address in seen:
-                if seen[address].depth != at.depth:
+            address, state = left.pop()
+            if address in visited:
+                if visited[address].depth != state.depth:
                     raise ValueError(f"{self.name(entry)}: two depths at {address:x}")
                 continue
-            seen[address] = at
-            one = self.code[address]
-            if one.name in ("call", "rcall") and one.target != one.after:
-                inner = self.deepest(one.target)
-                reached = Deepest(at.depth + self.address_size + inner.size, (self.name(one.target), *inner.path))
+            visited[address] = state
+            instruction = self.code[address]
+            if instruction.name in ("call", "rcall") and instruction.target != instruction.after:
+                inner = self.deepest(instruction.target)
+                reached = Deepest(
+                    state.depth + self.address_size + inner.size, (self.name(instruction.target), *inner.path)
+                )
             else:
-                reached = Deepest(at.depth, ())
+                reached = Deepest(state.depth, ())
             best = max(best, reached, key=lambda deep: deep.size)
-            left += self.onwards(address, at)
+            left += self.onwards(address, state)
         self.open.pop()
         self.known[entry] = best
         return best
 
-    def onwards(self, address: int, at: At) -> list[tuple[int, At]]:
+    def onwards(self, address: int, state: At) -> list[tuple[int, At]]:
         """What may come next, and how deep the stack is there."""
-        one = self.code[address]
-        name, after = one.name, one.after
+        instruction = self.code[address]
+        name, after = instruction.name, instruction.after
         if name in ("ret", "reti"):
             return []
         if name in ("icall", "ijmp", "eicall", "eijmp"):
             raise ValueError(f"{address:x}: {name}")
         if name in ("jmp", "rjmp"):
-            return [(one.target, at)]
+            return [(instruction.target, state)]
         if BRANCH.fullmatch(name):
-            return [(one.target, at), (after, at)]
+            return [(instruction.target, state), (after, state)]
         if name in SKIPS:
-            return [(after, at), (self.code[after].after, at)]
-        return [(after, self.moved(one, at))]
+            return [(after, state), (self.code[after].after, state)]
+        return [(after, self.moved(instruction, state))]
 
-    def moved(self, one: Instruction, at: At) -> At:
-        name, operands = one.name, one.operands
+    def moved(self, instruction: Instruction, state: At) -> At:
+        name, operands = instruction.name, instruction.operands
         if name == "push":
-            return At(at.depth + 1, at.frame)
+            return At(state.depth + 1, state.frame)
         if name == "pop":
             lost = operands[0] in ("r28", "r29")
-            return At(at.depth - 1, None if lost else at.frame)
+            return At(state.depth - 1, None if lost else state.frame)
         if name in ("call", "rcall"):  # to the next instruction: two or three bytes more
-            return At(at.depth + self.address_size, at.frame) if one.target == one.after else at
+            return (
+                At(state.depth + self.address_size, state.frame) if instruction.target == instruction.after else state
+            )
         if name == "in" and operands == ("r28", "0x3d"):
-            return At(at.depth, at.depth)
+            return At(state.depth, state.depth)
         if operands[:1] == ("r28",) and name not in READS:
-            return At(at.depth, self.frame(one, at.frame))
+            return At(state.depth, self.frame(instruction, state.frame))
         if name == "out" and operands == ("0x3d", "r28"):
-            if at.frame is None:
-                raise ValueError(f"a stack pointer from nowhere before {one.after:x}")
-            return At(at.frame, at.frame)
-        return at
+            if state.frame is None:
+                raise ValueError(f"a stack pointer from nowhere before {instruction.after:x}")
+            return At(state.frame, state.frame)
+        return state
 
-    def frame(self, one: Instruction, frame: int | None) -> int | None:
+    def frame(self, instruction: Instruction, frame: int | None) -> int | None:
         """Where Y points after an instruction that changes it; None: nobody knows, or nowhere on the stack."""
-        if frame is None or one.name not in ("sbiw", "adiw", "subi"):
+        if frame is None or instruction.name not in ("sbiw", "adiw", "subi"):
             return None
-        number = int(one.operands[1], 16)
-        if one.name != "subi":
-            return frame + (number if one.name == "sbiw" else -number)
-        high = self.code[one.after]  # the high byte comes with the next instruction
+        number = int(instruction.operands[1], 16)
+        if instruction.name != "subi":
+            return frame + (number if instruction.name == "sbiw" else -number)
+        high = self.code[instruction.after]  # the high byte comes with the next instruction
         if high.operands == ("r29", "r1"):  # 0
             return frame + number
         if high.name != "sbci" or high.operands[0] != "r29":

@@ -27,8 +27,8 @@ def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Seque
     file.write_text(json.dumps(moves))
     axes = board.stats()["axes"]
     assume = [] if any(axes[name]["positive"] or axes[name]["negative"] for name in "XYZ") else ["--assume-home"]
-    there = run_patiently("send", THREE_DOF, *place, "--port", board.port, *assume)
-    assert there.code == 0, there.err
+    placed = run_patiently("send", THREE_DOF, *place, "--port", board.port, *assume)
+    assert placed.code == 0, placed.err
     before, begin = net(board), 0
 
     def noted(*words: object) -> Any:

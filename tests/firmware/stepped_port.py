@@ -50,10 +50,10 @@ class SteppedPort:
         """Nothing to give back."""
 
     def _take(self) -> bytes:
-        out = b""
+        received = b""
         while self._here and self._here[0][0] <= self._now:
-            out += self._here.popleft()[1]
-        return out
+            received += self._here.popleft()[1]
+        return received
 
     def _run(self, end: int) -> None:
         """To the next thing that happens, `end` at the latest."""

@@ -19,9 +19,18 @@ EDGES = {"X": -900, "Y": 1500, "Z": -1200}  # in steps from where the arm was le
 def with_switches(path: Path) -> Path:
     """The three-joint arm with a limit switch on every joint."""
     text = (ROOT / THREE_DOF).read_text()
-    for axis, way, at, order in (("X", -1, -121, ", order: 2"), ("Y", 1, 121, ", order: 1"), ("Z", -1, -125, "")):
+    for axis, way, switch_value, order in (
+        ("X", -1, -121, ", order: 2"),
+        ("Y", 1, 121, ", order: 1"),
+        ("Z", -1, -125, ""),
+    ):
         head, tail = text.split(f"    drive: {{axis: {axis}", 1)
-        text = head + HOMING.format(switch=axis, way=way, at=at, order=order) + f"    drive: {{axis: {axis}" + tail
+        text = (
+            head
+            + HOMING.format(switch=axis, way=way, at=switch_value, order=order)
+            + f"    drive: {{axis: {axis}"
+            + tail
+        )
     path.write_text(text)
     return path
 

@@ -54,21 +54,21 @@ def waveform(trace: Trace, scale: float) -> list[list[int]]:
     names = [f"{axis}.{what}" for what in ("STEP", "DIR") for axis in SEEN]
     numbers = {trace.names[name]: bit for bit, name in enumerate(names)}
     first = min(trace.rises(f"{axis}.STEP")[0] for axis in SEEN)
-    level, out = 0, [[0, 0]]
+    level, samples = 0, [[0, 0]]
     for cycle, signal, value in zip(trace.cycle, trace.signal, trace.value, strict=True):
         if (bit := numbers.get(int(signal))) is not None:
             level = level & ~(1 << bit) | int(value) << bit
-            at = round((int(cycle) - int(first)) * scale) + 50_000
-            out.append([max(at, 1), level])
-    return out
+            sample = round((int(cycle) - int(first)) * scale) + 50_000
+            samples.append([max(sample, 1), level])
+    return samples
 
 
 def levels(wave: list[list[int]], bit: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """When a pin rises and falls."""
-    at, level = np.array(wave).T
+    samples, level = np.array(wave).T
     high = level >> bit & 1
     change = np.flatnonzero(np.diff(high))
-    return at[change + 1][high[change + 1] == 1], at[change + 1][high[change + 1] == 0]
+    return samples[change + 1][high[change + 1] == 1], samples[change + 1][high[change + 1] == 0]
 
 
 def off_grid(rises: NDArray[np.int64]) -> float:
@@ -87,14 +87,14 @@ def expected(wave: list[list[int]], axis: int) -> dict[str, Any]:
     rises, falls = levels(wave, axis)
     turns = np.sort(np.concatenate(levels(wave, axis + 4)))
     turns = turns[turns > 1]  # those before the first sample are not seen
-    at, level = np.array(wave).T
-    back = (level[np.searchsorted(at, rises, side="right") - 1] >> axis + 4) & 1
+    samples, level = np.array(wave).T
+    back = (level[np.searchsorted(samples, rises, side="right") - 1] >> axis + 4) & 1
 
     def gap(later: NDArray[np.int64], earlier: NDArray[np.int64]) -> float | None:
         """The least time from the last of `earlier` before it to one of `later`."""
         before = np.searchsorted(earlier, later, side="left") - 1
-        some = before >= 0
-        return float((later[some] - earlier[before[some]]).min() / SAMPLES) if some.any() else None
+        has_earlier = before >= 0
+        return float((later[has_earlier] - earlier[before[has_earlier]]).min() / SAMPLES) if has_earlier.any() else None
 
     return {
         "positive": int((back == 0).sum()),
@@ -120,6 +120,6 @@ def test_the_analyser_prints_what_the_emulated_pins_did(board: Any) -> None:
     table = json.loads(completed.stdout.splitlines()[-1])
     assert table["lost"] == 0
     for axis, name in enumerate(SEEN):
-        got = table["axes"][name]
-        assert got.pop("steady_runs") >= 1
-        assert got == pytest.approx(expected(wave, axis), abs=0.0081), name
+        printed = table["axes"][name]
+        assert printed.pop("steady_runs") >= 1
+        assert printed == pytest.approx(expected(wave, axis), abs=0.0081), name

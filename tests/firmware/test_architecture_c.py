@@ -26,13 +26,13 @@ HAL = re.compile(r"hal_\w+|dda_direction")  # what core/hal.h and chip.h ask of 
 
 def included(folder: Path) -> dict[str, set[str]]:
     """What each module (X.h and X.c together, "core/motion") below a folder includes of the same folder."""
-    out: dict[str, set[str]] = {}
+    includes: dict[str, set[str]] = {}
     for file in sorted([*folder.rglob("*.h"), *folder.rglob("*.c")]):
         name = file.relative_to(folder).with_suffix("").as_posix()
-        paths = [(file.parent / other).resolve() for other in INCLUDE.findall(file.read_text())]
+        paths = [(file.parent / header).resolve() for header in INCLUDE.findall(file.read_text())]
         uses = {path.relative_to(folder).with_suffix("").as_posix() for path in paths}
-        out.setdefault(name, set()).update(uses)
-    return {name: (uses & set(out)) - {name} for name, uses in out.items()}
+        includes.setdefault(name, set()).update(uses)
+    return {name: (uses & set(includes)) - {name} for name, uses in includes.items()}
 
 
 def called(objects: Iterable[Path]) -> tuple[dict[str, set[str]], set[str]]:
@@ -65,11 +65,11 @@ def circle(uses: Mapping[str, set[str]]) -> list[str]:
 
 def below(uses: Mapping[str, set[str]], name: str) -> set[str]:
     """All that a module reaches."""
-    found, new = set[str](), {name}
-    while new:
-        found |= new
-        new = set().union(*(uses[one] for one in new)) - found
-    return found - {name}
+    reached, next_names = set[str](), {name}
+    while next_names:
+        reached |= next_names
+        next_names = set().union(*(uses[user] for user in next_names)) - reached
+    return reached - {name}
 
 
 def compiled(room: str, sources: Iterable[Path], into: Path) -> list[Path]:
@@ -81,8 +81,8 @@ def compiled(room: str, sources: Iterable[Path], into: Path) -> list[Path]:
 
 def test_a_circle_is_found(tmp_path: Path) -> None:
     """Three files that include nothing but call each other in a round, by declarations of their own."""
-    for name, other in [("a", "b"), ("b", "c"), ("c", "a")]:
-        (tmp_path / f"{name}.c").write_text(f"void {other}(void); void {name}(void) {{ {other}(); }}")
+    for name, callee in [("a", "b"), ("b", "c"), ("c", "a")]:
+        (tmp_path / f"{name}.c").write_text(f"void {callee}(void); void {name}(void) {{ {callee}(); }}")
     uses, missing = called(compiled("pc", sorted(tmp_path.glob("*.c")), tmp_path))
     assert uses == {"a": {"b"}, "b": {"c"}, "c": {"a"}}
     assert (circle(uses), missing) == (["a", "b", "c"], set())
@@ -100,8 +100,8 @@ def test_no_module_of_the_core_calls_itself(tmp_path: Path) -> None:
     assert circle(uses) == []
     assert {name for name in missing if not HAL.fullmatch(name)} <= C_LIBRARY, "the core calls the chip by hal.h alone"
     includes = included(SOURCE)
-    for module, others in uses.items():
-        assert {f"core/{other}" for other in others} <= below(includes, f"core/{module}"), module
+    for module, used in uses.items():
+        assert {f"core/{callee}" for callee in used} <= below(includes, f"core/{module}"), module
 
 
 @pytest.mark.parametrize("room", ["avr", "rp2040"])
@@ -116,8 +116,8 @@ def test_no_module_of_the_emulator_calls_itself() -> None:
     uses, _ = called(BUILD / "sim" / f"{file.stem}.o" for file in sources)
     assert circle(uses) == []
     includes = included(FIRMWARE / "sim")
-    for module, others in uses.items():
-        assert others <= below(includes, module), module
+    for module, used in uses.items():
+        assert used <= below(includes, module), module
 
 
 def test_no_module_of_the_picos_emulator_imports_itself() -> None:

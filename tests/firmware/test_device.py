@@ -44,9 +44,9 @@ def net(board: EmulatedBoard, axis: str = "X") -> int:
 # Homing
 
 
-@pytest.mark.parametrize(("where", "bounce"), [(-3000, 0), (-777, 2), (40, 1)])
-def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, where: int, bounce: int) -> None:
-    board.control(f"set-switch X at {where} below bounce {bounce}ms" if bounce else f"set-switch X at {where} below")
+@pytest.mark.parametrize(("count", "bounce"), [(-3000, 0), (-777, 2), (40, 1)])
+def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, count: int, bounce: int) -> None:
+    board.control(f"set-switch X at {count} below bounce {bounce}ms" if bounce else f"set-switch X at {count} below")
     host = ready(board)
     rate = (-4000, 0, 0, 0, 0)
     host.order(protocol.home(0, switch=0, closed=False, slow=26, backoff=300, travel=8000, time=200, rate=rate))
@@ -55,7 +55,7 @@ def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, where: int,
     assert (status.error, bool(status.flags & Flag.LATCH)) == (0, True)
     latch = host.status(page=1).counts[0]
     # 1 ms of bouncing at 406 steps/s is within half a step
-    assert abs(latch - where) <= (1 if bounce else 0)
+    assert abs(latch - count) <= (1 if bounce else 0)
     assert status.counts[0] == net(board)
     host.order(protocol.set_position(0, {0: status.counts[0] - latch - 5000}))
     assert host.status().known == 0b11111
@@ -159,9 +159,9 @@ def test_every_question_of_many_at_once_is_answered_or_told_lost(board: Emulated
         host.hello(7)
     replies = host.run(0.2, protocol.encode_frame(protocol.status_query(1)) * 30)
     answers = [r for r in replies if isinstance(r, protocol.Status)]
-    told = [r for r in replies if isinstance(r, protocol.Ack)]
-    assert len(answers) == 30 or told
-    assert all((t.error, t.detail) == ((0, Error.SPILL) if opened else (Error.NO_SESSION, 0)) for t in told)
+    acks = [r for r in replies if isinstance(r, protocol.Ack)]
+    assert len(answers) == 30 or acks
+    assert all((t.error, t.detail) == ((0, Error.SPILL) if opened else (Error.NO_SESSION, 0)) for t in acks)
     # as many as the credit in bytes lets a host ask at once are answered
     replies = host.run(0.2, b"\0" + protocol.encode_frame(protocol.status_query(2)) * 18)
     assert [r.tag for r in replies if isinstance(r, protocol.Status)].count(2) == 18
@@ -176,12 +176,12 @@ def test_jog_stops_when_the_host_falls_silent(board: EmulatedBoard) -> None:
         host.order(protocol.jog(0, (4000, -2000, 0, 0, 0)))
         host.run(0.08)
     assert host.status().state == State.JOGGING
-    at = net(board)
+    begin = net(board)
     host.run(0.5)
     status = host.status()
     assert (status.state, status.error) == (State.IDLE, 0)
     # 250 ms of dead-man, 24 ms of queue, 25 ms of ramp
-    assert 4000 * 0.1 < net(board) - at < 4000 * 0.4
+    assert 4000 * 0.1 < net(board) - begin < 4000 * 0.4
     assert status.counts[:2] == (net(board), net(board, "Y"))
     assert abs(status.counts[0] + 2 * status.counts[1]) <= 2
 

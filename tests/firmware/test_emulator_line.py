@@ -64,18 +64,18 @@ def test_noise_has_its_rate_and_repeats_with_its_seed(probe: Path) -> None:
         with stepped(probe) as board:
             started(board).run(1 * MS, b"e")
             board.control(f"noise flip 0.01 drop 0.02 seed {seed} dir {way}")
-            got = board.run(0.85, sent)
+            received = board.run(0.85, sent)
             line: dict[str, dict[str, int]] = board.stats()["line"]
             board.control("restore")
             assert board.run(5 * MS, b"!!") == b"!!"
-            return got, line
+            return received, line
 
     first, line = noisy(7, "both")
     assert (first, line) == noisy(7, "both")
     assert first != noisy(8, "both")[0]
     for way, n in (("in", 20_000), ("out", 20_000 - line["in"]["dropped"])):
-        for what, p in (("flipped", 0.01 * 0.98), ("dropped", 0.02)):
-            assert abs(line[way][what] - n * p) < 5 * (n * p) ** 0.5, (way, what)
+        for fault, p in (("flipped", 0.01 * 0.98), ("dropped", 0.02)):
+            assert abs(line[way][fault] - n * p) < 5 * (n * p) ** 0.5, (way, fault)
     assert len(first) == 20_000 - line["in"]["dropped"] - line["out"]["dropped"]
     _, line = noisy(7, "in")
     assert (line["out"]["flipped"], line["out"]["dropped"]) == (0, 0)
@@ -115,8 +115,8 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
             with serial.Serial(board.port, 250000, timeout=60):
                 assert ask(port, b"p\x01") == b"\n"
             assert board.stats()["resets"] == 9
-        where = Path(board.port)
-    assert not where.parent.exists()
+        path = Path(board.port)
+    assert not path.parent.exists()
 
 
 def test_an_answer_knows_of_every_opening_before_its_question(probe: Path) -> None:

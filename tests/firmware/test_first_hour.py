@@ -38,6 +38,6 @@ def test_a_lost_arm_is_brought_home_by_keys_and_a_motor_turns_the_other_way(
         assert armkin.load(path).motors[1].invert
         steps = board.net()
         assert steps["X"] > 0
-        found = run("status", path, "--port", board.port, "--json")
-        assert found.json["position"] in ("known", "retained")
-        assert found.json["pulses"] == [0, 0, 0], "home, by the corrected file"
+        status = run("status", path, "--port", board.port, "--json")
+        assert status.json["position"] in ("known", "retained")
+        assert status.json["pulses"] == [0, 0, 0], "home, by the corrected file"

@@ -95,11 +95,11 @@ def test_a_cut_in_the_middle_is_told_and_the_same_command_repeats_it(empty: Make
         assert run(*command, board.port).code == 0
 
 
-@pytest.mark.parametrize(("asked", "there"), [KINDS, KINDS[::-1]])
-def test_another_board_than_was_named_keeps_its_program(asked: str, there: str, empty: Make) -> None:
-    chip = BOARDS[there].chip
-    with empty(there) as board:
-        completed = run("flash", "--board", asked, "--port", board.port)
+@pytest.mark.parametrize(("named", "plugged_in"), [KINDS, KINDS[::-1]])
+def test_another_board_than_was_named_keeps_its_program(named: str, plugged_in: str, empty: Make) -> None:
+    chip = BOARDS[plugged_in].chip
+    with empty(plugged_in) as board:
+        completed = run("flash", "--board", named, "--port", board.port)
         assert completed.code == 5
         assert f"the chip on {board.port} is an {chip}" in completed.err
         assert "nothing was written" in completed.err

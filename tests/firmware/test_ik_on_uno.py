@@ -32,7 +32,7 @@ def built(arm: armkin.Arm, target: np.ndarray, folder: Path) -> tuple[Path, dict
         f"static const REAL targets[QUESTIONS][TARGET] = {{{rows}}};\nstatic const REAL near[JOINTS] = {{{near}}};\n"
     )
     names = {"IK": "ik", "FK": "fk", "REAL": "real", "SOLUTION": "solution"}
-    defines = [f"-D{name}={prefix}_{what}" for name, what in names.items()]
+    defines = [f"-D{name}={prefix}_{constant}" for name, constant in names.items()]
     defines += [f"-D{name}={prefix.upper()}_{name}" for name in ("JOINTS", "TARGET", "BRANCHES")]
     common = ["avr-gcc", "-mmcu=atmega328p", "-DF_CPU=16000000UL", "-std=c99", "-Os", "-Wall", "-Wextra", "-Werror"]
     common += [f"-I{folder}", "-ffunction-sections", "-fdata-sections"]
@@ -43,8 +43,8 @@ def built(arm: armkin.Arm, target: np.ndarray, folder: Path) -> tuple[Path, dict
 
 
 def sizes(path: Path, name: str) -> dict[str, int]:
-    told = subprocess.run(["avr-size", path], capture_output=True, text=True, check=True).stdout
-    code, data, bss = map(int, re.findall(r"\d+", told.splitlines()[1])[:3])
+    listing = subprocess.run(["avr-size", path], capture_output=True, text=True, check=True).stdout
+    code, data, bss = map(int, re.findall(r"\d+", listing.splitlines()[1])[:3])
     return {f"{name}_flash": code + data, f"{name}_ram": data + bss}
 
 
@@ -58,7 +58,7 @@ def answers(arm: armkin.Arm, target: np.ndarray, folder: Path) -> dict[str, Any]
             size *= np.dtype(kind).itemsize
             start = int(board.control(f"peek {name} 1")["address"])
             parts = ((start + k, min(200, size - k)) for k in range(0, size, 200))
-            told = "".join(str(board.control(f"peek {at} {length}")["bytes"]) for at, length in parts)
+            told = "".join(str(board.control(f"peek {address} {length}")["bytes"]) for address, length in parts)
             return np.frombuffer(bytes.fromhex(told), kind)
 
         for _ in range(100):
@@ -108,6 +108,6 @@ def test_its_cycles_and_bytes_are_those_of_the_documents(on_uno: dict[str, Any])
         r"([\d,]+) bytes of stack": 2048 - on_uno["program_ram"] - on_uno["stack_left"],
     }
     for pattern, measured in figures.items():
-        told = re.search(pattern, text)
-        assert told, pattern
-        assert float(told[1].replace(",", "")) == pytest.approx(float(measured), rel=0.03), pattern
+        match = re.search(pattern, text)
+        assert match, pattern
+        assert float(match[1].replace(",", "")) == pytest.approx(float(measured), rel=0.03), pattern

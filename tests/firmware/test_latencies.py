@@ -37,14 +37,14 @@ def test_short_moves_lose_no_byte(monkeypatch: pytest.MonkeyPatch, load: float, 
                 yield reply
 
         monkeypatch.setattr(machine.session.line, "replies", replies)
-        at = machine.counts()
+        counts = machine.counts()
         for degrees in ([4, -3, 5], [-5, 6, 2], [0.3, 0.1, -0.2], [1.65, 1.4, 0.35]):
-            plan = machine.plan(at, ARM.home + np.deg2rad(degrees))
+            plan = machine.plan(counts, ARM.home + np.deg2rad(degrees))
             machine.run([plan])
-            at = machine.counts()
-            assert at == tuple(plan.end.tolist())
+            counts = machine.counts()
+            assert counts == tuple(plan.end.tolist())
         stats = board.stats()
-        assert [stats["axes"][axis]["net"] for axis in "XYZ"] == list(at)
+        assert [stats["axes"][axis]["net"] for axis in "XYZ"] == list(counts)
         assert (spilled, machine.session.line.resent, stats["uart"]["overruns"], machine.status.bad) == (0, 0, 0, 0)
 
 

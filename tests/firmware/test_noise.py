@@ -25,10 +25,10 @@ LOADS = {"quiet": 0.0, "busy": 3.0}
 WAY = [[100, 60, -90], [-100, 10, -20]]  # deg; 5.7 s
 
 
-def seconds(who: str, *line: str) -> float:
+def seconds(computer: str, *line: str) -> float:
     """How long the way takes, what is done to the line included; the counts are checked, and the pins."""
     with EmulatedBoard(speed="step", reset_on_open=False) as board, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(streaming, "_processor_load", lambda _: LOADS[who])
+        patch.setattr(streaming, "_processor_load", lambda _: LOADS[computer])
         patch.setattr(
             session, "_new_nonce", count(0x12340001).__next__
         )  # at random, the line would damage other bytes each time
@@ -50,25 +50,27 @@ def seconds(who: str, *line: str) -> float:
 
 
 @cache
-def clean(who: str) -> float:
+def clean(computer: str) -> float:
     """The same over a good line."""
-    return seconds(who)
+    return seconds(computer)
 
 
 @pytest.mark.parametrize(
-    ("who", "noises"), [("quiet", [(0.001, 4), (0.01, 20), (0.01, 9), (0.0125, 1)]), ("busy", [(0.01, 2)])]
+    ("computer", "noises"), [("quiet", [(0.001, 4), (0.01, 20), (0.01, 9), (0.0125, 1)]), ("busy", [(0.01, 2)])]
 )
 def test_noise_costs_a_twentieth_and_ends_at_exact_counts(
-    who: str, noises: list[tuple[float, int]], sample: Callable[[int, int], int]
+    computer: str, noises: list[tuple[float, int]], sample: Callable[[int, int], int]
 ) -> None:
     """The quiet ones of 1 % are held on their first degree, and gone on with. Of 24 seeds the worst takes 1.041."""
-    some = noises[: sample(4, 2)]
-    took = np.array([seconds(who, f"noise flip {rate} seed {seed}") for rate, seed in some]) / clean(who)
+    sampled = noises[: sample(4, 2)]
+    took = np.array([seconds(computer, f"noise flip {rate} seed {seed}") for rate, seed in sampled]) / clean(computer)
     assert took.max() < 1.05
 
 
-@pytest.mark.parametrize("who", LOADS)
-def test_a_line_that_is_dead_now_and_then_is_bridged(who: str) -> None:
+@pytest.mark.parametrize("computer", LOADS)
+def test_a_line_that_is_dead_now_and_then_is_bridged(computer: str) -> None:
     """0.2 s every 3 s."""
-    dead = [f"after {ms + more}ms {what}" for ms in (1700, 4700) for more, what in ((0, "cut both"), (200, "restore"))]
-    assert seconds(who, *dead) < 1.05 * clean(who)
+    dead = [
+        f"after {ms + more}ms {event}" for ms in (1700, 4700) for more, event in ((0, "cut both"), (200, "restore"))
+    ]
+    assert seconds(computer, *dead) < 1.05 * clean(computer)

@@ -91,30 +91,30 @@ def test_a_tick_behind_the_shortest_interval_is_not_early() -> None:
         uno.control("clear")
         status = host.stream(batches((0, 1, 2), (0, 0, 0), segments, 4))
         assert (status.error, status.overruns) == (0, 0)
-        wanted = curve_on_pins.predicted(segments, [0, 0, 0])
-        assert curve_on_pins.late_us(uno.trace(), wanted) <= 5.0
+        expected = curve_on_pins.predicted(segments, [0, 0, 0])
+        assert curve_on_pins.late_us(uno.trace(), expected) <= 5.0
 
 
 @pytest.mark.parametrize(("share", "cable"), [(0.22, False), (0.61, False), (0.4, True)])
 def test_a_curve_held_or_cut_off_stays_on_its_way_and_known(
     circle: curve_on_pins.Laid, share: float, cable: bool
 ) -> None:
-    got = curve_on_pins.held(circle, share, cable=cable)
-    assert got.known
-    assert got.goes_on
-    assert got.off_way_mm <= 0.05 + HALF_A_STEP
-    assert got.accel <= 1.6
+    held = curve_on_pins.held(circle, share, cable=cable)
+    assert held.known
+    assert held.goes_on
+    assert held.off_way_mm <= 0.05 + HALF_A_STEP
+    assert held.accel <= 1.6
     if not cable:  # 5/8 of the accelerations: slower than with all of them, unless the plan is slower by itself
         speed = circle.curve.evaluate(np.array([share * circle.curve.duration]), 1)[0]
         ramp = (np.abs(circle.arm.motor_gain @ speed) / motor_accel(circle.arm)).max()
-        assert 0.92 < got.milliseconds / 1000 / (ramp / 0.625) < 1.05
+        assert 0.92 < held.milliseconds / 1000 / (ramp / 0.625) < 1.05
 
 
 def test_waypoints_are_streamed_without_a_stop() -> None:
     # A frame carries 0.2 s of motion as a mean; every 0.04 s the board's time waits for a host without a processor.
-    got = waypoints_on_pins.stream(60, patience=0.04)
-    assert got.good, got
-    assert got.processor < got.seconds  # it keeps up, on a machine that has time for it
-    assert got.waypoints == 60
-    assert got.late_us <= 50
-    assert got.segments_a_second <= 100
+    streamed = waypoints_on_pins.stream(60, patience=0.04)
+    assert streamed.good, streamed
+    assert streamed.processor < streamed.seconds  # it keeps up, on a machine that has time for it
+    assert streamed.waypoints == 60
+    assert streamed.late_us <= 50
+    assert streamed.segments_a_second <= 100

@@ -57,10 +57,10 @@ def test_the_uf2_file_is_what_a_pico_takes() -> None:
     file = build_firmware(PICO).read_bytes()
     assert len(file) % 512 == 0
     flash = b""
-    for at in range(0, len(file), 512):
-        *head, data, end = struct.unpack("<8I476sI", file[at : at + 512])
+    for offset in range(0, len(file), 512):
+        *head, data, end = struct.unpack("<8I476sI", file[offset : offset + 512])
         address = 0x1000_0000 + len(flash)
-        assert head == [0x0A324655, 0x9E5D5157, 0x2000, address, 256, at // 512, len(file) // 512, 0xE48BFF56]
+        assert head == [0x0A324655, 0x9E5D5157, 0x2000, address, 256, offset // 512, len(file) // 512, 0xE48BFF56]
         assert end == 0x0AB16F30
         flash += data[:256]
 
@@ -91,11 +91,11 @@ def test_it_fits_the_memory_with_room_for_the_stack() -> None:
 
 def test_six_axes_at_250_khz_and_every_edge_is_where_the_protocol_puts_it() -> None:
     """Also while every interrupt comes 0.48 us late, which another one of 60 cycles would make."""
-    got = stepping(CLOCK // 250_000, ticks=1500, held_off_us=0.48)
-    assert got.exact
-    assert (got.rate, got.off_us, got.overruns, got.violations) == (250_000, 0, 0, 0)
-    assert got.high_us == pytest.approx(1.92)
-    assert got.asleep > 0.3
+    measured = stepping(CLOCK // 250_000, ticks=1500, held_off_us=0.48)
+    assert measured.exact
+    assert (measured.rate, measured.off_us, measured.overruns, measured.violations) == (250_000, 0, 0, 0)
+    assert measured.high_us == pytest.approx(1.92)
+    assert measured.asleep > 0.3
 
 
 def test_interrupts_that_come_later_than_there_is_room_for_are_told() -> None:
@@ -176,15 +176,15 @@ def test_a_silent_host_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None
 # Homing, resets, servos
 
 
-@pytest.mark.parametrize("where", [-1000, 40])
-def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, where: int) -> None:
-    board.control(f"set-switch B at {where} below")
+@pytest.mark.parametrize("count", [-1000, 40])
+def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, count: int) -> None:
+    board.control(f"set-switch B at {count} below")
     host = ready(board, MODERATE)
     rate = (0, 0, 0, 0, -4000, 0, 0, 0)
     host.order(protocol.home(0, switch=4, closed=False, slow=26, backoff=100, travel=8000, time=200, rate=rate))
     status = host.rest()
     assert (status.error, bool(status.flags & Flag.LATCH)) == (0, True)
-    assert host.status(page=1).counts[4] == where
+    assert host.status(page=1).counts[4] == count
     assert status.counts[4] == net(board)[4]
 
 
@@ -243,20 +243,20 @@ def test_noise_moves_nothing_that_was_not_sent(board: EmulatedBoard) -> None:
     host = ready(board, replace(WIDE, max_rate=20_000, max_accel=1_000_000))
     board.control("noise flip 0.01 drop 0.01 seed 5 dir both")
     share, segments = (3, -5, 2, 1, -1, 4), 60
-    at: tuple[int, ...] = (0,) * 6
+    counts: tuple[int, ...] = (0,) * 6
     sessions = 0
     end = tuple(segments * s for s in share)
-    while at != end and sessions < 100:
+    while counts != end and sessions < 100:
         sessions += 1
         host.hello(1000 + sessions)
-        left = (end[0] - at[0]) // share[0]
+        left = (end[0] - counts[0]) // share[0]
         work = [whole_steps(12, 25_000, 0, share)] * left
-        rest = tuple(e - a - left * s for e, a, s in zip(end, at, share, strict=True))
-        work += [whole_steps(20, 25_000, 0, rest)] if any(rest) else []
-        status = host.stream(batches(SIX, at, work, 3), resend=0.012, slice_s=2e-3, window=3, poll=0.05)
-        at = status.counts[:6]
+        remainder = tuple(e - a - left * s for e, a, s in zip(end, counts, share, strict=True))
+        work += [whole_steps(20, 25_000, 0, remainder)] if any(remainder) else []
+        status = host.stream(batches(SIX, counts, work, 3), resend=0.012, slice_s=2e-3, window=3, poll=0.05)
+        counts = status.counts[:6]
     board.control("restore")
-    assert at == end == net(board)
+    assert counts == end == net(board)
 
 
 # USB
@@ -265,7 +265,7 @@ def test_noise_moves_nothing_that_was_not_sent(board: EmulatedBoard) -> None:
 @pytest.mark.parametrize("name", ["move_pico6.talk", "refuse_pico6.talk"])
 def test_the_golden_conversations_over_usb(name: str) -> None:
     talk = next(t for t in talks() if t.name == name)
-    with EmulatedBoard(PICO, speed="step", by="usb") as board:
+    with EmulatedBoard(PICO, speed="step", link="usb") as board:
         board.run(0.05)  # until the host has set it up
         assert talk.replay(board) > 10
         usb = board.stats()["usb"]
@@ -296,7 +296,7 @@ def test_a_tick_that_is_brought_too_late_is_told_and_ends_in_a_hold(board: Emula
 
 def test_1200_baud_on_the_usb_lead_to_the_boot_drive_from_rest_alone() -> None:
     """What `armkin flash` does to a Pico that runs armkin; datasheet 2.8.3: reset_to_usb_boot."""
-    with EmulatedBoard(PICO, speed="step", trace=True, by="usb", driver="drv8825") as board:
+    with EmulatedBoard(PICO, speed="step", trace=True, link="usb", driver="drv8825") as board:
         board.run(0.1)  # the host sets the device up
         for rate in (115200, 250000):
             board.control(f"line-coding {rate}")

@@ -33,10 +33,10 @@ def wire(board: EmulatedBoard, arm: armkin.Arm, edges: Sequence[int]) -> None:
 
 def edges(arm: armkin.Arm) -> NDArray[np.int64]:
     """Pulses at the switches, from home; 0 where there is none."""
-    at = [
+    switch_values = [
         np.radians(switch.at) if switch is not None else home for switch, home in zip(arm.homing, arm.home, strict=True)
     ]
-    return armkin.pulses(arm, at)
+    return armkin.pulses(arm, switch_values)
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -45,12 +45,12 @@ def test_a_six_axis_arm_moves_end_to_end(name: str) -> None:
     arm = armkin.load(robot)
     pose = ARMS[name]
     # at 0.4 of real time neither a busy host nor a busy emulator runs into the other's time-outs
-    by: Literal["uart", "usb"] = "usb" if name == "parol6_pico6" else "uart"
+    link: Literal["uart", "usb"] = "usb" if name == "parol6_pico6" else "uart"
     planned = run("send", robot, *pose, "--dry-run", "--json")
     assert planned.code == 0, planned.err
     rehearsed = run("send", robot, *pose, "--port", "sim", "--json")
     assert rehearsed.code == 0, rehearsed.err
-    with EmulatedBoard(PICO, speed=0.4, trace=True, driver="tmc2209", by=by) as board:
+    with EmulatedBoard(PICO, speed=0.4, trace=True, driver="tmc2209", link=link) as board:
         wire(board, arm, edges(arm).tolist())
         sent = run("send", robot, *pose, "--port", board.port, "--assume-home", "--json")
         assert sent.code == 0, sent.err
@@ -85,7 +85,7 @@ def test_six_axis_arms_find_their_switches(pytestconfig: pytest.Config, monkeypa
         finds_its_switches(name, range(6) if long else range(5, 6), monkeypatch)
 
 
-def finds_its_switches(name: str, wanted: range, monkeypatch: pytest.MonkeyPatch) -> None:
+def finds_its_switches(name: str, joints: range, monkeypatch: pytest.MonkeyPatch) -> None:
     # the emulator takes 5 s of a core for a second of six fast axes: the host must not take that for a standstill
     monkeypatch.setattr("armkin.board.firmware.wire.session._STALLED", 120.0)
     robot = ROOT / "robots" / f"{name}.yaml"
@@ -95,11 +95,11 @@ def finds_its_switches(name: str, wanted: range, monkeypatch: pytest.MonkeyPatch
     with EmulatedBoard(PICO) as board:
         wire(board, arm, away.tolist())
         assert run("send", robot, "home", "--port", board.port, "--assume-home").code == 0
-        names = [arm.joint_names[j] for j in wanted]
+        names = [arm.joint_names[j] for j in joints]
         completed = run("home", robot, *names, "--port", board.port, "--stay", "--json")
         assert completed.code == 0, completed.err
-        found = np.subtract(completed.json["pulses"], list(board.net().values()))
-        wrong = np.where(np.isin(np.arange(6), wanted), edges(arm) - away, 0)
-        assert found.tolist() == wrong.tolist()
-        lost = {one["joint"]: abs(one["steps"]) for one in completed.json["lost_steps"]}
-        assert lost == dict(zip(names, np.abs(wrong[list(wanted)]).tolist(), strict=True))
+        difference = np.subtract(completed.json["pulses"], list(board.net().values()))
+        wrong = np.where(np.isin(np.arange(6), joints), edges(arm) - away, 0)
+        assert difference.tolist() == wrong.tolist()
+        lost = {joint_loss["joint"]: abs(joint_loss["steps"]) for joint_loss in completed.json["lost_steps"]}
+        assert lost == dict(zip(names, np.abs(wrong[list(joints)]).tolist(), strict=True))

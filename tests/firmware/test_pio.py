@@ -54,8 +54,8 @@ WS2812 = [0x6221, 0x1123, 0x1400, 0xA442]
 PWM = [0x9080, 0xA027, 0xA046, 0x00A5, 0x1806, 0xA042, 0x0083]
 
 
-def bits(value: int, count: int, each: int) -> str:
-    return "".join(str(value >> i & 1) * each for i in range(count))
+def bits(value: int, count: int, repeats: int) -> str:
+    return "".join(str(value >> i & 1) * repeats for i in range(count))
 
 
 CASES = {

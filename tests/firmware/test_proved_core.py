@@ -23,4 +23,4 @@ def test_no_bytes_of_a_segment_overflow_or_read_beside_it() -> None:
     alarms = re.findall(r"\[eva:alarm\] (\S+):(\d+): Warning: *\n? *(.*)", completed.stdout)
     lines = {(FIRMWARE / name).read_text().splitlines()[int(line) - 1].strip() for name, line, _ in alarms}
     assert lines == COUNTED
-    assert all("signed overflow" in what or "valid_dest" in what for *_, what in alarms)
+    assert all("signed overflow" in alarm or "valid_dest" in alarm for *_, alarm in alarms)

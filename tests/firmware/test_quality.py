@@ -10,36 +10,36 @@ import pytest
 
 @pytest.mark.parametrize("board", ["uno_cnc_shield", "mega_ramps14"])
 def test_25_khz_on_every_stepper_with_every_feature_on(board: str) -> None:
-    got = measure.stepping(board, 25_000, seconds=1.0)
-    assert got.exact
-    assert (got.error, got.overruns, got.violations) == (0, 0, 0)
-    assert abs(got.rate - 25_000) < 100
-    assert got.jitter_us <= 10
-    assert got.stack_free >= 128
+    measured = measure.stepping(board, 25_000, seconds=1.0)
+    assert measured.exact
+    assert (measured.error, measured.overruns, measured.violations) == (0, 0, 0)
+    assert abs(measured.rate - 25_000) < 100
+    assert measured.jitter_us <= 10
+    assert measured.stack_free >= 128
 
 
 def test_the_shortest_interval_that_the_board_accepts_is_kept() -> None:
-    got = measure.stepping("uno_cnc_shield", 40_000)
-    assert got.exact
-    assert (got.error, got.overruns, got.violations) == (0, 0, 0)
-    assert got.jitter_us <= 10.5
+    measured = measure.stepping("uno_cnc_shield", 40_000)
+    assert measured.exact
+    assert (measured.error, measured.overruns, measured.violations) == (0, 0, 0)
+    assert measured.jitter_us <= 10.5
 
 
 @pytest.mark.parametrize(("board", "interval", "ticks"), [("uno_cnc_shield", 400, 100), ("mega_ramps14", 576, 100)])
 def test_motors_turn_round_at_the_shortest_interval_that_the_board_tells(board: str, interval: int, ticks: int) -> None:
-    got = measure.turning(board, interval, ticks)
-    assert got.exact
-    assert (got.error, got.overruns, got.violations) == (0, 0, 0)
-    assert got.servo_ms < 25
-    assert got.late_servos == 0
-    assert got.stack_free >= 128
+    measured = measure.turning(board, interval, ticks)
+    assert measured.exact
+    assert (measured.error, measured.overruns, measured.violations) == (0, 0, 0)
+    assert measured.servo_ms < 25
+    assert measured.late_servos == 0
+    assert measured.stack_free >= 128
 
 
 def test_40_ticks_a_segment_at_25_khz_do_not_run_dry() -> None:
-    got = measure.turning("uno_cnc_shield", 640, ticks=40)
-    assert got.exact
-    assert (got.error, got.overruns, got.violations) == (0, 0, 0)
-    assert got.servo_ms < 25
+    measured = measure.turning("uno_cnc_shield", 640, ticks=40)
+    assert measured.exact
+    assert (measured.error, measured.overruns, measured.violations) == (0, 0, 0)
+    assert measured.servo_ms < 25
 
 
 @pytest.mark.parametrize(("board", "interval"), [("uno_cnc_shield", 400), ("mega_ramps14", 576)])
@@ -62,33 +62,33 @@ def test_first_step_within_3_ms_of_the_first_batch() -> None:
     [(115_200, 600, "uno_cnc_shield"), (250_000, 1200, "uno_cnc_shield"), (250_000, 1200, "mega_ramps14")],
 )
 def test_short_segments_a_second(baud: int, rate: float, board: str) -> None:
-    got, exact = measure.segments_per_second(baud, rate, board=board)
+    measured, exact = measure.segments_per_second(baud, rate, board=board)
     assert exact
-    assert got > 0.99 * rate
+    assert measured > 0.99 * rate
 
 
 @pytest.mark.parametrize("cause", ["hold", "abort", "silence"])
 def test_a_hold_from_full_speed_stays_on_the_path(cause: str) -> None:
-    got = measure.hold(cause=cause)
-    assert got.exact
-    assert got.known
-    assert got.off_path <= 1
-    assert 0.8 * got.ideal < got.milliseconds < 1.2 * got.ideal
+    held = measure.hold(cause=cause)
+    assert held.exact
+    assert held.known
+    assert held.off_path <= 1
+    assert 0.8 * held.ideal < held.milliseconds < 1.2 * held.ideal
 
 
 @pytest.mark.parametrize("first", [0, 3])
 def test_noise_on_both_lines_moves_nothing_wrong(first: int, sample: Callable[[int, int], int]) -> None:
     """tests/bench/bench_firmware.py counts 20 seeds."""
     for seed in range(first, first + sample(3, 1)):
-        got = measure.noise(seed)
-        assert got.resent > 100  # the noise was there
-        assert got.on_path
-        assert got.exact
+        measured = measure.noise(seed)
+        assert measured.resent > 100  # the noise was there
+        assert measured.on_path
+        assert measured.exact
 
 
 @pytest.mark.parametrize("speed", [1.0, 0.2])
 def test_steps_come_when_the_time_law_says_ramps_included(speed: float) -> None:
     """Every interval, from the first step to the last, to 60 us or 2 % of its period; the cruise peak to peak."""
-    for got in measure.smoothness(speed):
-        assert got.worst <= 1.2, got  # the interrupt's own latency comes on top of the arithmetic
-        assert got.peak_to_peak_us <= max(60, 0.02 * got.period_us) + 8, got
+    for measured in measure.smoothness(speed):
+        assert measured.worst <= 1.2, measured  # the interrupt's own latency comes on top of the arithmetic
+        assert measured.peak_to_peak_us <= max(60, 0.02 * measured.period_us) + 8, measured
