@@ -82,8 +82,8 @@ def families(
     names = ik(free.rest, moved(arm, free, goal[:1], np.zeros(1)), task.name, examine=False).names if len(goal) else ()
     names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
     method, why, _ = described(arm, free)
-    out = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(nears.shape, bool), rows.complete)
-    s = as_solutions(Goals(arm, task, goal, nears), close, lead, out, roundings, (names, method, why))
+    batch = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(nears.shape, bool), rows.complete)
+    s = as_solutions(Goals(arm, task, goal, nears), close, lead, batch, roundings, (names, method, why))
     return replace(s, interval=interval.reshape(*s.valid.shape, 2))
 
 

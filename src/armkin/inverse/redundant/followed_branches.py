@@ -90,8 +90,8 @@ def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
             at_once = max(SAMPLES // more, 1)
             for rows in (again[k : k + at_once] for k in range(0, len(again), at_once)):
                 part, part_short = _sampled(find.of(rows), more)
-                others, closer = rows_of(pieces, ~np.isin(pieces.row, rows)), part._replace(row=rows[part.row])
-                pieces = stacked([others, closer])
+                unchanged, closer = rows_of(pieces, ~np.isin(pieces.row, rows)), part._replace(row=rows[part.row])
+                pieces = stacked([unchanged, closer])
                 short[rows] = part_short
     return pieces, short
 

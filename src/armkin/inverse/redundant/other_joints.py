@@ -64,14 +64,14 @@ class Sampled(NamedTuple):
 @lru_cache(maxsize=64)
 def _recorded(arm: Arm, free: Redundancy) -> tuple[StraightLineCode, tuple[int, ...]]:
     """The closed form of the others with the redundant joint as an argument: of a target's entries and its pair."""
-    others = recorded(free.rest, solver(free.rest, free.task.name)[0], free.geometry)
+    rest_form = recorded(free.rest, solver(free.rest, free.task.name)[0], free.geometry)
     inputs = 12 if free.task.orientation == "full" else len(free.task.labels)
 
     def formula(x: list[Entry]) -> list[Entry]:
         goal = moved_entries(arm, free, x[:inputs], Pair(x[inputs], x[inputs + 1]))
-        return others.candidates(goal, [None] * others.arm.n)
+        return rest_form.candidates(goal, [None] * rest_form.arm.n)
 
-    return StraightLineCode(formula, inputs + 2), others.axes
+    return StraightLineCode(formula, inputs + 2), rest_form.axes
 
 
 def over_a_turn(count: int) -> Array:

@@ -220,8 +220,8 @@ def curves_of(find: Follower) -> Chains:
         return chains
     again, place = np.unique(row, return_inverse=True)
     more = _joined(find.of(again), place, q)
-    others = chains.curves(np.flatnonzero(~np.isin(chains.row, again)))
-    joined = stacked([others, more._replace(row=again[more.row])])
+    unchanged = chains.curves(np.flatnonzero(~np.isin(chains.row, again)))
+    joined = stacked([unchanged, more._replace(row=again[more.row])])
     return joined.curves(np.argsort(joined.row, kind="stable"))
 
 

@@ -62,21 +62,21 @@ class Curves:
         rows = np.flatnonzero(self.going)
         arm, joints, last, pace = self._arm, self._joints[rows], self._ahead[rows], self._pace[rows]
         start = self.at[rows] + pace[:, None] * last * radian_or_reach(arm)
-        there, V, second, size = _onto_curve(arm, self._task, start, joints, self._target[rows])
+        landed, V, second, size = _onto_curve(arm, self._task, start, joints, self._target[rows])
         ahead = _next_directions(V, second, last)
         cosine = np.linalg.norm(ahead, axis=1)
         good = (size < tol.OFF_CURVE) & (cosine > STRAIGHT)
         before = self.at[rows]
-        self.at[rows[good]], self._ahead[rows[good]] = there[good], ahead[good] / cosine[good, None]
+        self.at[rows[good]], self._ahead[rows[good]] = landed[good], ahead[good] / cosine[good, None]
         self._pace[rows] = pace = np.minimum(_longest_steps(second), np.where(good, 2.0, 0.5) * pace)
         self._taken[rows] += 1
         stuck, long = ~good & (pace < tol.SHORTEST_STEP), self._taken[rows] == MOST
         unsure = (second < tol.CROSSING) | (stuck & (size < tol.OFF_CURVE)) | long
-        out = Step(rows, before, newton.difference(arm, self.at[rows], before), np.asarray(unsure))
-        home = out.passes(arm, self._start[rows], np.arange(len(rows)))
+        step = Step(rows, before, newton.difference(arm, self.at[rows], before), np.asarray(unsure))
+        home = step.passes(arm, self._start[rows], np.arange(len(rows)))
         self.closed[rows] = home & good & (self._taken[rows] > 2)
         self.going[rows] = ~(self.closed[rows] | stuck | long)
-        return out
+        return step
 
 
 def directions(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Bool]:

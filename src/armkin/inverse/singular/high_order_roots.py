@@ -28,14 +28,14 @@ def joined(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array
     Steps back onto the curve leave out directions weaker than `HIGH`.
     """
     halfway = q + 0.5 * way * radian_or_reach(arm)
-    out = newton.missing(arm, task, halfway, target) <= tol.SOLUTION
+    solves = newton.missing(arm, task, halfway, target) <= tol.SOLUTION
     far = np.abs(way).max(axis=1)
-    some = np.flatnonzero(~out & (sigma < tol.HIGH) & (miss > ROOT * far * sigma))
-    if len(some):
-        third, size = newton.correct(arm, task, halfway[some], target[some], steps=3, least=tol.HIGH)
-        off = np.abs(newton.difference(arm, third, halfway[some])).max(axis=1)
-        out[some] = (off < BESIDE * far[some]) & (size <= tol.SOLUTION)
-    return np.asarray(out)
+    doubtful = np.flatnonzero(~solves & (sigma < tol.HIGH) & (miss > ROOT * far * sigma))
+    if len(doubtful):
+        third, size = newton.correct(arm, task, halfway[doubtful], target[doubtful], steps=3, least=tol.HIGH)
+        moved = np.abs(newton.difference(arm, third, halfway[doubtful])).max(axis=1)
+        solves[doubtful] = (moved < BESIDE * far[doubtful]) & (size <= tol.SOLUTION)
+    return np.asarray(solves)
 
 
 def alike(
@@ -52,15 +52,15 @@ def alike(
         start = q[k[row], b[row]]
         way = newton.difference(arm, q[k[row], column], start)
         # a pair's longer Newton step; of rounding alone the quotient says nothing
-        one, other = (k[row], b[row]), (k[row], column)
-        longer = size[other] * sigma[one] > size[one] * sigma[other]
-        miss, weakest = (np.where(longer, values[other], values[one]) for values in (size, sigma))
+        first, second = (k[row], b[row]), (k[row], column)
+        longer = size[second] * sigma[first] > size[first] * sigma[second]
+        miss, weakest = (np.where(longer, values[second], values[first]) for values in (size, sigma))
         further = joined(arm, task, start, way, miss, weakest, target[k[row]])
         same[row, column] = further
         for i in np.unique(row[further]):  # and those that rounding alone parts from these
-            there, some = q[k[i]], np.flatnonzero(same[i])
-            apart = newton.wrapped_distance(arm, there[:, None], there[some])
-            close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], some]))
+            postures, members = q[k[i]], np.flatnonzero(same[i])
+            apart = newton.wrapped_distance(arm, postures[:, None], postures[members])
+            close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], members]))
             same[i] |= close.any(axis=1)
     return np.asarray(same), away
 

@@ -26,15 +26,15 @@ from armkin.model.units import radian_or_reach
 FINE = np.deg2rad(0.1)  # between the postures of a self-motion that are looked at
 
 
-def with_legal_postures(goals: Goals, out: Batch, rows: Int) -> Batch:
+def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
     """The same branches, with legal ones for targets rows on an edge that have none, where such a posture is found.
 
-    goals, out: N targets and their branches. The legal posture takes the place of the one that it shares a self-motion
-    with, as `near` would.
+    goals, batch: N targets and their branches. The legal posture takes the place of the one that it shares a
+    self-motion with, as `near` would.
     """
     arm, task, target, near = goals
-    for k in rows[_may_be_legal(goals, out, rows)]:
-        q = out.q[k, out.valid[k]]
+    for k in rows[_may_be_legal(goals, batch, rows)]:
+        q = batch.q[k, batch.valid[k]]
         at_limit = _at_limits(arm, q).all(axis=1).any()
         legal = thorough(arm, task, target[k : k + 1], near[k : k + 1]).q
         exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])
@@ -42,21 +42,21 @@ def with_legal_postures(goals: Goals, out: Batch, rows: Int) -> Batch:
         if ((exact[0] >= arm.lower) & (exact[0] <= arm.upper)).all():
             legal = exact[0]
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
-        miss, *others = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
+        miss, *listed = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
         # of a self-motion as exact as what was listed; with a margin, for it has to be taken as a branch
-        if miss > (0.9 * tol.SOLUTION if at_limit else min(max(2.0 * min(others), tol.ACCEPTED), 0.9 * tol.SOLUTION)):
+        if miss > (0.9 * tol.SOLUTION if at_limit else min(max(2.0 * min(listed), tol.ACCEPTED), 0.9 * tol.SOLUTION)):
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
-        label = out.branch[k, out.valid[k]].astype(np.int64)
-        found = surfaces.swept(beside, components.examine(beside, Seeds.of(q[None], label), surfaces.no_more))
-        _, inside = nearest_row(arm, np.nan_to_num(found.q[0]), near[k])
-        if not (inside & found.valid[0]).any():
+        label = batch.branch[k, batch.valid[k]].astype(np.int64)
+        decision = surfaces.swept(beside, components.examine(beside, Seeds.of(q[None], label), surfaces.no_more))
+        _, inside = nearest_row(arm, np.nan_to_num(decision.q[0]), near[k])
+        if not (inside & decision.valid[0]).any():
             continue
         row = np.array([k])
-        out = write(arm, out, row, found.q, found.valid, found.label, near[row])
-        out.status[k] = max(out.status[k], found.status[0])  # of two roots in one, one was listed
-        out.free[k] |= found.free[0]
-    return out
+        batch = write(arm, batch, row, decision.q, decision.valid, decision.label, near[row])
+        batch.status[k] = max(batch.status[k], decision.status[0])  # of two roots in one, one was listed
+        batch.free[k] |= decision.free[0]
+    return batch
 
 
 def _at_limits(arm: Arm, q: Array) -> Bool:
@@ -65,37 +65,37 @@ def _at_limits(arm: Arm, q: Array) -> Bool:
     return np.asarray(beyond < tol.SAME)
 
 
-def _may_be_legal(goals: Goals, out: Batch, rows: Int) -> Bool:
+def _may_be_legal(goals: Goals, batch: Batch, rows: Int) -> Bool:
     """Which targets have a posture at a limit, or on a self-motion that may lead within limits: (len(rows),)."""
     arm, task, target, _ = goals
-    k, b = np.nonzero(out.valid[rows])
-    inside = _at_limits(arm, out.q[rows[k], b])
+    k, b = np.nonzero(batch.valid[rows])
+    inside = _at_limits(arm, batch.q[rows[k], b])
     # else a joint that is held is outside; or the curve is of small residuals, not as exact as the branches
-    some = np.flatnonzero((inside | out.free[rows[k]]).all(axis=1))
-    on: Bool = np.asarray(inside.all(axis=1))
-    some = some[~on[some]]
-    if len(some):
-        sigma, *_ = newton.null_space(arm, task, out.q[rows[k[some]], b[some]], target[rows[k[some]]])
-        on[some] = sigma < tol.CLOSED
-    return np.bincount(k[on], minlength=len(rows)) > 0
+    open_ = np.flatnonzero((inside | batch.free[rows[k]]).all(axis=1))
+    legal: Bool = np.asarray(inside.all(axis=1))
+    open_ = open_[~legal[open_]]
+    if len(open_):
+        sigma, *_ = newton.null_space(arm, task, batch.q[rows[k[open_]], b[open_]], target[rows[k[open_]]])
+        legal[open_] = sigma < tol.CLOSED
+    return np.bincount(k[legal], minlength=len(rows)) > 0
 
 
-def with_free_postures(goals: Goals, out: Batch) -> Batch:
+def with_free_postures(goals: Goals, batch: Batch) -> Batch:
     """The same branches; of singular targets each that hits something or is outside limits, at the nearest posture of
     its self-motion that is neither, if there is one to 0.1 degrees.
     """
     arm, task, target, near = goals
-    good = hits_nothing(arm, out.q) & out.within
-    for k, b in np.argwhere((out.status == Status.SINGULAR)[:, None] & out.valid & ~good):
-        on_it = followed(arm, task, out.q[k, b], target[k])
+    good = hits_nothing(arm, batch.q) & batch.within
+    for k, b in np.argwhere((batch.status == Status.SINGULAR)[:, None] & batch.valid & ~good):
+        on_it = followed(arm, task, batch.q[k, b], target[k])
         rows, inside = nearest_row(arm, on_it, near[k])
         free = np.flatnonzero(inside)
         free = free[hits_nothing(arm, rows[free])]
         if len(free):
             unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
             nearest = free[np.argmin((np.abs(rows[free] - near[k]) * unit).sum(axis=1))]
-            out.q[k, b], out.within[k, b] = rows[nearest], True
-    return out
+            batch.q[k, b], batch.within[k, b] = rows[nearest], True
+    return batch
 
 
 def followed(arm: Arm, task: Task, q: Array, target: Array) -> Array:
@@ -116,8 +116,8 @@ def followed(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         share = (np.arange(count) / count)[:, None, None]
         between = (step.before + share * step.chord * unit).reshape(-1, arm.n)
         goal = np.repeat(target[None], len(between), axis=0)
-        there, size = newton.correct(arm, task, between, goal, steps=6, least=tol.WEAK)
+        landed, size = newton.correct(arm, task, between, goal, steps=6, least=tol.WEAK)
         good = size <= tol.SOLUTION
-        pieces.append(there[good])
+        pieces.append(landed[good])
         walk.going[step.rows] &= good.reshape(count, -1).all(axis=0)  # what else is near is no part of it
     return np.concatenate(pieces)

@@ -56,25 +56,25 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     """
     arm, task, target, near = goals
     K, S, B, n = q.shape
-    asked = ~np.isnan(q[..., 0]) & loose[:, None]
-    size = np.full(asked.shape, np.inf)
-    size[asked] = newton.missing(arm, task, q[asked], np.repeat(target, asked.sum(axis=(1, 2)), axis=0))
-    there, own = size < tol.CLOSED, newton.missing(arm, task, near, target)
-    known, motions = _motions(goals, q, there, loose)
-    lacking = np.asarray((loose & (there.sum(axis=1) < 2)).any(axis=1))
-    known &= ~lacking & ~((own > tol.CLOSED) & (own <= tol.SOLUTION))
-    one, apart = _first_columns(arm, motions, loose)
-    known &= apart
+    tried = ~np.isnan(q[..., 0]) & loose[:, None]
+    size = np.full(tried.shape, np.inf)
+    size[tried] = newton.missing(arm, task, q[tried], np.repeat(target, tried.sum(axis=(1, 2)), axis=0))
+    solving, near_miss = size < tol.CLOSED, newton.missing(arm, task, near, target)
+    decided, motions = _motions(goals, q, solving, loose)
+    lacking = np.asarray((loose & (solving.sum(axis=1) < 2)).any(axis=1))
+    decided &= ~lacking & ~((near_miss > tol.CLOSED) & (near_miss <= tol.SOLUTION))
+    leader, apart = _first_columns(arm, motions, loose)
+    decided &= apart
     circuit = np.zeros((K, S, B), bool)
-    k, s, b = np.nonzero(there & known[:, None, None] & (motions.joint >= 0)[:, None])
+    k, s, b = np.nonzero(solving & decided[:, None, None] & (motions.joint >= 0)[:, None])
     if len(k):
         circuit[k, s, b] = four_bars.sides(arm, q[k, s, b], motions.d[k, b] != 0.0, motions.joint[k, b])
-    there[:, 1:] &= ~motions.line[:, None]  # of a line the posture at the first value is the nearest
-    key = np.where(there, 2 * one[:, None] + circuit, 2 * B).reshape(K, -1)
+    solving[:, 1:] &= ~motions.line[:, None]  # of a line the posture at the first value is the nearest
+    key = np.where(solving, 2 * leader[:, None] + circuit, 2 * B).reshape(K, -1)
     # a self-motion of two circuits may have candidates on one of them alone
-    seen = (key[:, :, None] == np.arange(2 * B)).any(axis=1).reshape(-1, B, 2)
-    half = known & ((motions.joint >= 0) & (seen.sum(axis=2) == 1)).any(axis=1)
-    known &= ~half
+    on_circuit = (key[:, :, None] == np.arange(2 * B)).any(axis=1).reshape(-1, B, 2)
+    half = decided & ((motions.joint >= 0) & (on_circuit.sum(axis=2) == 1)).any(axis=1)
+    decided &= ~half
     # of each circuit the posture with the least motion is listed
     q = q.reshape(K, S * B, n).copy()
     motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
@@ -82,26 +82,26 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     first, listed = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1) != 0, np.zeros(key.shape, bool)
     np.put_along_axis(listed, order, first, axis=1)
     listed &= key < 2 * B
-    if (stands := known & (own <= tol.CLOSED)).any():
-        known &= _listed_as_near(goals, q, listed, key, motions, one, loose, stands)
-    known &= _one_direction(goals, q, listed & known[:, None], key)
-    listed &= known[:, None]
+    if (stands := decided & (near_miss <= tol.CLOSED)).any():
+        decided &= _listed_as_near(goals, q, listed, key, motions, leader, loose, stands)
+    decided &= _one_direction(goals, q, listed & decided[:, None], key)
+    listed &= decided[:, None]
     q[~listed] = np.nan
     joints = listed[:, :, None] & np.tile(motions.d != 0.0, (1, S, 1))
-    return Linkages(known, lacking | half, q, joints)
+    return Linkages(decided, lacking | half, q, joints)
 
 
-def _motions(goals: Goals, q: Array, there: Bool, loose: Bool) -> tuple[Bool, _Motions]:
-    """What the loose candidates that solve their targets, there (K, S, B), move on; known: (K,) if it is all known."""
+def _motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[Bool, _Motions]:
+    """What the loose candidates solving (K, S, B) their targets move on; known: (K,) if it is all known."""
     arm, task, target, _ = goals
-    base = np.take_along_axis(q, there.argmax(axis=1)[:, None, :, None], axis=1)[:, 0]
+    base = np.take_along_axis(q, solving.argmax(axis=1)[:, None, :, None], axis=1)[:, 0]
     moving: Bool = np.asarray(
-        ((np.abs(newton.difference(arm, q, base[:, None])) > tol.SAME) & there[..., None]).any(axis=1)
+        ((np.abs(newton.difference(arm, q, base[:, None])) > tol.SAME) & solving[..., None]).any(axis=1)
     )
     way = newton.difference(arm, q[:, 1], q[:, 0])
     even = ((np.abs(np.abs(way) - 1.0) < tol.SAME) & ~arm.prismatic | ~moving).all(axis=2)
     first, last, count = moving.argmax(axis=2), arm.n - 1 - moving[:, :, ::-1].argmax(axis=2), moving.sum(axis=2)
-    line: Bool = np.asarray(loose & there[:, 0] & there[:, 1] & even & (count == 2) & (last - first == 2))
+    line: Bool = np.asarray(loose & solving[:, 0] & solving[:, 1] & even & (count == 2) & (last - first == 2))
     d = np.where(line[:, :, None], np.where(moving, np.sign(way), 0.0), moving)
     k, b = np.nonzero(line)
     if len(k):
@@ -128,14 +128,14 @@ def _held_difference(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Arra
     return np.asarray(held)
 
 
-def _first_columns(arm: Arm, at: _Motions, loose: Bool) -> tuple[Int, Bool]:
+def _first_columns(arm: Arm, motions: _Motions, loose: Bool) -> tuple[Int, Bool]:
     """The first column (K, B) on the same self-motion as each; and whether all others are clearly apart (K,)."""
     B = loose.shape[1]
     held = _held_difference(
-        arm, at.base[:, None], at.base[:, :, None], at.d[:, :, None], at.line[:, :, None]
+        arm, motions.base[:, None], motions.base[:, :, None], motions.d[:, :, None], motions.line[:, :, None]
     )  # (K, B, B)
-    alike = ((at.d[:, :, None] != 0.0) == (at.d[:, None] != 0.0)).all(axis=3)
-    sense = at.d.prod(axis=2, where=at.d != 0.0)
+    alike = ((motions.d[:, :, None] != 0.0) == (motions.d[:, None] != 0.0)).all(axis=3)
+    sense = motions.d.prod(axis=2, where=motions.d != 0.0)
     alike &= sense[:, :, None] == sense[:, None]
     pair = loose[:, :, None] & loose[:, None] & ~np.eye(B, dtype=bool)
     same = pair & alike & (held < tol.TURNED)
@@ -149,17 +149,17 @@ def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
     for _ in range(2):  # the posture that is listed; else, for it may be where bars are in one line, all others
         if not len(k):
             break
-        row, other = np.nonzero(listed[k] & (key[k] == key[k, m][:, None]))
-        _, J = newton.scaled(goals.arm, goals.task, q[k[row], other], goals.target[k[row]])
+        row, column = np.nonzero(listed[k] & (key[k] == key[k, m][:, None]))
+        _, J = newton.scaled(goals.arm, goals.task, q[k[row], column], goals.target[k[row]])
         fine = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > tol.FOLDED], minlength=len(k)) > 0
         k, m, listed = k[~fine], m[~fine], np.ones_like(listed)
-    out = np.ones(len(q), bool)
-    out[k] = False
-    return out
+    regular = np.ones(len(q), bool)
+    regular[k] = False
+    return regular
 
 
 def _listed_as_near(
-    goals: Goals, q: Array, listed: Bool, key: Int, at: _Motions, one: Int, loose: Bool, stands: Bool
+    goals: Goals, q: Array, listed: Bool, key: Int, motions: _Motions, leader: Int, loose: Bool, stands: Bool
 ) -> Bool:
     """Put `near` in place of what is listed of the self-motion that it is on; (K,) False where it may be on another.
 
@@ -167,15 +167,15 @@ def _listed_as_near(
     """
     arm, _, _, near = goals
     k = np.flatnonzero(stands)
-    known = np.ones(len(q), bool)
-    held = _held_difference(arm, near[k, None], at.base[k], at.d[k], at.line[k])
+    decided = np.ones(len(q), bool)
+    held = _held_difference(arm, near[k, None], motions.base[k], motions.d[k], motions.line[k])
     held = np.where(loose[k], held, np.inf)
     b, least = held.argmin(axis=1), held.min(axis=1)
-    known[k[(least >= tol.TURNED) & (least < tol.APART_ROOTS)]] = False
+    decided[k[(least >= tol.TURNED) & (least < tol.APART_ROOTS)]] = False
     k, b = k[least < tol.TURNED], b[least < tol.TURNED]
-    mine = 2 * one[k, b]
-    if len(two := np.flatnonzero(at.joint[k, b] >= 0)):
-        mine[two] += four_bars.sides(arm, near[k[two]], at.d[k[two], b[two]] != 0.0, at.joint[k[two], b[two]])
+    mine = 2 * leader[k, b]
+    if len(two := np.flatnonzero(motions.joint[k, b] >= 0)):
+        mine[two] += four_bars.sides(arm, near[k[two]], motions.d[k[two], b[two]] != 0.0, motions.joint[k[two], b[two]])
     row, m = np.nonzero(listed[k] & (key[k] == mine[:, None]))
     q[k[row], m] = near[k[row]]
-    return known
+    return decided

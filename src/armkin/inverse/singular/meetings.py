@@ -40,21 +40,21 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost)
     arm, task, target, _ = goals
     k, b = np.nonzero((size[:, 1:] <= tol.SOLUTION) & (lost.nullity[:, 1:] > 1))
     b += 1
-    at, nullity = rows_of(lost.weak, lost.place[k, b]), lost.nullity[k, b]
+    weak, nullity = rows_of(lost.weak, lost.place[k, b]), lost.nullity[k, b]
     rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / tol.HIGH)
     _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     row = k[first]
     most = np.maximum(tol.ACCEPTED, 2.0 * size[row, b[first]])
-    who, there, rests = _steps_out(arm, task, q[row, b[first]], rows_of(at, first), nullity[first], target[row], most)
-    size[k, b] = np.where(np.isin(same.reshape(-1), who), np.inf, size[k, b])
-    order = np.argsort(row[who], kind="stable")
-    who, there = who[order], there[order]
-    whose, row = label[k[first], b[first]][who], row[who]
+    meet, ends, rests = _steps_out(arm, task, q[row, b[first]], rows_of(weak, first), nullity[first], target[row], most)
+    size[k, b] = np.where(np.isin(same.reshape(-1), meet), np.inf, size[k, b])
+    order = np.argsort(row[meet], kind="stable")
+    meet, ends = meet[order], ends[order]
+    whose, row = label[k[first], b[first]][meet], row[meet]
     place = np.arange(len(row)) - np.searchsorted(row, row)
     shape = len(q), int(place.max(initial=-1)) + 1
     more, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, OWN), np.full(shape, np.inf)
-    more[row, place], labels[row, place] = there, whose
-    sizes[row, place] = newton.missing(arm, task, there, target[row])
+    more[row, place], labels[row, place] = ends, whose
+    sizes[row, place] = newton.missing(arm, task, ends, target[row])
     resting = np.zeros((len(q), q.shape[1] + shape[1]), bool)
     resting[k, b] = rests[same.reshape(-1)]
     return np.concatenate([q, more], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1), resting
@@ -85,7 +85,7 @@ def _tangents(
     round, and where they are nothing but zero they do not tell. Of three lost directions it is told whether there is
     none.
     """
-    n, known = arm.n, np.zeros(len(q), bool)
+    n, decided = arm.n, np.zeros(len(q), bool)
     whose, ways = [np.zeros(0, np.intp)], [np.zeros((0, n))]
     for k in (2, 3):
         rows = np.flatnonzero(nullity == k)
@@ -99,49 +99,49 @@ def _tangents(
         goal = np.concatenate([target[rows]] * (2 * len(pairs)))
         r = newton.missed(arm, task, ends, goal).reshape(2, len(pairs), len(rows), n)
         bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / tol.FOLD_WAY**2
-        own = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
-        forms = np.stack([b if i == j else b - own[i] - own[j] for b, (i, j) in zip(bent, pairs, strict=True)])
+        diag = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
+        forms = np.stack([b if i == j else b - diag[i] - diag[j] for b, (i, j) in zip(bent, pairs, strict=True)])
         grown = forms.transpose(1, 2, 0) @ products  # (m, k, P)
         size = np.sqrt((grown * grown).sum(axis=1))
         # that far from the next of these directions a form differs by twice its largest value at most
         least = ALL_ROUND + 2.0 * far * size.max(axis=1)
         if k == 3:
-            known[rows] = size.min(axis=1) > least
+            decided[rows] = size.min(axis=1) > least
             continue
-        known[rows] = size.max(axis=1) > SPREAD * ALL_ROUND
-        zero = (size <= least[:, None]) & known[rows, None]
+        decided[rows] = size.max(axis=1) > SPREAD * ALL_ROUND
+        zero = (size <= least[:, None]) & decided[rows, None]
         zero &= (size <= np.roll(size, 1, axis=1)) & (size < np.roll(size, -1, axis=1))
-        place, who = np.nonzero(zero.T)
-        whose.append(rows[who])
-        ways.append((unit[place][:, :, None] * V[who]).sum(axis=1))
-    return known, np.concatenate(whose), np.concatenate(ways)
+        place, row = np.nonzero(zero.T)
+        whose.append(rows[row])
+        ways.append((unit[place][:, :, None] * V[row]).sum(axis=1))
+    return decided, np.concatenate(whose), np.concatenate(ways)
 
 
 def _steps_out(
-    arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array, most: Array
+    arm: Arm, task: Task, q: Array, linear: newton.Linear, nullity: Int, target: Array, most: Array
 ) -> tuple[Int, Array, Bool]:
     """Postures (m, n) on self-motions that leave meetings (M, n), a long step off, and whose: (m,).
 
     most: (M,) residual of what counts as on one: points beside a self-motion of double roots have more. Also which
     meetings (M,) all pushes fall back to.
     """
-    known, who, push = _tangents(arm, task, q, at, nullity, target)
-    rests, open_ = known.copy(), np.flatnonzero(~known)
-    rests[open_] = ~on_surface(arm, task, q[open_], at.V[open_], nullity[open_], target[open_])
+    decided, meeting, push = _tangents(arm, task, q, linear, nullity, target)
+    rests, open_ = decided.copy(), np.flatnonzero(~decided)
+    rests[open_] = ~on_surface(arm, task, q[open_], linear.V[open_], nullity[open_], target[open_])
     rows = open_[rests[open_]]
     if len(rows):
-        others, further = null_directions(arm.n, at.V[rows], nullity[rows])
-        who, push = np.concatenate([who, rows[others]]), np.concatenate([push, further])
-    if not len(who):
-        return who, push, rests
-    there, size, grown = pushed(arm, task, q[who], np.full(len(who), 10 * STEP), push, target[who])
-    rests[who[grown <= tol.GROWTH]] = False
-    unit, way = radian_or_reach(arm), newton.difference(arm, there, q[who])
-    some = np.flatnonzero((size <= most[who]) & (np.abs(way).max(axis=1) > 3 * STEP))
-    some = some[newton.null_space(arm, task, there[some], target[who[some]])[2] == 1]
+        more, further = null_directions(arm.n, linear.V[rows], nullity[rows])
+        meeting, push = np.concatenate([meeting, rows[more]]), np.concatenate([push, further])
+    if not len(meeting):
+        return meeting, push, rests
+    postures, size, grown = pushed(arm, task, q[meeting], np.full(len(meeting), 10 * STEP), push, target[meeting])
+    rests[meeting[grown <= tol.GROWTH]] = False
+    unit, way = radian_or_reach(arm), newton.difference(arm, postures, q[meeting])
+    good = np.flatnonzero((size <= most[meeting]) & (np.abs(way).max(axis=1) > 3 * STEP))
+    good = good[newton.null_space(arm, task, postures[good], target[meeting[good]])[2] == 1]
     # the way there is a self-motion's, too: half way it is beside the chord by no more than a curve is
-    start = q[who[some]] + 0.5 * way[some] * unit
-    between, size = follow(arm, task, start, target[who[some]])
+    start = q[meeting[good]] + 0.5 * way[good] * unit
+    between, size = follow(arm, task, start, target[meeting[good]])
     beside = np.abs(newton.difference(arm, between, start)).max(axis=1)
-    some = some[(size <= tol.SOLUTION) & (beside < BOW * np.abs(way[some]).max(axis=1))]
-    return who[some], there[some], rests
+    good = good[(size <= tol.SOLUTION) & (beside < BOW * np.abs(way[good]).max(axis=1))]
+    return meeting[good], postures[good], rests

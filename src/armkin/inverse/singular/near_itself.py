@@ -46,38 +46,38 @@ def reached(
     return rows
 
 
-def take(goals: Goals, out: Batch, rows: Int) -> Int:
+def take(goals: Goals, batch: Batch, rows: Int) -> Int:
     """Put `near` in place of the branch that it is one with; returns the targets that have to be examined.
 
-    goals, out: N targets and their branches; rows: those of `reached`. Two are one if the posture between them solves
+    goals, batch: N targets and their branches; rows: those of `reached`. Two are one if the posture between them solves
     the target, too. Where there is no such branch, or another one close by, `near` still solves the target.
     """
-    left = [_taken(goals, out, rows[start : start + AT_ONCE]) for start in range(0, len(rows), AT_ONCE)]
+    left = [_taken(goals, batch, rows[start : start + AT_ONCE]) for start in range(0, len(rows), AT_ONCE)]
     return np.concatenate(left) if left else rows
 
 
-def _taken(goals: Goals, out: Batch, rows: Int) -> Int:
+def _taken(goals: Goals, batch: Batch, rows: Int) -> Int:
     arm, task = goals.arm, goals.task
     rows = rows[~limits.outside(arm, goals.near[rows]).any(axis=1)]
     if not len(rows):
         return rows
     near, target = goals.near[rows], goals.target[rows]
-    if not out.valid.shape[1]:  # an elimination that found nothing at all
+    if not batch.valid.shape[1]:  # an elimination that found nothing at all
         return np.asarray(rows[newton.missing(arm, task, near, target) <= tol.SOLUTION])
-    away = newton.wrapped_distance(arm, out.q[rows], near[:, None])
-    away = np.where(out.valid[rows], away, np.inf)
+    away = newton.wrapped_distance(arm, batch.q[rows], near[:, None])
+    away = np.where(batch.valid[rows], away, np.inf)
     place = away.argmin(axis=1)
     least = away.min(axis=1)
     stays, solves = least <= tol.THERE, np.ones(len(rows), bool)
-    some = np.flatnonzero(~stays)
-    if len(some):
-        solves[some] = newton.missing(arm, task, near[some], target[some]) <= tol.SOLUTION
-        some = some[solves[some] & ((away[some] < tol.CLOSE_BY).sum(axis=1) == 1)]
-        way = newton.difference(arm, out.q[rows[some], place[some]], near[some])
-        between = near[some] + 0.5 * way * radian_or_reach(arm)
-        stays[some] = newton.missing(arm, task, between, target[some]) <= tol.SOLUTION
-    out.q[rows[stays], place[stays]] = near[stays]
-    out.within[rows[stays], place[stays]] = True
+    unsure = np.flatnonzero(~stays)
+    if len(unsure):
+        solves[unsure] = newton.missing(arm, task, near[unsure], target[unsure]) <= tol.SOLUTION
+        unsure = unsure[solves[unsure] & ((away[unsure] < tol.CLOSE_BY).sum(axis=1) == 1)]
+        way = newton.difference(arm, batch.q[rows[unsure], place[unsure]], near[unsure])
+        between = near[unsure] + 0.5 * way * radian_or_reach(arm)
+        stays[unsure] = newton.missing(arm, task, between, target[unsure]) <= tol.SOLUTION
+    batch.q[rows[stays], place[stays]] = near[stays]
+    batch.within[rows[stays], place[stays]] = True
     return np.asarray(rows[solves & ~stays])
 
 
@@ -86,16 +86,16 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> I
 
     Of those that are known better than to `SOLUTION` there are none: of these `take` has decided.
     """
-    known = most > ROUNDED
-    if not known.any():
-        return np.flatnonzero(known)
+    rounded = most > ROUNDED
+    if not rounded.any():
+        return np.flatnonzero(rounded)
     close = np.broadcast_to(near, (len(target), arm.n))
-    rows = reached(arm, task, target, position(arm, near), room=np.where(known, most, -1.0))
+    rows = reached(arm, task, target, position(arm, near), room=np.where(rounded, most, -1.0))
     rows = rows[~limits.outside(arm, close[rows]).any(axis=1)]
     return np.asarray(rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]])
 
 
-def stand(goals: Goals, out: Batch, most: Array) -> Batch:
+def stand(goals: Goals, batch: Batch, most: Array) -> Batch:
     """The same branches, with `near` among them where it solves a rounded target: see `standing`.
 
     In place of the branch that it is one with to within the rounding; else beside the others. Where there are no
@@ -104,22 +104,22 @@ def stand(goals: Goals, out: Batch, most: Array) -> Batch:
     arm, task, target, near = goals
     rows = standing(arm, task, target, near, most)
     if not len(rows):
-        return out
-    way = newton.difference(arm, out.q[rows], near[rows, None])
-    away = np.where(out.valid[rows], np.abs(way).max(axis=2), np.inf)
+        return batch
+    way = newton.difference(arm, batch.q[rows], near[rows, None])
+    away = np.where(batch.valid[rows], np.abs(way).max(axis=2), np.inf)
     away = np.pad(away, ((0, 0), (0, 1)), constant_values=np.inf)
-    one, nearest = away <= tol.THERE, away == away.min(axis=1, keepdims=True)
-    for some, steps in (nearest, 0), (away < np.inf, 0), (away < np.inf, 6):  # in the last the component may bend
-        k, b = np.nonzero(some & (away < np.inf) & ~one.any(axis=1, keepdims=True))
+    same, nearest = away <= tol.THERE, away == away.min(axis=1, keepdims=True)
+    for tried, steps in (nearest, 0), (away < np.inf, 0), (away < np.inf, 6):  # in the last the component may bend
+        k, b = np.nonzero(tried & (away < np.inf) & ~same.any(axis=1, keepdims=True))
         halfway = near[rows[k]] + 0.5 * way[k, b] * radian_or_reach(arm)
         beside, size = follow(arm, task, halfway, target[rows[k]], steps)
-        off = newton.wrapped_distance(arm, beside, halfway)
-        one[k, b] = (size <= most[rows[k]]) & (off <= BESIDE * away[k, b])
-    place, there = np.where(one, away, np.inf).argmin(axis=1), one.any(axis=1)
-    count = out.valid[rows].sum(axis=1)
-    place = np.where(there, place, count)
-    out = stacked([out, empty(0, int(place.max()) + 1, arm.n)])
-    out.q[rows, place], out.valid[rows, place], out.within[rows, place] = near[rows], True, True
-    out.branch[rows] = named(out.branch[rows].astype(np.int64), out.valid[rows])
-    out.status[rows[count == 0]] = Status.BOUNDARY
-    return out
+        moved = newton.wrapped_distance(arm, beside, halfway)
+        same[k, b] = (size <= most[rows[k]]) & (moved <= BESIDE * away[k, b])
+    place, stays = np.where(same, away, np.inf).argmin(axis=1), same.any(axis=1)
+    count = batch.valid[rows].sum(axis=1)
+    place = np.where(stays, place, count)
+    batch = stacked([batch, empty(0, int(place.max()) + 1, arm.n)])
+    batch.q[rows, place], batch.valid[rows, place], batch.within[rows, place] = near[rows], True, True
+    batch.branch[rows] = named(batch.branch[rows].astype(np.int64), batch.valid[rows])
+    batch.status[rows[count == 0]] = Status.BOUNDARY
+    return batch

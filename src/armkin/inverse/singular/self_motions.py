@@ -36,10 +36,10 @@ def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: 
     pairs: list[tuple[int, int, int]] = []  # a target, a posture of it and one of a self-motion beside
     for k in np.flatnonzero((chosen & curve.any(axis=2)).any(axis=1)):
         mine = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
-        few = curve[k, mine].sum(axis=1) <= arm.n // 2
+        narrow = curve[k, mine].sum(axis=1) <= arm.n // 2
         for i in np.flatnonzero(chosen[k] & (sigma[k] < tol.HIGH) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
-            pairs += [(int(k), int(i), int(j)) for j in mine[(away < tol.CLOSE_BY) & few]]
+            pairs += [(int(k), int(i), int(j)) for j in mine[(away < tol.CLOSE_BY) & narrow]]
         mine = mine[sigma[k, mine] < tol.SOLUTION]  # of double roots the posture listed may be off it
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
@@ -48,51 +48,51 @@ def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: 
             if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < tol.TURNED).any():
                 chosen[k, i] = False
     if pairs:
-        row, mid, other = np.array(pairs).T
-        grows = _grows_from(arm, task, q[row, mid], q[row, other], curve[row, other], target[row]) & (mid > 0)
+        row, mid, beside = np.array(pairs).T
+        grows = _grows_from(arm, task, q[row, mid], q[row, beside], curve[row, beside], target[row]) & (mid > 0)
         chosen[row[grows], mid[grows]] = False
 
 
-def _grows_from(arm: Arm, task: Task, q: Array, others: Array, curve: Bool, target: Array) -> Bool:
+def _grows_from(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, target: Array) -> Bool:
     """Whether q (M, n) are one with self-motions: with the postures that have their values of the joints that move.
 
-    others: (M, n) postures of self-motions, curve: (M, n) the joints that these move. Two are one if the posture
+    motions: (M, n) postures of self-motions, curve: (M, n) the joints that these move. Two are one if the posture
     between them solves the target, too. The other is sought beside q, and in the direction that q loses: where two
     directions are lost a curve of small residuals leaves the self-motion, off which the residual grows.
     """
     unit = radian_or_reach(arm)
-    apart = np.where(curve, 0.0, newton.difference(arm, others, q))
+    apart = np.where(curve, 0.0, newton.difference(arm, motions, q))
     sigma, V, _ = newton.null_space(arm, task, q, target)
     held = np.where(curve, 0.0, V[:, -1])
     far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), tol.TINY)
     ahead = apart + np.where(curve, V[:, -1] * np.clip(far, -tol.CLOSE_BY, tol.CLOSE_BY)[:, None], 0.0)
     q, goal, sigma = np.concatenate([q, q]), np.concatenate([target, target]), np.concatenate([sigma, sigma])
-    there, size = newton.correct(arm, task, q + np.concatenate([apart, ahead]) * unit, goal, steps=6, least=tol.WEAK)
-    way = newton.difference(arm, there, q)
+    landed, size = newton.correct(arm, task, q + np.concatenate([apart, ahead]) * unit, goal, steps=6, least=tol.WEAK)
+    way = newton.difference(arm, landed, q)
     near = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(way).max(axis=1) < tol.CLOSE_BY))
-    miss, out = newton.missing(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
-    out[near] = high_order_roots.joined(arm, task, q[near], way[near], miss, sigma[near], goal[near])
-    return np.asarray(out.reshape(2, -1).any(axis=0))
+    miss, joined = newton.missing(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
+    joined[near] = high_order_roots.joined(arm, task, q[near], way[near], miss, sigma[near], goal[near])
+    return np.asarray(joined.reshape(2, -1).any(axis=0))
 
 
-def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, on: Bool, tube: Array) -> None:
+def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, linked: Bool, tube: Array) -> None:
     """Of chosen postures (K, M) of self-motions that turn out to be the same keep the nearest to `near`: change chosen.
 
     q: (K, M, n); curve: (K, M, n) the joints that a posture's self-motion moves; ended: (K, M) those of which both ends
-    are known, and all that is between; on: (K, M, M) which others, not followed to their ends, are on each one's; tube:
-    (K, M) how far postures may be off their curve. One group's posture may be close to another's; where a self-motion
-    consists of double roots, known to the root of rounding, its postures were taken for many.
+    are known, and all that is between; linked: (K, M, M) which others, not followed to their ends, are on each one's;
+    tube: (K, M) how far postures may be off their curve. One group's posture may be close to another's; where a
+    self-motion consists of double roots, known to the root of rounding, its postures were taken for many.
     """
     arm, task, target, near = goals
     moving = np.asarray(curve.any(axis=2))
     moving[:, 0] = True  # `near`, the first: nothing is said to move where three directions are lost at once
-    some = chosen & moving & ~ended  # what else were on one of these would be one with it
-    on = (on | on.swapaxes(1, 2)) & chosen[:, :, None] & chosen[:, None]
-    k, i, j = np.nonzero((on | some[:, :, None] & some[:, None]) & np.tri(q.shape[1], k=-1, dtype=bool))
+    listed = chosen & moving & ~ended  # what else were on one of these would be one with it
+    linked = (linked | linked.swapaxes(1, 2)) & chosen[:, :, None] & chosen[:, None]
+    k, i, j = np.nonzero((linked | listed[:, :, None] & listed[:, None]) & np.tri(q.shape[1], k=-1, dtype=bool))
     if not len(k):
         return
-    at, apart, unit = q[k, i], newton.difference(arm, q[k, j], q[k, i]), radian_or_reach(arm)
-    same, size = on[k, i, j], np.abs(apart)
+    start, apart, unit = q[k, i], newton.difference(arm, q[k, j], q[k, i]), radian_or_reach(arm)
+    same, size = linked[k, i, j], np.abs(apart)
     # one may be where its own self-motion and the other meet
     turned = np.where(curve[k, i], 0.0, size).max(axis=1)
     thick = np.maximum(tol.TURNED, tube[k, i] + tube[k, j])
@@ -102,12 +102,12 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, o
     slow = ~held & (most > tol.TURNED) & (most < tol.DRIFT)
     held |= np.equal(j, 0)  # `near` stands for all that meet there
     open_ = np.flatnonzero(held & ~same)
-    same[open_] = _reached_straight(arm, task, at[open_], apart[open_], target[k[open_]])
+    same[open_] = _reached_straight(arm, task, start[open_], apart[open_], target[k[open_]])
     left = np.flatnonzero(slow & ~same)
     if len(left):  # whether the self-motion of the one goes round to the other
         joints = curve[k[left], i[left]] | (size[left] > tol.SAME)
-        there, asked = (at[left] + apart[left] * unit)[:, None], np.ones((len(left), 1), bool)
-        same[left] = circuits.on_one(arm, task, at[left], joints, there, asked, target[k[left]])[:, 0]
+        end, compared = (start[left] + apart[left] * unit)[:, None], np.ones((len(left), 1), bool)
+        same[left] = circuits.on_one(arm, task, start[left], joints, end, compared, target[k[left]])[:, 0]
     k, i, j = k[same], i[same], j[same]
     motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
     nearer = motion[k, i] < motion[k, j] - tol.SAME
@@ -122,18 +122,18 @@ def _reached_straight(arm: Arm, task: Task, q: Array, way: Array, target: Array)
     A quarter, half and three quarters of the way are asked, each way round for joints that turn by about 180 degrees.
     They may be off by as much as roots of high order are.
     """
-    out = np.zeros(len(q), bool)
+    reached = np.zeros(len(q), bool)
     if not len(q):
-        return out
-    ways = [_both_ways(arm, one) for one in way]
-    who = np.repeat(np.arange(len(q)), [len(each) for each in ways])
-    start = q[who] + np.array([0.25, 0.5, 0.75])[:, None, None] * np.concatenate(ways) * radian_or_reach(arm)
-    goal = np.concatenate([target[who]] * 3)
-    there, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=3, least=tol.WEAK)
-    off = np.abs(newton.difference(arm, there, start.reshape(-1, arm.n))).max(axis=1)
-    good = (size <= tol.SOLUTION) & (off < 10 * tol.TURNED)
-    out[who[good.reshape(3, -1).all(axis=0)]] = True
-    return out
+        return reached
+    ways = [_both_ways(arm, single) for single in way]
+    index = np.repeat(np.arange(len(q)), [len(choices) for choices in ways])
+    start = q[index] + np.array([0.25, 0.5, 0.75])[:, None, None] * np.concatenate(ways) * radian_or_reach(arm)
+    goal = np.concatenate([target[index]] * 3)
+    landed, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=3, least=tol.WEAK)
+    moved = np.abs(newton.difference(arm, landed, start.reshape(-1, arm.n))).max(axis=1)
+    good = (size <= tol.SOLUTION) & (moved < 10 * tol.TURNED)
+    reached[index[good.reshape(3, -1).all(axis=0)]] = True
+    return reached
 
 
 def _both_ways(arm: Arm, way: Array) -> Array:
@@ -155,9 +155,9 @@ def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Arr
     q that is a step's length; infinite for those that fell back.
     """
     unit = radian_or_reach(arm)
-    there, size = follow(arm, task, q + step[:, None] * push * unit, target)
-    far = (np.abs(there - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
-    return there, size, np.where(far, size - newton.missing(arm, task, q, target), np.inf) / step
+    landed, size = follow(arm, task, q + step[:, None] * push * unit, target)
+    far = (np.abs(landed - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
+    return landed, size, np.where(far, size - newton.missing(arm, task, q, target), np.inf) / step
 
 
 def _equally_long(away: Array, push: Array) -> Bool:
@@ -181,35 +181,35 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     """Whether postures (M, n) can move along any direction that they lose, pulled back by steps of least norm."""
     unit = radian_or_reach(arm)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
-    who, push = null_directions(arm.n, V, nullity)
+    row, push = null_directions(arm.n, V, nullity)
     # Most candidates fall back at once. Where several directions are lost, a short step is drawn back to the meeting.
-    several = nullity[who] > 1
+    several = nullity[row] > 1
     first = np.where(several, 10 * STEP, STEP)
-    _, _, grown = pushed(arm, task, q[who], first, push, target[who])
-    some = np.flatnonzero(grown <= tol.GROWTH)
+    _, _, grown = pushed(arm, task, q[row], first, push, target[row])
+    going = np.flatnonzero(grown <= tol.GROWTH)
     # of those that lose one direction most do not stay on a longer way
-    one = ~several[some] & (grown[some] * first[some] > tol.CLOSED)
-    if one.any():
-        at = some[one]
-        _, _, grown = pushed(arm, task, q[who[at]], 10 * first[at], push[at], target[who[at]])
-        one[one] = ~(grown <= tol.GROWTH)
-        some = some[~one]
-    if not len(some):
+    alone = ~several[going] & (grown[going] * first[going] > tol.CLOSED)
+    if alone.any():
+        tried = going[alone]
+        _, _, grown = pushed(arm, task, q[row[tried]], 10 * first[tried], push[tried], target[row[tried]])
+        alone[alone] = ~(grown <= tol.GROWTH)
+        going = going[~alone]
+    if not len(going):
         return moving, joints
-    who, push, several = who[some], push[some], several[some]
+    row, push, several = row[going], push[going], several[going]
     # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n); a joint that
     # rests at a double root comes half the way back in each
     ways = np.multiply.outer(STEPS[:, 0], [[1.0, 0.6], [-1.0, -0.6]])[..., None, None]
-    start = q[who] + ways * push * unit
-    there, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[who]] * 8), steps=20)
-    away, size = (there.reshape(start.shape)[:, :, 0] - q[who]) / unit, size.reshape(start.shape[:4])
-    grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[who]  # (2, m)
+    start = q[row] + ways * push * unit
+    landed, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[row]] * 8), steps=20)
+    away, size = (landed.reshape(start.shape)[:, :, 0] - q[row]) / unit, size.reshape(start.shape[:4])
+    grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[row]  # (2, m)
     short, long = (grown <= tol.GROWTH * STEPS) & _equally_long(away, push)
     # where the residual grows at all, it must do so slowly as far as the long step: near a fold the first tenth of a
     # radian costs nothing
     along = (short & ((grown[0] <= tol.CLOSED) | long)) | (long & several)
-    np.logical_or.at(moving, who, along)
-    np.logical_or.at(joints, who, along[:, None] & _moving_joints(away, long))
+    np.logical_or.at(moving, row, along)
+    np.logical_or.at(joints, row, along[:, None] & _moving_joints(away, long))
     return moving, joints
 
 
@@ -220,16 +220,16 @@ def on_surface(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: A
     more directions are lost surfaces meet, and rounding chooses the vectors: there any of `null_directions` tells.
     """
     two, more = np.flatnonzero(nullity < 3), np.flatnonzero(nullity > 2)
-    who, push = two, V[two, arm.n - 1] + 0.7 * V[two, arm.n - 2]
+    row, push = two, V[two, arm.n - 1] + 0.7 * V[two, arm.n - 2]
     if len(more):
-        others, further = null_directions(arm.n, V[more], nullity[more])
-        who, push = np.concatenate([who, more[others]]), np.concatenate([push, further])
-    there, size = follow(arm, task, q[who] + 10 * STEP * push * radian_or_reach(arm), target[who])
-    lost = newton.null_space(arm, task, there, target[who])[2]
-    away = np.abs(newton.difference(arm, there, q[who])).max(axis=1)
-    out = np.zeros(len(q), bool)
-    np.logical_or.at(out, who, (size <= tol.SOLUTION) & (lost > 1) & (away > 3 * STEP))
-    return out
+        more_rows, further = null_directions(arm.n, V[more], nullity[more])
+        row, push = np.concatenate([row, more[more_rows]]), np.concatenate([push, further])
+    landed, size = follow(arm, task, q[row] + 10 * STEP * push * radian_or_reach(arm), target[row])
+    lost = newton.null_space(arm, task, landed, target[row])[2]
+    away = np.abs(newton.difference(arm, landed, q[row])).max(axis=1)
+    surface = np.zeros(len(q), bool)
+    np.logical_or.at(surface, row, (size <= tol.SOLUTION) & (lost > 1) & (away > 3 * STEP))
+    return surface
 
 
 def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
@@ -238,12 +238,12 @@ def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
     V: (M, n, n) right singular vectors. Each direction is there once, whichever sign it has.
     """
     pushes = list(_null_directions(n, V, nullity))
-    who, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
+    row, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
     first = (np.abs(push) > 0.1).argmax(axis=1)
     ahead = np.sign(np.take_along_axis(push, first[:, None], axis=1))
-    _, once = np.unique(np.column_stack([who, np.rint(1e6 * push * ahead)]), axis=0, return_index=True)
+    _, once = np.unique(np.column_stack([row, np.rint(1e6 * push * ahead)]), axis=0, return_index=True)
     once.sort()
-    return who[once], push[once]
+    return row[once], push[once]
 
 
 def _normals(held: Array) -> Array:
@@ -259,20 +259,20 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
     is pushed as far as the null space lets it, and of k dimensions any k - 1 joints are held.
     """
     for index in range(int(nullity.max())):
-        who = np.flatnonzero(nullity > index)
-        yield who, V[who, n - 1 - index]
+        row = np.flatnonzero(nullity > index)
+        yield row, V[row, n - 1 - index]
     for k in range(2, int(nullity.max()) + 1):
-        some = np.flatnonzero(nullity == k)
-        basis = V[some, ::-1][:, :k]
+        rows = np.flatnonzero(nullity == k)
+        basis = V[rows, ::-1][:, :k]
         held = list(itertools.combinations(range(n), k - 1))
-        yield _long_directions(some, np.einsum("cmk,mkn->cmn", _normals(np.moveaxis(basis[:, :, held], 2, 0)), basis))
-    many = np.flatnonzero(nullity > 1)
-    in_null = (np.arange(n) >= n - nullity[many][:, None])[:, :, None]
-    yield _long_directions(many, np.moveaxis(V[many].swapaxes(1, 2) @ np.where(in_null, V[many], 0.0), 1, 0))
+        yield _long_directions(rows, np.einsum("cmk,mkn->cmn", _normals(np.moveaxis(basis[:, :, held], 2, 0)), basis))
+    several = np.flatnonzero(nullity > 1)
+    in_null = (np.arange(n) >= n - nullity[several][:, None])[:, :, None]
+    yield _long_directions(several, np.moveaxis(V[several].swapaxes(1, 2) @ np.where(in_null, V[several], 0.0), 1, 0))
 
 
-def _long_directions(who: Int, push: Array) -> tuple[Int, Array]:
+def _long_directions(row: Int, push: Array) -> tuple[Int, Array]:
     """Those of directions (C, m, n) of postures (m,) that are long enough, of length one."""
     size = np.linalg.norm(push, axis=2)
     far = size > 0.1
-    return np.broadcast_to(who, size.shape)[far], push[far] / size[far][:, None]
+    return np.broadcast_to(row, size.shape)[far], push[far] / size[far][:, None]

@@ -23,13 +23,13 @@ from armkin.model.lock_joints import lock
 Pair = tuple[int, int, float]  # joints about one line, and the way of the first for a turn of the second
 
 
-def swept(goals: Goals, seen: Examined) -> Examined:
+def swept(goals: Goals, decision: Examined) -> Examined:
     """The same, surfaces listed by the curves that they are swept from."""
     if goals.task.orientation == "none":  # sums of joint values are those of all joints
-        return seen
-    for k in np.flatnonzero(seen.surface):
-        seen = _with_curves(goals, seen, k)
-    return seen
+        return decision
+    for k in np.flatnonzero(decision.surface):
+        decision = _with_curves(goals, decision, k)
+    return decision
 
 
 def no_more(target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
@@ -37,29 +37,29 @@ def no_more(target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
     return np.full((len(near), 1, near.shape[1]), np.nan), np.zeros(1, np.int64), np.zeros(len(near), bool)
 
 
-def _with_curves(goals: Goals, seen: Examined, k: np.intp) -> Examined:
+def _with_curves(goals: Goals, decision: Examined, k: np.intp) -> Examined:
     """The same, with a posture of each curve in place of those on surfaces of target k.
 
     Where three joints are about one line, the two of them that sweep the most surfaces tell.
     """
-    arm, one = goals.arm, goals.of(np.array([k]))
-    q, label = seen.q[k, seen.valid[k]], seen.label[k, seen.valid[k]]
-    at, rest = _jacobians(one, q)
-    found = [_curves(one, q[on], label[on], pair) for pair, on in _pairs(arm, at, rest)]
-    if not found:
-        return seen
-    rows, names, free, pair = max(found, key=lambda curves: len(curves[0]))
+    arm, subset = goals.arm, goals.of(np.array([k]))
+    q, label = decision.q[k, decision.valid[k]], decision.label[k, decision.valid[k]]
+    J, rests = _jacobians(subset, q)
+    options = [_curves(subset, q[about], label[about], pair) for pair, about in _pairs(arm, J, rests)]
+    if not options:
+        return decision
+    rows, names, free, pair = max(options, key=lambda curves: len(curves[0]))
     if not len(rows):
-        return seen
-    on = _about_one_line(at, pair)
-    rows, names = np.concatenate([q[~on], rows]), np.append(label[~on], names)
-    q, valid, label = (widened(array, len(rows)) for array in (seen.q, seen.valid, seen.label))
-    out = seen._replace(q=q, valid=valid, label=label, free=seen.free.copy())
-    there = np.arange(out.q.shape[1]) < len(rows)
-    out.q[k], out.valid[k], out.label[k] = np.nan, there, OWN
-    out.q[k, there], out.label[k, there] = rows, names
-    out.free[k] |= free
-    return out
+        return decision
+    about = _about_one_line(J, pair)
+    rows, names = np.concatenate([q[~about], rows]), np.append(label[~about], names)
+    q, valid, label = (widened(array, len(rows)) for array in (decision.q, decision.valid, decision.label))
+    listed = decision._replace(q=q, valid=valid, label=label, free=decision.free.copy())
+    used = np.arange(listed.q.shape[1]) < len(rows)
+    listed.q[k], listed.valid[k], listed.label[k] = np.nan, used, OWN
+    listed.q[k, used], listed.label[k, used] = rows, names
+    listed.free[k] |= free
+    return listed
 
 
 def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> tuple[Array, Int, Bool, Pair]:
@@ -69,18 +69,18 @@ def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> tuple[Array, Int,
     i, j, way = pair
     turned = q.copy()
     turned[:, i] += way * (turned[:, j] - near[j])
-    others = np.delete(np.arange(arm.n), j)
-    rest = lock(arm, {arm.joint_names[j]: float(near[j])})
-    starts = newton.many_starts(rest, task, target, np.ones(1, bool))[0]
+    joints = np.delete(np.arange(arm.n), j)
+    held_arm = lock(arm, {arm.joint_names[j]: float(near[j])})
+    starts = newton.many_starts(held_arm, task, target, np.ones(1, bool))[0]
     starts = starts[~np.isnan(starts[:, 0])]
     marks = np.concatenate([label, np.full(len(starts), OWN)])
-    seeds = Seeds.of(np.concatenate([turned[:, others], starts])[None], marks[None])
-    found = examine(Goals(rest, task, target, near[None, others]), seeds, no_more)
-    there = found.valid[0]
-    rows, free = np.insert(found.q[0, there], j, near[j], axis=1), np.insert(found.free[0], j, True)
+    seeds = Seeds.of(np.concatenate([turned[:, joints], starts])[None], marks[None])
+    decision = examine(Goals(held_arm, task, target, near[None, joints]), seeds, no_more)
+    valid = decision.valid[0]
+    rows, free = np.insert(decision.q[0, valid], j, near[j], axis=1), np.insert(decision.free[0], j, True)
     free[i] = True
-    on = _about_one_line(_jacobians(goals, rows)[0], pair)
-    return rows[on], found.label[0, there][on], free, pair
+    about = _about_one_line(_jacobians(goals, rows)[0], pair)
+    return rows[about], decision.label[0, valid][about], free, pair
 
 
 def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:
@@ -107,10 +107,10 @@ def _pairs(arm: Arm, J: Array, rests: Bool) -> list[tuple[Pair, Bool]]:
     """Pairs of joints that are about one line in some posture in which those between them rest; all postures (M,) in
     which they are about one.
     """
-    out = []
+    pairs = []
     for i, j in itertools.combinations(np.flatnonzero(~arm.prismatic).tolist(), 2):
         for way in (1.0, -1.0):
-            on = _about_one_line(J, (i, j, way))
-            if (on & rests[:, i + 1 : j].all(axis=1)).any():
-                out.append(((i, j, way), on))
-    return out
+            about = _about_one_line(J, (i, j, way))
+            if (about & rests[:, i + 1 : j].all(axis=1)).any():
+                pairs.append(((i, j, way), about))
+    return pairs

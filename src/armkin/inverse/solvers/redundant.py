@@ -64,9 +64,9 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
     for joint in ([arm.n - 1] if task.orientation == "full" or _turns_about_the_tool(arm, task) else []) + [0]:
         if arm.prismatic[joint]:
             continue
-        others = lock(arm, {arm.joint_names[joint]: 0.0})
+        rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
         try:
-            options.append(Redundancy(joint, others, task, solver(others, task.name)[1]))
+            options.append(Redundancy(joint, rest_arm, task, solver(rest_arm, task.name)[1]))
         except UsageError:
             continue
     closed = [option for option in options if option.geometry.pairs is not None]
@@ -79,9 +79,9 @@ def nearly_closed(arm: Arm, free: Redundancy) -> Redundancy:
     for joint in (arm.n - 1, 0):
         if free.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
             continue
-        others = lock(arm, {arm.joint_names[joint]: 0.0})
-        for alike in (module.recognise(others, free.task, tol.NEAR) for module in (spherical, three_parallel)):
-            if alike is not None and (option := Redundancy(joint, others, free.task, alike)).by_formula:
+        rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
+        for alike in (module.recognise(rest_arm, free.task, tol.NEAR) for module in (spherical, three_parallel)):
+            if alike is not None and (option := Redundancy(joint, rest_arm, free.task, alike)).by_formula:
                 return option
     return free
 
