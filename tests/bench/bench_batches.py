@@ -69,9 +69,9 @@ def c_alone(fast: Any, T: np.ndarray) -> float:
 
     def timed(*arguments: Any) -> int:
         start = time.process_time()
-        done = int(call(*arguments))
+        answered = int(call(*arguments))
         spent[0] += time.process_time() - start
-        return done
+        return answered
 
     inner._batch = timed
     fast.ik(T)
@@ -86,8 +86,8 @@ def main() -> None:
         arm = armkin.load(name)
         fast = armkin.compile(arm)
         for kind in SETS:
-            few = FEW if kind == "random" and name != "jaco_j2n6s300" else FEW // 5
-            for size in SIZES if kind == "random" else (few,):
+            slow_count = FEW if kind == "random" and name != "jaco_j2n6s300" else FEW // 5
+            for size in SIZES if kind == "random" else (slow_count,):
                 if size > (largest if name != "jaco_j2n6s300" else min(largest, 1_000)):
                     continue
                 T = targets(arm, kind, size)
@@ -101,11 +101,11 @@ def main() -> None:
                     1e6 * min(c_alone(fast, T) for _ in range(RUNS)) / size,
                 )
                 worst = ""
-                if size in (few, FEW):
-                    some = range(min(ALONE, size))
+                if size in (slow_count, FEW):
+                    sampled = range(min(ALONE, size))
                     singles = [
-                        max(1e6 * least(lambda k=k, f=f: f(T[k]), 2) for k in some)  # type: ignore[misc]
-                        for f in (lambda one: armkin.ik(arm, one), fast.ik)
+                        max(1e6 * least(lambda k=k, f=f: f(T[k]), 2) for k in sampled)  # type: ignore[misc]
+                        for f in (lambda goal: armkin.ik(arm, goal), fast.ik)
                     ]
                     worst = f"{singles[0]:10.0f} / {singles[1]:.0f}"
                 print(f"{name:14s} {kind:12s} {size:7d} {plain:9.2f} {quick:12.2f} {inside:11.2f}  {worst}", flush=True)

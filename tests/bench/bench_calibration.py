@@ -34,21 +34,21 @@ def figures() -> None:
     print("| arm | noise/mm | play/deg | file/mm | calibrated/mm | prototype/mm | s |\n|---|---|---|---|---|---|---|")
     for name, noise, play, figure in FIGURES:
         arm = armkin.load(name)
-        found = []
+        rows = []
         for seed in range(4):
             rng = np.random.default_rng(100 + seed)
-            true = built(arm, seed)
+            real_arm = built(arm, seed)
             c = commands(arm, 60, rng)
-            x = measured(true, c, rng, noise=noise)
+            x = measured(real_arm, c, rng, noise=noise)
             if play:
-                x += true.tips(c + np.radians(play) * rng.uniform(-1, 1, c.shape)) - true.tips(c)
+                x += real_arm.tips(c + np.radians(play) * rng.uniform(-1, 1, c.shape)) - real_arm.tips(c)
             began = time.process_time()
-            new = armkin.calibrate(arm, c, x).arm
+            calibrated = armkin.calibrate(arm, c, x).arm
             seconds = time.process_time() - began
             unseen = commands(arm, 1000, rng)
-            want = true.tips(unseen)
-            found.append([*(rms(armkin.fk(a, unseen)[:, :3, 3], want) for a in (arm, new)), seconds])
-        before, after, seconds = np.median(found, axis=0)
+            want = real_arm.tips(unseen)
+            rows.append([*(rms(armkin.fk(a, unseen)[:, :3, 3], want) for a in (arm, calibrated)), seconds])
+        before, after, seconds = np.median(rows, axis=0)
         flag = "" if after <= 1.5 * figure else " (above the bar)"
         print(
             f"| {name} | {noise} | {play} | {before:.1f} | {after:.3f}{flag} | {figure} | {seconds:.1f} |", flush=True
@@ -64,14 +64,14 @@ def harm(seeds: int) -> None:
             good = 0
             for seed in range(seeds):
                 rng = np.random.default_rng(1000 + seed)
-                true = Built(arm, np.ones(arm.n)) if base is None else built(arm, seed, base=base)
+                real_arm = Built(arm, np.ones(arm.n)) if base is None else built(arm, seed, base=base)
                 c, unseen = commands(arm, count, rng), commands(arm, 300, rng)
-                new = armkin.calibrate(arm, c, measured(true, c, rng, noise=noise, wrong=0.0)).arm
-                tips = measured(true, unseen, rng, noise=noise, wrong=0.0)
-                after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (new, arm))
+                calibrated = armkin.calibrate(arm, c, measured(real_arm, c, rng, noise=noise, wrong=0.0)).arm
+                tips = measured(real_arm, unseen, rng, noise=noise, wrong=0.0)
+                after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibrated, arm))
                 good += after <= 1.05 * before
-            said = {True: "yes", False: "no", None: "file right"}[base]
-            print(f"| {name} | {count} | {noise} | {said} | {100 * good / seeds:.1f} % |", flush=True)
+            helped = {True: "yes", False: "no", None: "file right"}[base]
+            print(f"| {name} | {count} | {noise} | {helped} | {100 * good / seeds:.1f} % |", flush=True)
 
 
 if __name__ == "__main__":

@@ -58,13 +58,13 @@ def write(values: np.ndarray, folder: Path, name: str) -> dict[str, Path]:
     import pyarrow.parquet as parquet
 
     columns = dict(zip(LABELS, values.T, strict=True))
-    found = {end: folder / f"{name}.{end}" for end in ("csv", "npz", "parquet")}
-    with found["csv"].open("w") as file:
+    path_of = {end: folder / f"{name}.{end}" for end in ("csv", "npz", "parquet")}
+    with path_of["csv"].open("w") as file:
         file.write(",".join(LABELS) + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in values.tolist())
-    np.savez(found["npz"], **columns)
-    parquet.write_table(pa.table(columns), found["parquet"])
-    return found | {"all branches": found["csv"]}
+    np.savez(path_of["npz"], **columns)
+    parquet.write_table(pa.table(columns), path_of["parquet"])
+    return path_of | {"all branches": path_of["csv"]}
 
 
 def spent(*words: Any, times: int = 3) -> Spent:
@@ -72,13 +72,13 @@ def spent(*words: Any, times: int = 3) -> Spent:
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
     least = Spent(np.inf, np.inf)
     for _ in range(times):
-        began, at = _children(), time.perf_counter()
+        began, clock = _children(), time.perf_counter()
         subprocess.run(
             [sys.executable, "-m", "armkin", *map(str, words)],
             env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False,
         )  # fmt: skip
-        one = Spent(_children() - began, time.perf_counter() - at)
-        least = Spent(min(one.cpu, least.cpu), min(one.wall, least.wall))
+        cost = Spent(_children() - began, time.perf_counter() - clock)
+        least = Spent(min(cost.cpu, least.cpu), min(cost.wall, least.wall))
     return least
 
 
@@ -87,10 +87,10 @@ def _children() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def batch(given: Path, folder: Path, *more: Any) -> tuple[Any, ...]:
+def batch(source: Path, folder: Path, *more: Any) -> tuple[Any, ...]:
     """The command."""
-    out = folder / f"out{given.suffix}"
-    return ("ik", "ur5e", "--batch", given, "--compiled", "--out", out, *more)
+    target = folder / f"out{source.suffix}"
+    return ("ik", "ur5e", "--batch", source, "--compiled", "--out", target, *more)
 
 
 def reference() -> float:
@@ -111,13 +111,16 @@ def rows(folder: Path, count: int) -> bool:
         f"a pose solved in numpy: {reference():.2f} us here, {AT_REST:g} on a machine at rest (docs/figures.md)",
         flush=True,
     )
-    few, many = write(values[: count // 10], folder, "few"), write(values, folder, "many")
+    tenth, every_row = write(values[: count // 10], folder, "few"), write(values, folder, "many")
     for name, bar in BARS.items():
         more = ("--all-branches",) if name == "all branches" else ()
-        small, large = (spent(*batch(files[name], folder, *more)).cpu for files in (few, many))
-        slope, whole = (large - small) / (0.9 * count) * 1e6, large / count * 1e6
+        small, large = (spent(*batch(files[name], folder, *more)).cpu for files in (tenth, every_row))
+        slope, with_start = (large - small) / (0.9 * count) * 1e6, large / count * 1e6
         good &= slope <= bar
-        print(f"{name:13}{count:,} rows: {slope:5.2f} us a row, {whole:5.2f} with the start (bar {bar:g})", flush=True)
+        print(
+            f"{name:13}{count:,} rows: {slope:5.2f} us a row, {with_start:5.2f} with the start (bar {bar:g})",
+            flush=True,
+        )
     return good
 
 
@@ -134,10 +137,10 @@ def unsolvable(folder: Path, count: int) -> bool:
         "a little too far": ("ur5e", typed(arm, straight)),
     }
     for name, (robot, values) in cases.items():
-        many = write(values, folder, "off")["csv"]
-        few = write(values[: len(values) // 10], folder, "few")["csv"]
-        each = [spent("ik", robot, *batch(path, folder)[2:]).cpu for path in (few, many)]
-        rate = 0.9 * len(values) / max(each[1] - each[0], 1e-3)
+        every_row = write(values, folder, "off")["csv"]
+        tenth = write(values[: len(values) // 10], folder, "few")["csv"]
+        costs = [spent("ik", robot, *batch(path, folder)[2:]).cpu for path in (tenth, every_row)]
+        rate = 0.9 * len(values) / max(costs[1] - costs[0], 1e-3)
         good &= rate >= UNSOLVABLE
         print(f"{name:17}{len(values):,} rows: {rate:,.0f} a second (bar {UNSOLVABLE:,})", flush=True)
     return good
@@ -145,29 +148,29 @@ def unsolvable(folder: Path, count: int) -> bool:
 
 def workers(folder: Path, count: int) -> bool:
     """Two processes against one: wall time, and what it would be on two cores that do nothing else."""
-    given = write(poses(count), folder, "many")["csv"]
-    one, two = (spent(*batch(given, folder, "--workers", n)) for n in (1, 2))
-    print(f"workers      1: {one.cpu:.2f} s of CPU, {one.wall:.2f} s; 2: {two.cpu:.2f} s, {two.wall:.2f} s")
-    faster, most = one.wall / two.wall, 2 * one.cpu / two.cpu
+    source = write(poses(count), folder, "many")["csv"]
+    alone, two = (spent(*batch(source, folder, "--workers", n)) for n in (1, 2))
+    print(f"workers      1: {alone.cpu:.2f} s of CPU, {alone.wall:.2f} s; 2: {two.cpu:.2f} s, {two.wall:.2f} s")
+    faster, most = alone.wall / two.wall, 2 * alone.cpu / two.cpu
     print(f"{'':13}{faster:.2f} times as fast (bar {FASTER}), at most {most:.2f} by the CPU time")
-    return one.wall / two.wall >= FASTER
+    return alone.wall / two.wall >= FASTER
 
 
 def memory(folder: Path, count: int) -> bool:
     """Memory of a process for some rows, and for ten times as many: the same hundred thousand again and again."""
-    block, found = min(count // 10, 100_000), {}
+    block, peak_of = min(count // 10, 100_000), {}
     heading, _, lines = write(poses(block), folder, "block")["csv"].read_text().partition("\n")
     for name, size in (("few", count // 10), ("many", count)):
-        given = folder / f"{name}.csv"
-        with given.open("w") as file:
+        source = folder / f"{name}.csv"
+        with source.open("w") as file:
             file.write(f"{heading}\n")
             file.writelines(lines for _ in range(size // block))
-        words = [sys.executable, "-m", "armkin", *map(str, batch(given, folder))]
+        words = [sys.executable, "-m", "armkin", *map(str, batch(source, folder))]
         # by way of a small process: what a process had before it became the command counts as the command's
         completed = subprocess.run([sys.executable, "-c", _LARGEST, *words], capture_output=True, text=True, check=True)
-        found[name] = int(completed.stdout) / 1024
-        print(f"memory       {size:,} rows: {found[name]:.0f} MB (bar {MEMORY})", flush=True)
-    return found["many"] <= MEMORY
+        peak_of[name] = int(completed.stdout) / 1024
+        print(f"memory       {size:,} rows: {peak_of[name]:.0f} MB (bar {MEMORY})", flush=True)
+    return peak_of["many"] <= MEMORY
 
 
 _LARGEST = """
@@ -247,7 +250,7 @@ def _beside(address: str, pids: tuple[int, int], work: Any, job: float, count: i
     for _ in in_order(Engine(cluster=address), work, job, [bytes(1 << 20)] * count):
         pass
     after = [*map(_used, pids), time.process_time(), time.perf_counter()]
-    return Beside(*((new - old) / count for old, new in zip(before, after, strict=True)))
+    return Beside(*((end - begin) / count for begin, end in zip(before, after, strict=True)))
 
 
 def _address(file: Path) -> str:
@@ -272,10 +275,10 @@ def results() -> Iterator[bool]:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--rows", type=int, default=200_000)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=[])
-    asked = parser.parse_args()
-    for name in asked.parts or PARTS:
+    arguments = parser.parse_args()
+    for name in arguments.parts or PARTS:
         with tempfile.TemporaryDirectory() as folder:
-            yield PARTS[name](Path(folder), asked.rows)
+            yield PARTS[name](Path(folder), arguments.rows)
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ def agree(count: int, only: str | None) -> None:
         arm = armkin.load(ROBOTS / f"{name}.yaml")
         N = int(count * share) if not only else count
         with tempfile.TemporaryDirectory() as folder:
-            told = agreement(arm, Path(folder), N)
+            compared = agreement(arm, Path(folder), N)
         q = random_joints(arm, N)
         goal = targets(arm, None, q)
         a, b = armkin.ik(arm, goal), armkin.compile(arm).ik(goal)
@@ -95,11 +95,11 @@ def agree(count: int, only: str | None) -> None:
         )
         unlike = int(np.sum(~alike)) if np.ndim(alike) else N
         print(
-            f"| {name} | {N} | {told.edges} | {len(told.different)} | {told.largest:.0e} | {told.largest_fk:.0e} "
-            f"| {unlike} |",
+            f"| {name} | {N} | {compared.edges} | {len(compared.different)} | {compared.largest:.0e} "
+            f"| {compared.largest_fk:.0e} | {unlike} |",
             flush=True,
         )
-        for line in told.different[:5]:
+        for line in compared.different[:5]:
             print("   ", line)
 
 

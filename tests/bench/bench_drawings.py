@@ -21,10 +21,13 @@ BROKEN = ("G1 X", "G33 X1", "G1 X1 X2", "G0 G1 X1", "G1 X#1", "G2 X1 Y1", "G1 X1
 
 def main(count: int) -> None:
     """Print the figures."""
-    for name, off in (("programs", program_off), ("drawings", drawing_off)):
-        found = np.array([off(seed) for seed in range(count)])
-        print(f"{name}: {int((found <= 0.01).sum())} of {count} within 0.01 mm; worst {found.max():.5f} mm", flush=True)
-        print("  beyond:", np.flatnonzero(found > 0.01).tolist())
+    for name, distance in (("programs", program_off), ("drawings", drawing_off)):
+        distances = np.array([distance(seed) for seed in range(count)])
+        print(
+            f"{name}: {int((distances <= 0.01).sum())} of {count} within 0.01 mm; worst {distances.max():.5f} mm",
+            flush=True,
+        )
+        print("  beyond:", np.flatnonzero(distances > 0.01).tolist())
     right = 0
     for seed in range(count):
         lines, rng = random_drawings.program(seed).splitlines(), np.random.default_rng(seed)

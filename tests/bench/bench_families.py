@@ -55,16 +55,16 @@ def row(name: str, count: int, brute: int) -> str:
         start = time.process_time()
         armkin.ik(arm, target[k])
         alone.append(time.process_time() - start)
-    places, off = by_brute_force(arm, free.joint, target[:brute])
+    places, wrong_counts = by_brute_force(arm, free.joint, target[:brute])
     return (
         f"{name:12s} {count:7d} {1e3 * spent / count:8.2f} {1e3 * float(np.median(alone)):10.1f} {rows / count:10.2f}"
-        f" {lost:5d} {missed:7d} {places:13d} {off:9d}"
+        f" {lost:5d} {missed:7d} {places:13d} {wrong_counts:9d}"
     )
 
 
 def by_brute_force(arm: armkin.Arm, joint: int, target: np.ndarray) -> tuple[int, int]:
     """How many places were asked, and at how many the listed intervals and the arm with the joint held disagree."""
-    s, places, off = armkin.ik(arm, target), 0, 0
+    s, places, wrong_counts = armkin.ik(arm, target), 0, 0
     assert s.interval is not None
     for k in range(len(target)):
         legal = s.interval[k][s.within_limits[k]]
@@ -74,9 +74,9 @@ def by_brute_force(arm: armkin.Arm, joint: int, target: np.ndarray) -> tuple[int
         for value in [*beside.ravel(), *(0.5 * (ends[1:] + ends[:-1]))]:
             if arm.lower[joint] < value < arm.upper[joint]:
                 places += 1
-                own = held_answers(arm, joint, float(value), target[k], None)
-                off += int(covers(arm, legal, float(value), 0.0).sum()) != len(own)
-    return places, off
+                held = held_answers(arm, joint, float(value), target[k], None)
+                wrong_counts += int(covers(arm, legal, float(value), 0.0).sum()) != len(held)
+    return places, wrong_counts
 
 
 if __name__ == "__main__":

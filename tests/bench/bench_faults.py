@@ -133,14 +133,14 @@ def _go_on(board: EmulatedBoard, position: str, wrong: list[str]) -> str:
             wrong.append("a lost position was gone on from")
         return "refused"
     how = "resumed"
-    done = run_process(*send(board, "--resume"))
-    if done.code == 2:
-        how, done = "sent again", run_process(*send(board))
+    completed = run_process(*send(board, "--resume"))
+    if completed.code == 2:
+        how, completed = "sent again", run_process(*send(board))
     for _ in range(5):
-        if done.code == 5:
-            how, done = "resumed twice", run_process(*send(board, "--resume"))
-    if done.code or at_rest(board) != COUNTS:
-        wrong.append(f"it does not go on: {done.code} {done.err}")
+        if completed.code == 5:
+            how, completed = "resumed twice", run_process(*send(board, "--resume"))
+    if completed.code or at_rest(board) != COUNTS:
+        wrong.append(f"it does not go on: {completed.code} {completed.err}")
     return how
 
 
@@ -156,9 +156,9 @@ def main() -> None:
         with ThreadPoolExecutor(arguments.jobs) as pool:
             struck = list(pool.map(one, faults, seeds))
         good = sum(not s.wrong for s in struck)
-        told = ", ".join(f"{n} {what}" for what, n in Counter(s.position for s in struck).most_common())
-        onward = ", ".join(f"{n} {what}" for what, n in Counter(s.onward for s in struck).most_common())
-        print(f"{kind:16} truthful {good} of {len(faults)}; position {told}; then {onward}", flush=True)
+        positions = ", ".join(f"{n} {outcome}" for outcome, n in Counter(s.position for s in struck).most_common())
+        onward = ", ".join(f"{n} {outcome}" for outcome, n in Counter(s.onward for s in struck).most_common())
+        print(f"{kind:16} truthful {good} of {len(faults)}; position {positions}; then {onward}", flush=True)
         for line in (w for s in struck for w in s.wrong):
             print("   ", line, flush=True)
 

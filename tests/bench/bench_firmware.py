@@ -29,13 +29,13 @@ def flash_and_ram(board: str) -> tuple[int, int]:
     """Bytes of flash and of variables."""
     built = build_firmware(board)
     size = ["arm-none-eabi-size", str(BUILD / f"{board}.elf")] if board == PICO else ["avr-size", str(built)]
-    out = subprocess.run(size, capture_output=True, text=True, check=True).stdout
-    text, data, bss = map(int, out.splitlines()[1].split()[:3])
+    listing = subprocess.run(size, capture_output=True, text=True, check=True).stdout
+    text, data, bss = map(int, listing.splitlines()[1].split()[:3])
     return text + data, data + bss
 
 
-def row(what: str, ours: str, grbl: str = "") -> None:
-    print(f"{what:46} {ours:34} {grbl}", flush=True)
+def row(label: str, ours: str, grbl: str = "") -> None:
+    print(f"{label:46} {ours:34} {grbl}", flush=True)
 
 
 SPLINE: dict[str, Any] = {
@@ -59,24 +59,24 @@ def curves(places: int) -> None:
         row(f"{name}, {laid.curve.duration:.2f} s", figures)
         for cable in (False, True):
             rng = np.random.default_rng(3)
-            got = [curve_on_pins.held(laid, s, cable=cable) for s in rng.uniform(0.05, 0.9, places)]
-            known, on = sum(g.known for g in got), sum(g.goes_on for g in got)
-            off, accel = max(g.off_way_mm for g in got), max(g.accel for g in got)
-            figures = f"known {known}, go on {on}, off {off:.3f} mm, {accel:.2f} of max_accel"
+            helds = [curve_on_pins.held(laid, s, cable=cable) for s in rng.uniform(0.05, 0.9, places)]
+            known_count, going_on = sum(g.known for g in helds), sum(g.goes_on for g in helds)
+            farthest, accel = max(g.off_way_mm for g in helds), max(g.accel for g in helds)
+            figures = f"known {known_count}, go on {going_on}, off {farthest:.3f} mm, {accel:.2f} of max_accel"
             row(f"{name}: {'cable cut' if cable else 'held'} at {places} places", figures)
 
 
 def waypoint_rows() -> None:
     """`armkin send --batch ROWS --blend` through 1,000 waypoints, in real time."""
-    got = waypoints_on_pins.stream(1000)
+    streamed = waypoints_on_pins.stream(1000)
     row(
         "waypoints streamed, this far apart, within",
-        f"{got.waypoints}, {got.apart[0]:.1f} to {got.apart[1]:.1f} deg, {got.seconds:.1f} s",
+        f"{streamed.waypoints}, {streamed.apart[0]:.1f} to {streamed.apart[1]:.1f} deg, {streamed.seconds:.1f} s",
     )
-    row("  longest without a step / as planned", f"{got.gap_ms:.2f} / {got.planned_gap_ms:.2f} ms")
-    row("  slowest between the ramps at either end", f"{got.slowest:.1f} deg/s")
-    row("  off PROTOCOL.md's arithmetic, segments/s", f"{got.late_us:.1f} us, {got.segments_a_second:.0f}")
-    row("  stops, faults", "none" if got.good else f"FAULTS {got.error}")
+    row("  longest without a step / as planned", f"{streamed.gap_ms:.2f} / {streamed.planned_gap_ms:.2f} ms")
+    row("  slowest between the ramps at either end", f"{streamed.slowest:.1f} deg/s")
+    row("  off PROTOCOL.md's arithmetic, segments/s", f"{streamed.late_us:.1f} us, {streamed.segments_a_second:.0f}")
+    row("  stops, faults", "none" if streamed.good else f"FAULTS {streamed.error}")
 
 
 def pico_rows() -> None:
@@ -84,24 +84,24 @@ def pico_rows() -> None:
     flash, ram = flash_and_ram(PICO)
     row("pico6: flash, variables", f"{flash} B, {ram} B")
     for interval, held_off_us in ((pico.CLOCK // 100_000, 0.0), (100, 0.0), (100, 0.48)):
-        got = pico.stepping(interval, held_off_us=held_off_us)
-        fault = "" if got.exact and not (got.overruns or got.violations) else "  FAULTS"
-        what = f"pico6: {got.rate / 1000:.0f} kHz on six axes, farthest edge"
-        what += f", interrupts {held_off_us} us late" if held_off_us else ""
-        row(what, f"{got.off_us:.3f} us, {got.overruns} overruns, {100 * got.asleep:.0f} % idle{fault}")
+        measured = pico.stepping(interval, held_off_us=held_off_us)
+        fault = "" if measured.exact and not (measured.overruns or measured.violations) else "  FAULTS"
+        label = f"pico6: {measured.rate / 1000:.0f} kHz on six axes, farthest edge"
+        label += f", interrupts {held_off_us} us late" if held_off_us else ""
+        row(label, f"{measured.off_us:.3f} us, {measured.overruns} overruns, {100 * measured.asleep:.0f} % idle{fault}")
     row("pico6: first step after the first batch", f"{pico.first_step_ms('uart'):.2f} ms")
-    for by, axes, rates, batch in (
+    for link, axes, rates, batch in (
         ("USB", pico.SIX, (10_000, 15_000, 20_000), 11),
         ("UART at 250000", (0, 1, 2, 3), (1_400, 1_550), 14),
         ("UART at 250000", pico.SIX, (1_000, 1_100), 11),
     ):
         best = 0.0
         for rate in rates:
-            got_rate, exact = pico.segments_per_second("usb" if by == "USB" else "uart", axes, rate, batch)
+            got_rate, exact = pico.segments_per_second("usb" if link == "USB" else "uart", axes, rate, batch)
             if not exact:
                 break
             best = got_rate
-        row(f"pico6: segments a second of {len(axes)} axes, {by}", f"{best:.0f}")
+        row(f"pico6: segments a second of {len(axes)} axes, {link}", f"{best:.0f}")
 
 
 def chip_rows() -> None:
@@ -143,10 +143,10 @@ def chip_rows() -> None:
 def smooth_rows() -> None:
     """Step intervals against the time law's."""
     for speed, grbl in ((1.0, "73 us (X)"), (0.2, "88 us (X)"), (0.05, "354 us (X)"), (0.02, ""), (0.01, "")):
-        got = measure.smoothness(speed)
-        figures = " / ".join(f"{one.peak_to_peak_us:.0f}" for one in got)
+        measured = measure.smoothness(speed)
+        figures = " / ".join(f"{axis.peak_to_peak_us:.0f}" for axis in measured)
         row(f"step intervals at {speed:.0%}, X / Y / Z, peak to peak", f"{figures} us", grbl)
-        worst = max(one.worst for one in got)
+        worst = max(axis.worst for axis in measured)
         row("  worst of all, ramps included, of max(60 us, 2 %)", f"{worst:.0%}")
 
 

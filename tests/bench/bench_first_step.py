@@ -33,7 +33,7 @@ from armkin.errors import LinkError
 def first_steps(runs: int) -> tuple[list[float], float]:
     """To the first step of a move, and of that the law's own [ms]."""
     arm = armkin.load("three_dof")
-    out, own = [], 0.0
+    delays, law_delay = [], 0.0
     for _ in range(runs):
         with EmulatedBoard(trace=True, reset_on_open=False, patience=0) as board:
             port = SerialPort(board.port)
@@ -41,7 +41,7 @@ def first_steps(runs: int) -> tuple[list[float], float]:
             machine.prepare(assume=arm.home)
             plan = machine.plan(machine.counts(), np.deg2rad([-3, 0.5, -0.5]))
             law = plan.trajectory.stretches[0].law  # type: ignore[attr-defined]
-            own = 1e3 * math.sqrt(law.length / law.accel / int(np.abs(plan.end - plan.start).max()))
+            law_delay = 1e3 * math.sqrt(law.length / law.accel / int(np.abs(plan.end - plan.start).max()))
             time.sleep(0.03)
             begin = board.control("cycles")["cycle"]
             try:
@@ -54,16 +54,16 @@ def first_steps(runs: int) -> tuple[list[float], float]:
             trace = board.trace()
             arrived, _ = trace.edges("uart.in")
             step = min(int(trace.rises(f"{axis}.STEP")[0]) for axis in "XYZ")
-            out.append(float(step - arrived[arrived > begin][0]) / 16e3)
-    return out, own
+            delays.append(float(step - arrived[arrived > begin][0]) / 16e3)
+    return delays, law_delay
 
 
 def short_moves(moves: int, load: int) -> tuple[int, int, float]:
     """Moves of a few degrees, each from rest, with `load` busy processes: how many arrived, were held, and seconds."""
     arm = armkin.load("three_dof")
     busy = [multiprocessing.Process(target=_spin, daemon=True) for _ in range(load)]
-    for one in busy:
-        one.start()
+    for process in busy:
+        process.start()
     arrived = held = 0
     begin = time.monotonic()
     try:
@@ -84,8 +84,8 @@ def short_moves(moves: int, load: int) -> tuple[int, int, float]:
                     machine.refresh()
             port.close()
     finally:
-        for one in busy:
-            one.terminate()
+        for process in busy:
+            process.terminate()
     return arrived, held, time.monotonic() - begin
 
 
@@ -107,10 +107,10 @@ def main() -> None:
         streaming._processor_load = lambda session: 0.0
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     if args.runs:
-        got, own = first_steps(args.runs)
-        figures = " / ".join(f"{np.quantile(got, q):.1f}" for q in (0.0, 0.5, 0.9, 1.0))
+        delays, law_delay = first_steps(args.runs)
+        figures = " / ".join(f"{np.quantile(delays, q):.1f}" for q in (0.0, 0.5, 0.9, 1.0))
         print(f"first step after the first byte of MOTION, {args.runs} runs: {figures} ms (least, median, 90 %, most)")
-        print(f"  of these the law's own {own:.1f} ms")
+        print(f"  of these the law's own {law_delay:.1f} ms")
     if args.moves:
         arrived, held, seconds = short_moves(args.moves, args.load)
         print(f"{args.moves} short moves beside {args.load} busy ones: {arrived} arrived, {held} held, {seconds:.0f} s")

@@ -44,9 +44,9 @@ def main() -> None:
         if ets is None:
             print(f"| {name} | {len(q)} | {ours:.3f} | - | - | - |")
             continue
-        off = np.abs(ets.eval(q) - armkin.fk(arm, q)).max()
+        difference = np.abs(ets.eval(q) - armkin.fk(arm, q)).max()
         theirs, ratio = times[1] / len(q) * 1e6, times[1] / times[0]
-        print(f"| {name} | {len(q)} | {ours:.3f} | {theirs:.3f} | {ratio:.1f} | {off:.1e} |")
+        print(f"| {name} | {len(q)} | {ours:.3f} | {theirs:.3f} | {ratio:.1f} | {difference:.1e} |")
 
 
 if __name__ == "__main__":

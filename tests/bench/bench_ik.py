@@ -127,15 +127,15 @@ def peer_job(tool: str | None, arm: armkin.Arm, T: np.ndarray) -> tuple[str, Cal
             from ssik.prebuilt.kinova import jaco2_ik
         except ImportError:
             return None
-        some = _metres(T)[:300]
-        return "ssik prebuilt", lambda: [jaco2_ik.solve(p) for p in some], len(some)
+        sample = _metres(T)[:300]
+        return "ssik prebuilt", lambda: [jaco2_ik.solve(p) for p in sample], len(sample)
     return None
 
 
 def _metres(T: np.ndarray) -> np.ndarray:
-    out = T.copy()
-    out[:, :3, 3] *= 1e-3
-    return out
+    scaled = T.copy()
+    scaled[:, :3, 3] *= 1e-3
+    return scaled
 
 
 def hits(arm: armkin.Arm, q: np.ndarray, s: armkin.Solutions) -> float:
@@ -176,8 +176,8 @@ def threaded(row: Row, poses: int, workers: int) -> str:
             start = time.perf_counter()
             armkin.ik(arm, goal, row.task, workers=count)
             best[i] = min(best[i], time.perf_counter() - start)
-    one, many = (t / poses * 1e6 for t in best)
-    return f"| {arm.name} | {row.task or '-'} | {one:.3f} | {many:.3f} | {one / many:.2f} |"
+    single, threaded_time = (t / poses * 1e6 for t in best)
+    return f"| {arm.name} | {row.task or '-'} | {single:.3f} | {threaded_time:.3f} | {single / threaded_time:.2f} |"
 
 
 def measured(row: Row, poses: int) -> str:

@@ -83,8 +83,8 @@ def postures(arm: armkin.Arm, random: int, typed: int, seed: int) -> np.ndarray:
     turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
     step = rng.choice([15.0, 30.0, 45.0, 90.0], (typed, 1))
     values = np.round(rng.uniform(-180, 180, (typed, arm.n)) / step) * step
-    whole = np.where(arm.prismatic, 120.0 + values / 4, np.deg2rad(values))
-    return np.concatenate([rng.uniform(-turn, turn, (random, arm.n)), whole])
+    round_values = np.where(arm.prismatic, 120.0 + values / 4, np.deg2rad(values))
+    return np.concatenate([rng.uniform(-turn, turn, (random, arm.n)), round_values])
 
 
 def speed(arm: armkin.Arm, folder: Path) -> str:
@@ -119,8 +119,8 @@ def speed(arm: armkin.Arm, folder: Path) -> str:
     edges = np.fromfile(folder / "edges.bin", np.uint8) != 0
     goals = goals[~edges]
     prepare(ROUNDS)
-    own, theirs = np.min([[once("node", "ask.mjs"), once("./ask")] for _ in range(TURNS)], axis=0)
-    return f"JS {own:.2f} us, C {theirs:.2f} us, {own / theirs:.2f} times; {edges.sum()} of {len(edges)} at an edge"
+    ours, theirs = np.min([[once("node", "ask.mjs"), once("./ask")] for _ in range(TURNS)], axis=0)
+    return f"JS {ours:.2f} us, C {theirs:.2f} us, {ours / theirs:.2f} times; {edges.sum()} of {len(edges)} at an edge"
 
 
 def agree(arm: armkin.Arm, folder: Path, seed: int) -> str:
@@ -141,15 +141,15 @@ def _held(arm: armkin.Arm, folder: Path, q: np.ndarray, joint: int) -> list[str]
     near = np.tile(arm.home, (len(q), 1))
     near[:, joint] = q[:, joint]
     targets = armkin.fk(arm, q)
-    told = ask(arm, folder, q, near, targets)["ik"]
+    answers = ask(arm, folder, q, near, targets)["ik"]
     different = []
     for k, value in enumerate(values):
-        mine = told[k :: len(values)]
+        mine = answers[k :: len(values)]
         for row in (row for answer in mine for row in answer["branches"]):
             del row["joints"][joint]
         locked_arm = armkin.lock(arm, {arm.joint_names[joint]: value})
-        found = differences(locked_arm, mine, armkin.ik(locked_arm, targets[k :: len(values)]))
-        different += [f"held at {value:.4f}: {line}" for line in found]
+        differing = differences(locked_arm, mine, armkin.ik(locked_arm, targets[k :: len(values)]))
+        different += [f"held at {value:.4f}: {line}" for line in differing]
     return different
 
 
@@ -160,10 +160,10 @@ def main(words: list[str]) -> None:
         arm = armkin.load(name)
         with tempfile.TemporaryDirectory() as folder:
             try:
-                told = speed(arm, Path(folder)) if seed is None else agree(arm, Path(folder), seed)
+                line = speed(arm, Path(folder)) if seed is None else agree(arm, Path(folder), seed)
             except UsageError as error:
-                told = str(error).splitlines()[0]
-        print(f"{name:14} {told}", flush=True)
+                line = str(error).splitlines()[0]
+        print(f"{name:14} {line}", flush=True)
 
 
 if __name__ == "__main__":

@@ -110,16 +110,16 @@ def exact_box(box: Box, a: Any, b: Any) -> Any:
     for axis in range(3):
         for signs in itertools.product((-1, 1), repeat=2):
             corner = np.insert(np.array(signs, dtype=np.longdouble), axis, 1)[:, None] * h
-            other = corner.copy()
-            other[axis] *= -1
-            least = np.minimum(least, exact_between(p, q, corner + 0 * p, other + 0 * p))
-    at, by = np.concatenate([p - h, -p - h]), np.concatenate([way, -way])
-    depth = np.minimum(at.max(axis=0), (at + by).max(axis=0))
+            opposite = corner.copy()
+            opposite[axis] *= -1
+            least = np.minimum(least, exact_between(p, q, corner + 0 * p, opposite + 0 * p))
+    heights, slopes = np.concatenate([p - h, -p - h]), np.concatenate([way, -way])
+    depth = np.minimum(heights.max(axis=0), (heights + slopes).max(axis=0))
     for i, j in itertools.combinations(range(6), 2):
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = (at[j] - at[i]) / (by[i] - by[j])
+            t = (heights[j] - heights[i]) / (slopes[i] - slopes[j])
         t = np.clip(np.where(np.isfinite(t), t, 0), 0, 1)
-        depth = np.minimum(depth, (at + t * by).max(axis=0))
+        depth = np.minimum(depth, (heights + t * slopes).max(axis=0))
     return np.where(enters, np.minimum(depth, 0), least)
 
 
@@ -186,45 +186,45 @@ class Coal:
     def distances(self, q: Array) -> Array:
         form, held = self.held.bodies, self.held
         a, b = segment_ends(held.arm, q)
-        out = np.empty((len(q), len(held.pairs)))
+        distances = np.empty((len(q), len(held.pairs)))
         for n in range(len(q)):
             bodies = [self.capsule(a[:, s, n], b[:, s, n], form.radius[o]) for s, o in enumerate(form.owner)]
             for k, pair_ in enumerate(held.pairs):
-                own = [bodies[s] for s in np.flatnonzero(form.owner == pair_.body)]
+                of_body = [bodies[s] for s in np.flatnonzero(form.owner == pair_.body)]
                 if pair_.other is None:
-                    others = [self.solids[pair_.name]]
+                    of_other = [self.solids[pair_.name]]
                 else:
-                    others = [bodies[s] for s in np.flatnonzero(form.owner == pair_.other)]
-                out[n, k] = min(self.one(x, y) for x in own for y in others)
-        return out
+                    of_other = [bodies[s] for s in np.flatnonzero(form.owner == pair_.other)]
+                distances[n, k] = min(self.one(x, y) for x in of_body for y in of_other)
+        return distances
 
     def one(self, x: tuple[Any, Any], y: tuple[Any, Any]) -> float:
-        found = self.coal.DistanceResult()
-        self.coal.distance(x[0], x[1], y[0], y[1], self.request, found)
-        return float(found.min_distance)
+        answer = self.coal.DistanceResult()
+        self.coal.distance(x[0], x[1], y[0], y[1], self.request, answer)
+        return float(answer.min_distance)
 
 
 def pairs(count: int, rng: np.random.Generator, oracle: bool) -> None:
     print("| arm | pairs | overlap | from exact | coal, apart | signs differ |")
     print("|---|---|---|---|---|---|")
     for name in ARMS:
-        seen = hit = signs = 0
-        worst = off = 0.0
+        compared = hit = signs = 0
+        worst = coal_error = 0.0
         for arm in scenes(name, rng):
             held, q = guard(arm), random_joints(arm, rng, 200)
-            found, exact = held.distances(q), exact_distances(guard(arm), q)
-            seen, hit = seen + found.size, hit + int((found < 0).sum())
-            worst = max(worst, float(np.abs(found - exact).max()))
-            signs += int(((found < 0) != (exact < 0)).sum())
+            clearances, exact = held.distances(q), exact_distances(guard(arm), q)
+            compared, hit = compared + clearances.size, hit + int((clearances < 0).sum())
+            worst = max(worst, float(np.abs(clearances - exact).max()))
+            signs += int(((clearances < 0) != (exact < 0)).sum())
             if oracle:
-                other = Coal(held).distances(q)
-                apart = found > 0
-                off = max(off, float(np.abs(found - other)[apart].max()))
-                signs += int((((found < 0) != (other < 0)) & (np.abs(found) > 1e-9)).sum())
-            if seen >= count / len(ARMS):
+                coal = Coal(held).distances(q)
+                apart = clearances > 0
+                coal_error = max(coal_error, float(np.abs(clearances - coal)[apart].max()))
+                signs += int((((clearances < 0) != (coal < 0)) & (np.abs(clearances) > 1e-9)).sum())
+            if compared >= count / len(ARMS):
                 break
-        said = f"{off:.1e}" if oracle else "-"
-        print(f"| {name} | {seen} | {hit} | {worst:.1e} | {said} | {signs} |", flush=True)
+        error_text = f"{coal_error:.1e}" if oracle else "-"
+        print(f"| {name} | {compared} | {hit} | {worst:.1e} | {error_text} | {signs} |", flush=True)
 
 
 # motions -----------------------------------------------------------------------------------------------------------
@@ -236,7 +236,7 @@ def motions(count: int, rng: np.random.Generator) -> None:
     print("|---|---|---|---|---|---|---|")
     share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
     for name in ARMS:
-        done = free = wrong = needless = 0
+        count_done = free = wrong = needless = 0
         deepest, looked = 0.0, []
         for arm in scenes(name, rng):
             held, q = guard(arm), random_joints(arm, rng, 600)
@@ -246,17 +246,17 @@ def motions(count: int, rng: np.random.Generator) -> None:
                 proof = prove_trajectory(plan_joint_moves(arm, a, b))
                 assert proof is not None
                 least = float(held.least_clearances(a + share * (b - a))[0].min())
-                done, free = done + 1, free + proof.free
+                count_done, free = count_done + 1, free + proof.free
                 looked.append(proof.postures)
                 if proof.free:
                     deepest = min(deepest, least)
                     wrong += least < -DEEP
                 else:
                     needless += least >= 0
-            if done >= count / len(ARMS):
+            if count_done >= count / len(ARMS):
                 break
         tally = f"{np.median(looked):.0f}, {max(looked)}"
-        print(f"| {name} | {done} | {free} | {wrong} | {deepest:.4f} | {needless} | {tally} |", flush=True)
+        print(f"| {name} | {count_done} | {free} | {wrong} | {deepest:.4f} | {needless} | {tally} |", flush=True)
 
 
 def targets(count: int, rng: np.random.Generator) -> None:
@@ -264,7 +264,7 @@ def targets(count: int, rng: np.random.Generator) -> None:
     print("| arm | targets | some branch free | best is not | best hits |")
     print("|---|---|---|---|---|")
     for name in ARMS:
-        done = some = missed = hit = 0
+        count_done = with_free = missed = hit = 0
         for arm in scenes(name, rng):
             q = random_joints(arm, rng, 250)
             solutions = armkin.ik(arm, goals(arm, q))
@@ -272,12 +272,12 @@ def targets(count: int, rng: np.random.Generator) -> None:
             free = ((rows.min(axis=1) >= 0).reshape(solutions.valid.shape)) & solutions.within_limits & solutions.valid
             best = solutions.best
             taken = np.take_along_axis(free, np.maximum(best, 0)[:, None], axis=1)[:, 0]
-            done, some = done + len(q), some + int(free.any(axis=1).sum())
+            count_done, with_free = count_done + len(q), with_free + int(free.any(axis=1).sum())
             missed += int((free.any(axis=1) & (best < 0)).sum())
             hit += int(((best >= 0) & ~taken).sum())
-            if done >= count / len(ARMS):
+            if count_done >= count / len(ARMS):
                 break
-        print(f"| {name} | {done} | {some} | {missed} | {hit} |", flush=True)
+        print(f"| {name} | {count_done} | {with_free} | {missed} | {hit} |", flush=True)
 
 
 def goals(arm: Arm, q: Array) -> Array:

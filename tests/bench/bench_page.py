@@ -93,8 +93,8 @@ class Processor:
 
     def scripts(self) -> float:
         """Milliseconds of scripts by now."""
-        told = self.meter.send("Performance.getMetrics")["metrics"]
-        return 1e3 * float(next(one["value"] for one in told if one["name"] == "ScriptDuration"))
+        metrics = self.meter.send("Performance.getMetrics")["metrics"]
+        return 1e3 * float(next(metric["value"] for metric in metrics if metric["name"] == "ScriptDuration"))
 
     def loop(self) -> float:
         """Milliseconds of the fixed loop."""
@@ -153,7 +153,7 @@ def measure(browser: Browser, name: str, folder: Path) -> None:
     file = folder / f"{name}.html"
     try:
         wrote = min(exported(name, file) for _ in range(2))
-        own = list(slid(browser, file.as_uri(), amid))
+        file_rows = list(slid(browser, file.as_uri(), amid))
         size = f"{file.stat().st_size / 1e6:.2f} MB {len(gzip.compress(file.read_bytes())) / 1e3:.0f} kB {wrote:.2f} s"
     except subprocess.CalledProcessError as error:
         print(f"{name:14} {error.stderr.decode().strip().splitlines()[0]}", flush=True)
@@ -162,12 +162,12 @@ def measure(browser: Browser, name: str, folder: Path) -> None:
         served = list(slid(browser, address, amid))
     print(f"{name:14} {size}", flush=True)
     for place, k in (("home", 0), ("amid limits", 1)):
-        for page, rows in (("file", own), ("served", served)):
-            one = rows[k]
-            cpu = f"processor {one.processor:.1f}, alone {one.alone:.1f}"
-            later = f", confirmed {one.confirmed:.1f}" if page == "served" else ""
-            told = f"{one.wall:6.1f} ms (least {one.least:.1f}; {cpu}){later}"
-            print(f"    {place:11} {page:6} {told}", flush=True)
+        for page, rows in (("file", file_rows), ("served", served)):
+            row = rows[k]
+            cpu = f"processor {row.processor:.1f}, alone {row.alone:.1f}"
+            later = f", confirmed {row.confirmed:.1f}" if page == "served" else ""
+            line = f"{row.wall:6.1f} ms (least {row.least:.1f}; {cpu}){later}"
+            print(f"    {place:11} {page:6} {line}", flush=True)
 
 
 if __name__ == "__main__":

@@ -61,25 +61,25 @@ def branches(lines: int) -> None:
     print("arm            lines  whole  reach differs (worst/mm)  runs differ  worst dev/um  ladder us/pt  ik us/pt")
     for name in ARMS:
         arm, rng = moving(name), np.random.default_rng(7)
-        whole = differ = others = 0
-        off = worst = spent = own = 0.0
+        carried = differ = unlike_runs = 0
+        reach_error = worst = spent = ik_seconds = 0.0
         for _ in range(lines):
             way = random_line(arm, rng)
             dense = np.linspace(0, way.length, 1001)
             columns = link_branches(arm, way.targets, dense[::4], task=None, tolerance=0.05, near=arm.home)
-            all_ = chains_of_columns(arm, columns)
-            mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
-            whole += mine >= way.length - 1e-9
+            chains = chains_of_columns(arm, columns)
+            mine = max((columns.s[c.carries(0)] for c in chains if c.first == 0 and c.carries(0) >= 0), default=-1.0)
+            carried += mine >= way.length - 1e-9
             apart = abs(mine - brute.zoomed(arm, way.targets, dense, 0.05))
-            off, differ = max(off, apart), differ + (apart > 0.01)
-            length = [columns.s[run.last] - columns.s[run.first] for run in fewest_runs(all_, len(columns.s))]
+            reach_error, differ = max(reach_error, apart), differ + (apart > 0.01)
+            length = [columns.s[run.last] - columns.s[run.first] for run in fewest_runs(chains, len(columns.s))]
             for finer_by in (1, 10):  # a run that is shorter than their step is none to the samples
                 s = np.linspace(0, way.length, 1000 * finer_by + 1)
                 unlike = sum(x > s[1] for x in length) != len(brute.runs(arm, way.targets(s), 0.05))
                 if not unlike:
                     break
-            others += unlike
-            worst = max(worst, tips_off(arm, all_))
+            unlike_runs += unlike
+            worst = max(worst, tips_off(arm, chains))
             s = np.linspace(0, way.length, 10_000)
             targets = way.targets(s)
             began = time.process_time()
@@ -89,25 +89,25 @@ def branches(lines: int) -> None:
                 chains_of_columns(arm, link_branches(arm, way.targets, s, task=None, tolerance=0.05, near=arm.home)),
                 10_000,
             )
-            own, spent = own + between - began, spent + time.process_time() - between
+            ik_seconds, spent = ik_seconds + between - began, spent + time.process_time() - between
         per = 1e6 / lines / 10_000
         print(
-            f"{name:14} {lines:5d} {whole:6d} {differ:7d} ({off:.4f}) {others:20d} {1000 * worst:13.1f} "
-            f"{spent * per:13.1f} {own * per:9.2f}",
+            f"{name:14} {lines:5d} {carried:6d} {differ:7d} ({reach_error:.4f}) {unlike_runs:20d} {1000 * worst:13.1f} "
+            f"{spent * per:13.1f} {ik_seconds * per:9.2f}",
             flush=True,
         )
 
 
-def tips_off(arm: armkin.Arm, all_: list[Chain]) -> float:
+def tips_off(arm: armkin.Arm, chains: list[Chain]) -> float:
     """How far the tip leaves its chord at most, on twenty points of every step of all chains [mm]."""
     worst, f = 0.0, np.linspace(0, 1, 20)[:, None]
-    for chain in all_:
+    for chain in chains:
         for part in np.array_split(np.arange(len(chain.q) - 1), max(len(chain.q) // 2000, 1)):
             if len(part):
                 a, b = chain.q[part, None], chain.q[part + 1, None]
                 p = armkin.fk(arm, a + f * (b - a))[..., :3, 3]
-                off = np.linalg.norm(p - p[:, :1] - f * (p[:, -1:] - p[:, :1]), axis=2).max()
-                worst = max(worst, float(off))
+                deviation = np.linalg.norm(p - p[:, :1] - f * (p[:, -1:] - p[:, :1]), axis=2).max()
+                worst = max(worst, float(deviation))
     return worst
 
 
@@ -116,18 +116,18 @@ def tips(lines: int) -> None:
     print("arm            lines  chains' steps  beyond 0.05 mm  worst dev/um  planned  beyond  worst/um")
     for name in SIX:
         arm, rng = moving(name), np.random.default_rng(31)
-        each = -(-lines // len(SIX))
+        lines_each = -(-lines // len(SIX))
         steps = beyond = planned = wrong = 0
         worst = far = 0.0
-        for _ in range(each):
+        for _ in range(lines_each):
             way = random_line(arm, rng)
             columns = link_branches(
                 arm, way.targets, np.linspace(0, way.length, 60), task=None, tolerance=0.05, near=arm.home
             )
-            all_ = chains_of_columns(arm, columns)
-            steps += sum(len(chain.q) - 1 for chain in all_)
-            off = tips_off(arm, all_)
-            worst, beyond = max(worst, off), beyond + (off > 0.05)
+            chains = chains_of_columns(arm, columns)
+            steps += sum(len(chain.q) - 1 for chain in chains)
+            deviation = tips_off(arm, chains)
+            worst, beyond = max(worst, deviation), beyond + (deviation > 0.05)
             ends = way.targets(np.array([0.0, way.length]))
             plan = planned_along(arm, ends)
             if plan is None:
@@ -140,10 +140,10 @@ def tips(lines: int) -> None:
             a, b = (split_target(task_for(arm), end).p for end in ends)
             a, b = (np.append(x, p[0, 2])[:3] if len(x) < 3 else x for x in (a, b))
             d = (b - a) / np.linalg.norm(b - a)
-            off = float(np.linalg.norm(p - a - ((p - a) @ d)[:, None] * d, axis=1).max())
-            far, wrong = max(far, off), wrong + (off > 0.05)
+            deviation = float(np.linalg.norm(p - a - ((p - a) @ d)[:, None] * d, axis=1).max())
+            far, wrong = max(far, deviation), wrong + (deviation > 0.05)
         print(
-            f"{name:14} {each:5d} {steps:14d} {beyond:15d} {1000 * worst:13.1f} {planned:8d} {wrong:7d} "
+            f"{name:14} {lines_each:5d} {steps:14d} {beyond:15d} {1000 * worst:13.1f} {planned:8d} {wrong:7d} "
             f"{1000 * far:9.1f}",
             flush=True,
         )
@@ -210,9 +210,9 @@ def laws(splines: int) -> None:
                 Curve(path, x).duration / float(np.sum(2 * np.diff(s) / (sd[1:] + sd[:-1]))) - 1
                 for path, x, sd in zip(paths, mine, made, strict=True)
             ]
-            each = 1e3 / splines
+            us = 1e3 / splines
             print(
-                f"{n:6d} {N:7d} {each * min(ours):8.2f} {each * min(theirs):10.2f} {min(ours) / min(theirs):6.2f}   "
+                f"{n:6d} {N:7d} {us * min(ours):8.2f} {us * min(theirs):10.2f} {min(ours) / min(theirs):6.2f}   "
                 f"{min(apart):+.1e} {max(apart):+.1e}",
                 flush=True,
             )
@@ -228,11 +228,11 @@ def straight(moves: int) -> None:
     worst, rng = 0.0, np.random.default_rng(1)
     for _ in range(moves):
         length, v, a, j = 10 ** rng.uniform([-2, -1, -1, -1], [2, 1, 1, 2])
-        one = ruckig.InputParameter(1)
-        one.current_position, one.target_position = [0.0], [length]
-        one.max_velocity, one.max_acceleration, one.max_jerk = [v], [a], [j]
+        parameters = ruckig.InputParameter(1)
+        parameters.current_position, parameters.target_position = [0.0], [length]
+        parameters.max_velocity, parameters.max_acceleration, parameters.max_jerk = [v], [a], [j]
         made = ruckig.Trajectory(1)
-        ruckig.Ruckig(1).calculate(one, made)
+        ruckig.Ruckig(1).calculate(parameters, made)
         worst = max(worst, abs(seven_phases(length, v, a, j).duration / made.duration - 1))
     print(f"straight moves with jerk, {moves} at random: T ours/ruckig - 1 at most {worst:.1e}")
 

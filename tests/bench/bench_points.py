@@ -74,7 +74,7 @@ def shapes() -> None:
         count = 1500 if name == "spiral" else 600
         points, seeds = shape(name, count), [np.random.default_rng(seed) for seed in range(_SEEDS)]
         smooth = on_path(armkin.path(arm, shape(name, 20_000), corners="tolerance"))
-        ratios, off, spent = [], 0.0, 0.0
+        ratios, deviation, spent = [], 0.0, 0.0
         uniform = [rng.uniform(-0.02, 0.02, points.shape) for rng in seeds]
         for noises in ([0 * points], uniform, [rng.normal(0, 0.02, points.shape) for rng in seeds]):
             ratios.append(0.0)
@@ -83,16 +83,16 @@ def shapes() -> None:
                 plan = armkin.path(arm, points + noise, corners="tolerance")
                 spent = max(spent, time.process_time() - began)
                 ratios[-1] = max(ratios[-1], on_path(plan) / smooth)
-                off = max(off, plan.deviation)
+                deviation = max(deviation, plan.deviation)
         print(f"{name:10} {count:7d} {smooth:9.3f} {ratios[0]:16.4f} {ratios[1]:13.4f} {ratios[2]:14.4f} "
-              f"{spent:7.2f} {off:15.4f}", flush=True)  # fmt: skip
+              f"{spent:7.2f} {deviation:15.4f}", flush=True)  # fmt: skip
 
 
-def planned(name: str, text: str, at: list[float]) -> None:
+def planned(name: str, text: str, place: list[float]) -> None:
     """Read and plan a program; print what it takes."""
     arm = armkin.load("three_dof")
     began = time.process_time()
-    file = gcode.parse_gcode(text.encode(), "points.gcode", place_drawing(arm, at), DrawingOptions())
+    file = gcode.parse_gcode(text.encode(), "points.gcode", place_drawing(arm, place), DrawingOptions())
     read = time.process_time() - began
     plan = armkin.path(arm, file)
     spent = time.process_time() - began
@@ -118,7 +118,7 @@ def saw(points: int) -> None:
 
 def lines(count: int) -> None:
     """Lines of 300 mm that begin at a point: planned where some branch carries them, refused where none does."""
-    right = whole = 0
+    right = carried_count = 0
     for k in range(count):
         arm, rng = moving(ARMS[k % len(ARMS)]), np.random.default_rng(1000 + k)
         way = random_line(arm, rng)
@@ -126,14 +126,14 @@ def lines(count: int) -> None:
         carried = brute.zoomed(arm, way.targets, np.linspace(0, way.length, 601), 0.05) == way.length
         try:
             end = armkin.path(arm, ends).motion.end
-            off = np.linalg.norm(armkin.fk(arm, end)[: arm.n, 3][:2] - _place(ends[1])[:2])
-            found = bool(off < 0.01)
+            distance = np.linalg.norm(armkin.fk(arm, end)[: arm.n, 3][:2] - _place(ends[1])[:2])
+            planned = bool(distance < 0.01)
         except armkin.NoSolutionError:
-            found = False
-        whole, right = whole + carried, right + (found == carried)
-        if found != carried:
-            print(f"  line {k} of {arm.name}: planned {found}, by brute force {carried}")
-    print(f"lines from a point: {right} of {count} right; {whole} are carried")
+            planned = False
+        carried_count, right = carried_count + carried, right + (planned == carried)
+        if planned != carried:
+            print(f"  line {k} of {arm.name}: planned {planned}, by brute force {carried}")
+    print(f"lines from a point: {right} of {count} right; {carried_count} are carried")
 
 
 def _place(target: np.ndarray) -> np.ndarray:

@@ -57,8 +57,8 @@ def by_brute_force(arm: armkin.Arm, T: np.ndarray, rng: np.random.Generator) -> 
     free = arm.n - 3
     low, high = np.where(np.isfinite(arm.lower), arm.lower, -np.pi), np.where(np.isfinite(arm.upper), arm.upper, np.pi)
     axes = [np.linspace(a, b, GRID[free]) for a, b in zip(low[3:], high[3:], strict=True)]
-    rest = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, free).repeat(STARTS[free], axis=0)
-    q = np.concatenate([rng.uniform(low[:3], high[:3], (len(rest), 3)), rest], axis=1)
+    free_values = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, free).repeat(STARTS[free], axis=0)
+    q = np.concatenate([rng.uniform(low[:3], high[:3], (len(free_values), 3)), free_values], axis=1)
     angle, q = judged(arm, onto(arm, q, T[:3, 3], 14), T)
     stencil = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 5)] * free, indexing="ij"), axis=-1).reshape(-1, free)
     size, count = (high - low)[3:] / (GRID[free] - 1), BEST[0]
@@ -67,12 +67,12 @@ def by_brute_force(arm: armkin.Arm, T: np.ndarray, rng: np.random.Generator) -> 
         angle, q = angle[best], q[best]
         beside = q.repeat(len(stencil), axis=0)
         beside[:, 3:] = np.clip(beside[:, 3:] + np.tile(stencil * size, (len(q), 1)), low[3:], high[3:])
-        each, beside = judged(arm, onto(arm, beside, T[:3, 3], 4 if k < 6 else 2), T)
-        each = each.reshape(len(q), -1)
-        place, rows = each.argmin(axis=1), np.arange(len(q))
-        better = each[rows, place] < angle
+        angles, beside = judged(arm, onto(arm, beside, T[:3, 3], 4 if k < 6 else 2), T)
+        angles = angles.reshape(len(q), -1)
+        place, rows = angles.argmin(axis=1), np.arange(len(q))
+        better = angles[rows, place] < angle
         q = np.where(better[:, None], beside.reshape(len(q), -1, arm.n)[rows, place], q)
-        angle = np.minimum(angle, each[rows, place])
+        angle = np.minimum(angle, angles[rows, place])
         size = size * (0.62 if better.any() else 0.5)
         count = BEST[(k >= 5) + (k >= 10)]
     return float(angle.min())
@@ -91,11 +91,11 @@ def main() -> None:
         spent = (time.process_time() - start) / count
         assert s.angle is not None
         rng = np.random.default_rng(first)
-        by = np.array([by_brute_force(arm, one, rng) for one in T]) - s.angle[:, 0]
-        off = np.abs(armkin.fk(arm, s.q[:, 0])[:, :3, 3] - T[:, :3, 3]).max()
+        gain = np.array([by_brute_force(arm, goal, rng) for goal in T]) - s.angle[:, 0]
+        error = np.abs(armkin.fk(arm, s.q[:, 0])[:, :3, 3] - T[:, :3, 3]).max()
         print(
-            f"{name:14s} {count:7d} {1e3 * spent:8.1f} {(by < -WORSE).sum():6d} {(np.abs(by) <= WORSE).sum():18d} "
-            f"{np.rad2deg(by[np.isfinite(by)].max()):31.4f} {off:17.1e}",
+            f"{name:14s} {count:7d} {1e3 * spent:8.1f} {(gain < -WORSE).sum():6d} {(np.abs(gain) <= WORSE).sum():18d} "
+            f"{np.rad2deg(gain[np.isfinite(gain)].max()):31.4f} {error:17.1e}",
             flush=True,
         )
 

@@ -51,14 +51,14 @@ def keep_outs() -> bool:
     for name, grid, count, starts in (("three_dof", 20.0, 1000, 30), ("ur5e", 150.0, 300, 150)):
         scene = ROOT / f"examples/scenes/{name}.yaml"
         words = [sys.executable, "-m", "armkin", "info", name, "--scene", str(scene), "--json"]
-        said = json.loads(subprocess.run(words, capture_output=True, check=True).stdout)
+        answer = json.loads(subprocess.run(words, capture_output=True, check=True).stdout)
         arm = armkin.load(name, scene=scene)
-        cells = monte_carlo.cells(arm, scene, said, grid=grid, count=count, starts=starts)
-        volume = monte_carlo.volume(arm, scene, said, grid=grid / 2, count=count, starts=starts)
+        cells = monte_carlo.cells(arm, scene, answer, grid=grid, count=count, starts=starts)
+        volume = monte_carlo.volume(arm, scene, answer, grid=grid / 2, count=count, starts=starts)
         good &= cells.different == 0 and abs(volume.map - volume.counted) < 4 * volume.sigma
         print(f"{name:10}{cells.different} of {count} cells differ, {cells.known:.1%} could be told")
-        found = f"{volume.map:.3f} by the map, {volume.counted:.3f} +- {volume.sigma:.3f} counted"
-        print(f"{'':10}of the ball of the reach {found}", flush=True)
+        shares = f"{volume.map:.3f} by the map, {volume.counted:.3f} +- {volume.sigma:.3f} counted"
+        print(f"{'':10}of the ball of the reach {shares}", flush=True)
     return good
 
 
@@ -84,14 +84,14 @@ def place(solve: Any = armkin.ik) -> bool:
         began = time.process_time()
         step = half / 18
         area = (-half, half + 1e-6, -half, half + 1e-6)
-        [found] = armkin.place([arm], targets, area=area, step=step, yaw=np.pi / 36, solve=solve)
+        [places] = armkin.place([arm], targets, area=area, step=step, yaw=np.pi / 36, solve=solve)
         took = time.process_time() - began
         total, arms = total + took, arms + 1
         print(f"{name:16}{took:.2f} s", flush=True)
-        asked = place_targets.Question(arm, task, targets, 72, np.pi / 36, 0.0)
-        for i, j, k in rng.integers(0, found.reached.shape, (1000 // 20, 3)).tolist():
-            there = place_targets.legal_from(asked, np.array([found.x[i], found.y[j]]), float(found.yaw[k]))
-            different += int(there.sum()) != found.reached[i, j, k]
+        question = place_targets.Question(arm, task, targets, 72, np.pi / 36, 0.0)
+        for i, j, k in rng.integers(0, places.reached.shape, (1000 // 20, 3)).tolist():
+            legal = place_targets.legal_from(question, np.array([places.x[i], places.y[j]]), float(places.yaw[k]))
+            different += int(legal.sum()) != places.reached[i, j, k]
     print(f"place     {arms} arms in {total:.1f} s (bar {PLACE:g}), {different} of {50 * arms:,} places differ")
     return total <= PLACE and not different
 
@@ -110,28 +110,30 @@ def unseen(seed: int = 1, poses: int = 10**6) -> bool:
 
     rng, total, different = np.random.default_rng(seed), 0, 0
     for name in TEN:
-        arm, here, cells = armkin.load(name), 0, 0
-        while here < poses / len(TEN):
+        arm, pose_count, cells = armkin.load(name), 0, 0
+        while pose_count < poses / len(TEN):
             M, N, L = (int(rng.integers(*limits)) for limits in ((3, 60), (2, 40), (2, 30)))
             grid = Grid(arm, arm.reach / rng.uniform(3.0, 15.0), M, N, L, bool(rng.integers(2)) and arm.n > 3)
             ring = grid.rings[rng.integers(0, len(grid.rings), 1)]
             columns = cell_columns(Question(grid), ring)
             D, L = grid.directions_count, grid.rolls_count
-            k, each = np.divmod(np.arange(M * D * L), D * L)
-            goals = grid.targets(np.repeat(ring, len(k), 0), k * TURN / M, each // L, (each % L) * TURN / L)
+            k, orientation = np.divmod(np.arange(M * D * L), D * L)
+            goals = grid.targets(
+                np.repeat(ring, len(k), 0), k * TURN / M, orientation // L, (orientation % L) * TURN / L
+            )
             s = armkin.ik(arm, goals)
             legal = s.within_limits.sum(axis=1).reshape(M, -1)
             with np.errstate(invalid="ignore"):
                 mean = legal.sum(axis=1) / (legal > 0).sum(axis=1)
-            any_ = s.valid.any(axis=1).reshape(M, -1).mean(axis=1)
-            asked = np.array([(legal > 0).mean(axis=1), any_, mean, (legal == 1).mean(axis=1)])
-            said = np.array([columns[column] for column in ("share", "share_any", "branches", "single")])
-            off = ~np.isclose(said, asked, rtol=0, atol=1e-12, equal_nan=True).all(axis=0)
-            if off.any():
-                print(f"{name}: {off.sum()} cells of ring {ring.tolist()}, grid {grid.step}, {M} x {N} x {L}")
-            cells, here, different = cells + M, here + len(k), different + int(off.sum())
-        total += here
-        print(f"{name:16}{here:,} poses, {cells:,} cells", flush=True)
+            reached = s.valid.any(axis=1).reshape(M, -1).mean(axis=1)
+            from_ik = np.array([(legal > 0).mean(axis=1), reached, mean, (legal == 1).mean(axis=1)])
+            from_cells = np.array([columns[column] for column in ("share", "share_any", "branches", "single")])
+            differs = ~np.isclose(from_cells, from_ik, rtol=0, atol=1e-12, equal_nan=True).all(axis=0)
+            if differs.any():
+                print(f"{name}: {differs.sum()} cells of ring {ring.tolist()}, grid {grid.step}, {M} x {N} x {L}")
+            cells, pose_count, different = cells + M, pose_count + len(k), different + int(differs.sum())
+        total += pose_count
+        print(f"{name:16}{pose_count:,} poses, {cells:,} cells", flush=True)
     print(f"unseen    {different} cells differ, of {total:,} poses")
     return not different
 

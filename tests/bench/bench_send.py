@@ -44,11 +44,11 @@ def noisy(seed: int) -> str:
         board.control(f"noise flip 0.01 drop 0.01 seed {seed}")
         probe_line(machine.session)
         plans: list[Any] = []
-        at, lowest = list(machine.counts()), [10**6]
+        counts, lowest = list(machine.counts()), [10**6]
         while sum(plan.segments for plan in plans) < SEGMENTS:
             goal = rng.uniform(np.deg2rad([-60, 20, -100]), np.deg2rad([60, 110, -10]))
-            plans.append(plan_moves(arm, at, goal))
-            at = plans[-1].end.tolist()
+            plans.append(plan_moves(arm, counts, goal))
+            counts = plans[-1].end.tolist()
         segments = sum(plan.segments for plan in plans)
         total = sum(plan.duration for plan in plans)
         begin = time.monotonic()
@@ -65,7 +65,7 @@ def noisy(seed: int) -> str:
         port.close()
         board.control("restore")
         net = [board.net()[axis] for axis in "XYZ"]
-        exact = net == at if outcome == "arrived" else net == list(machine.counts())
+        exact = net == counts if outcome == "arrived" else net == list(machine.counts())
         line = board.stats()["line"]["in"]
     return (
         f"{seed:4d}  {segments:5d}  {total:6.1f} s  {line['flipped'] + line['dropped']:6d} bytes damaged  "

@@ -51,12 +51,12 @@ def main() -> None:
             armkin.ik(arm, T[:64])  # recorded once
             solutions = armkin.ik(arm, T)
             mean = 1e6 * seconds(lambda T=T: armkin.ik(arm, T)) / arguments.poses  # type: ignore[misc]
-            own = 1e6 * seconds(lambda T=T, q=q: armkin.ik(arm, T, near=q)) / arguments.poses  # type: ignore[misc]
+            own_pose = 1e6 * seconds(lambda T=T, q=q: armkin.ik(arm, T, near=q)) / arguments.poses  # type: ignore[misc]
             edge = np.flatnonzero(solutions.status != armkin.Status.EXACT)[: arguments.alone]
             worst = max((seconds(lambda T=T, k=k: armkin.ik(arm, T[k])) for k in edge), default=0.0)  # type: ignore[misc]
             counts = np.bincount(solutions.status, minlength=3)
             print(
-                f"{name} | {arguments.poses} at {kind} | {mean:.0f} | {own:.0f} | {counts[2]}, {counts[1]} "
+                f"{name} | {arguments.poses} at {kind} | {mean:.0f} | {own_pose:.0f} | {counts[2]}, {counts[1]} "
                 f"| {1e3 * worst:.1f} of {len(edge)}",
                 flush=True,
             )

@@ -57,9 +57,9 @@ def chosen(solve: Callable[..., armkin.Solutions]) -> Best:
     """The best branch of each target (N, n), nan where there is none."""
 
     def best(T: np.ndarray, q: np.ndarray) -> np.ndarray:
-        found = solve(T, near=q)
-        some = found.q[np.arange(len(q)), np.maximum(found.best, 0)]
-        return np.where(found.best[:, None] < 0, np.nan, some)
+        solutions = solve(T, near=q)
+        chosen_q = solutions.q[np.arange(len(q)), np.maximum(solutions.best, 0)]
+        return np.where(solutions.best[:, None] < 0, np.nan, chosen_q)
 
     return best
 
@@ -75,9 +75,11 @@ def in_c(code: Exported) -> Best:
 
 def in_js(arm: armkin.Arm, folder: Path) -> Best:
     def best(T: np.ndarray, q: np.ndarray) -> np.ndarray:
-        told = ask(arm, folder, q, near=q, targets=np.asarray(T, float))["ik"]
+        answers = ask(arm, folder, q, near=q, targets=np.asarray(T, float))["ik"]
         nothing = [np.nan] * arm.n
-        return np.array([nothing if one["best"] is None else one["branches"][one["best"]]["joints"] for one in told])
+        return np.array(
+            [nothing if answer["best"] is None else answer["branches"][answer["best"]]["joints"] for answer in answers]
+        )
 
     return best
 
@@ -104,15 +106,18 @@ def main() -> None:
                     continue
             ways["JS"] = in_js(arm, Path(folder))
             for words, best in ways.items():
-                at = q.astype(np.float32).astype(float) if words == "C float" else q
-                T = armkin.fk(arm, at)
+                standing = q.astype(np.float32).astype(float) if words == "C float" else q
+                T = armkin.fk(arm, standing)
                 moved, worst = {}, 0.0
                 for digits in DIGITS:
-                    off = np.abs(best(rounded(T, digits), at) - at).max(axis=1)
-                    moved[digits] = int((~(off <= MOVES)).sum())
-                    worst = max(worst, float(np.nan_to_num(off, nan=np.inf).max()))
-                some = ", ".join(f"{count} at {digits}" for digits, count in moved.items() if count)
-                print(f"{name} | {words} | {arguments.poses} x {len(DIGITS)} | {some or 0} | {worst:.1e}", flush=True)
+                    motion = np.abs(best(rounded(T, digits), standing) - standing).max(axis=1)
+                    moved[digits] = int((~(motion <= MOVES)).sum())
+                    worst = max(worst, float(np.nan_to_num(motion, nan=np.inf).max()))
+                moved_text = ", ".join(f"{count} at {digits}" for digits, count in moved.items() if count)
+                print(
+                    f"{name} | {words} | {arguments.poses} x {len(DIGITS)} | {moved_text or 0} | {worst:.1e}",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -47,8 +47,10 @@ def main() -> int:
         moves.pop("robot", None)
     good = True
     for kind in arguments.kinds or ([] if arguments.pins else KINDS):
-        one = on(kind)
-        good &= driven(kind, partial(carried_out, one), paths, places, one.tolerance, one.rest)
+        kind_of_board = on(kind)
+        good &= driven(
+            kind, partial(carried_out, kind_of_board), paths, places, kind_of_board.tolerance, kind_of_board.rest
+        )
     if arguments.pins:
         from emulator import EmulatedBoard
         from starts_on_pins import sent
@@ -64,21 +66,25 @@ def driven(
     kind: str, send: Callable[..., Result], paths: Paths, places: Places, tolerance: float, most_rest: int
 ) -> bool:
     """Send every path from every place and print what was found so far; whether all were driven where they are."""
-    off = begins = 0.0
-    rest = done = refused = 0
+    farthest = begins = 0.0
+    rest_counts = driven_count = refused = 0
     for place in places:
         for name, moves in paths.items():
             try:
-                found = send(moves, place)
+                motion = send(moves, place)
             except NoSolutionError as error:
                 refused += 1
                 print(f"{kind:16} refused: {name} from {place}: {str(error).splitlines()[0]}", flush=True)
                 continue
-            done += 1
-            off, begins, rest = max(off, found.off_mm), max(begins, found.begins_mm), max(rest, found.rest)
-        so_far = f"off {off:6.3f} mm  start {begins:6.3f} mm  end {rest} counts"
-        print(f"{kind:16} {done:4} driven, {refused} refused  {so_far}", flush=True)
-    return max(off, begins) < tolerance and rest <= most_rest
+            driven_count += 1
+            farthest, begins, rest_counts = (
+                max(farthest, motion.off_mm),
+                max(begins, motion.begins_mm),
+                max(rest_counts, motion.rest),
+            )
+        so_far = f"off {farthest:6.3f} mm  start {begins:6.3f} mm  end {rest_counts} counts"
+        print(f"{kind:16} {driven_count:4} driven, {refused} refused  {so_far}", flush=True)
+    return max(farthest, begins) < tolerance and rest_counts <= most_rest
 
 
 if __name__ == "__main__":

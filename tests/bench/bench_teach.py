@@ -102,14 +102,14 @@ def events(robot: str) -> None:
             for k in range(EVENTS):
                 moved = [target[0] + 10 * math.sin(k / 20), target[1] + 5 * math.cos(k / 15), *target[2:]]
                 since = time.perf_counter()
-                found = len(act("look", tab, q=q, target=moved, held=held, nearest=False)["branches"])
+                branch_count = len(act("look", tab, q=q, target=moved, held=held, nearest=False)["branches"])
                 times.append(time.perf_counter() - since)
             rounds.append(((cpu(process) - begun) / EVENTS, statistics.median(times)))
             time.sleep(PAUSE)
         stream.close()
         used, median = min(rounds)
         spent = f"{1e3 * used:.2f} ms CPU an event (the first {EVENTS}: {1e3 * rounds[0][0]:.2f})"
-        print(f"{robot:14} {found} branches: {spent}, {1e3 * median:.2f} ms to the answer", flush=True)
+        print(f"{robot:14} {branch_count} branches: {spent}, {1e3 * median:.2f} ms to the answer", flush=True)
 
 
 def _inside(joint: dict[str, Any], share: float) -> float:
@@ -119,16 +119,16 @@ def _inside(joint: dict[str, Any], share: float) -> float:
 
 def starts(robot: str, browser: Browser) -> None:
     """From the command to the first picture, in a browser that runs already and has an empty page open."""
-    found = []
+    seconds = []
     for _ in range(STARTS):
         view = browser.new_page(viewport=WINDOW)
         with teaching(robot) as (_, address, began):
             view.goto(address, wait_until="commit")
             view.wait_for_selector("html[data-ready]", state="attached")
             view.evaluate(DRAWN)
-            found.append(time.perf_counter() - began)
+            seconds.append(time.perf_counter() - began)
         view.close()
-    print(f"{robot:10} command to first picture: median {statistics.median(found):.2f} s, best {min(found):.2f} s")
+    print(f"{robot:10} command to first picture: median {statistics.median(seconds):.2f} s, best {min(seconds):.2f} s")
 
 
 def drags(robot: str, browser: Browser) -> None:
@@ -155,10 +155,10 @@ def drags(robot: str, browser: Browser) -> None:
             view.wait_for_timeout(60)
         ghosts = len(view.locator("#branches button").all()) - 1
         view.mouse.up()
-        seen = sorted(view.evaluate("window.seen"))
-        median, late = statistics.median(seen), seen[int(0.95 * len(seen))]
+        delays = sorted(view.evaluate("window.seen"))
+        median, late = statistics.median(delays), delays[int(0.95 * len(delays))]
         figures = f"median {median:.0f} ms, p95 {late:.0f} ms"
-        print(f"{robot:10} pointer to numbers, {len(seen)} moves, {ghosts} ghosts: {figures}")
+        print(f"{robot:10} pointer to numbers, {len(delays)} moves, {ghosts} ghosts: {figures}")
         view.close()
 
 

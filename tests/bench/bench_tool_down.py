@@ -44,16 +44,16 @@ def main() -> None:
         fast = armkin.compile(arm)
         for label, way in WAYS.items():
             T = targets(arm, way, count)
-            some = T[: max(count // 4, 1)]
+            sample = T[: max(count // 4, 1)]
             armkin.ik(arm, T[:2])
-            own, found = armkin.ik(arm, some), fast.ik(T)
+            python, compiled = armkin.ik(arm, sample), fast.ik(T)
             quick = 1e6 * least(lambda T=T: fast.ik(T), RUNS) / count  # type: ignore[misc]
             inside = 1e6 * min(c_alone(fast, T) for _ in range(RUNS)) / count
-            plain = 1e6 * least(lambda some=some: armkin.ik(arm, some)) / len(some)  # type: ignore[misc]
-            alone = [1e3 * least(lambda one=one: armkin.ik(arm, one)) for one in T[:ALONE]]  # type: ignore[misc]
+            plain = 1e6 * least(lambda sample=sample: armkin.ik(arm, sample)) / len(sample)  # type: ignore[misc]
+            alone = [1e3 * least(lambda goal=goal: armkin.ik(arm, goal)) for goal in T[:ALONE]]  # type: ignore[misc]
             print(
                 f"{name:14s} {label:5s} {quick:11.1f} {inside:11.1f} {plain:9.0f} {np.median(alone):12.2f} / "
-                f"{max(alone):.2f} {100 * found.complete.mean():16.2f} / {100 * own.complete.mean():.2f} %",
+                f"{max(alone):.2f} {100 * compiled.complete.mean():16.2f} / {100 * python.complete.mean():.2f} %",
                 flush=True,
             )
 

@@ -134,12 +134,12 @@ def near(poses: int, only: str) -> None:
     print(f"\n| class, off by | {HEAD} |\n|---|---|---|---|---|---|---|---|---|")
     for name in CLASSES:
         if only in name and "general" not in name:
-            for off in OFF:
+            for size in OFF:
                 case = random_case(name, 1)
-                arm, screw = moved(case.arm, off, 1)
+                arm, screw = moved(case.arm, size, 1)
                 begin = time.perf_counter()
                 report = examine(arm, screw, case.task, random_joints(screw, max(poses, 1), 1))
-                row(f"{name}, {off:.0e}", [report], time.perf_counter() - begin)
+                row(f"{name}, {size:.0e}", [report], time.perf_counter() - begin)
 
 
 def against_oracle(poses: int, arms: int, only: str) -> None:
@@ -162,9 +162,11 @@ def against_oracle(poses: int, arms: int, only: str) -> None:
                     part = np.arange(begin, min(begin + 50, len(report.q)))
                     missing = not_found(report, part, 60 if report.arm.n < 4 else 250, 3)
                     weak += [oracle.weakness(report.screw, report.goals.take([k]), q[None])[0] for k, q in missing]
-            count, branches = (sum(each) for each in zip(*((len(r.q), r.counts.sum()) for r in reports), strict=True))
-            where = " ".join(f"{w:.0e}" for w in weak[:5])
-            print(f"| {name} | {len(reports)} | {count} | {branches} | {len(weak)} | {where} |", flush=True)
+            count, branches = (
+                sum(column) for column in zip(*((len(r.q), r.counts.sum()) for r in reports), strict=True)
+            )
+            weak_text = " ".join(f"{w:.0e}" for w in weak[:5])
+            print(f"| {name} | {len(reports)} | {count} | {branches} | {len(weak)} | {weak_text} |", flush=True)
 
 
 ASKED = "| robot or class | asked | targets | wrong | complete | singular | us/pose |\n|---|---|---|---|---|---|---|"
@@ -185,13 +187,13 @@ def asked_arms(only: str, first: int) -> Iterator[tuple[str, Arm, oracle.Screws,
         if only in name or only == "classes":
             case = random_case(name, first)
             yield name, case.arm, case.screw, case.task, 50, 50
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for seed in range(first, first + (200 if only in RIGHT_ANGLES else 0)):
         made = case_of(right_angles(np.random.default_rng(seed)), "pose")
         with suppress(UsageError):  # it cannot reach poses at will
             method = solver(made.arm, "pose")[1].name
-            found[method] = found.get(method, 0) + 1
-            if found[method] <= 5:
+            counts[method] = counts.get(method, 0) + 1
+            if counts[method] <= 5:
                 yield f"{RIGHT_ANGLES} {seed}, {method}", made.arm, made.screw, "pose", 500, 500
 
 

@@ -59,10 +59,10 @@ def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
         middle = q[k] + 0.5 * np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
         across = truth.across(screw, goals.take([k]), middle[None], weak=1e-4)
         onto = bool(oracle.distance(screw, across[0], middle) > 0.1 * nearest[k])  # one of the two
-        off, turned = oracle.missing(screw, goals.take([k]), across)
+        residual, turned = oracle.missing(screw, goals.take([k]), across)
         # of a rotation's three columns two are at right angles to its axis, and each moves by the angle
         angle = turned[0] / (np.sqrt(2.0) if goals.orientation == "full" else 1.0)
-        lost[k] = onto or np.hypot(off[0] / arm.reach, angle) > 1e-9
+        lost[k] = onto or np.hypot(residual[0] / arm.reach, angle) > 1e-9
     B = s.q.shape[1]
     rows, columns = np.nonzero(s.valid)
     mm, rad = oracle.missing(screw, goals.take(rows), s.q[rows, columns])
@@ -79,12 +79,12 @@ def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
 
 def not_found(report: Report, rows: NDArray[np.int64], starts: int, seed: int) -> list[tuple[int, Array]]:
     """Solutions that the multi-start oracle knows and `armkin.ik` does not: (row, joints)."""
-    known = oracle.branches(report.screw, report.goals.take(rows), starts, seed)
-    out = []
-    for row, solutions in zip(rows, known, strict=True):
+    branches = oracle.branches(report.screw, report.goals.take(rows), starts, seed)
+    unlisted = []
+    for row, solutions in zip(rows, branches, strict=True):
         if not len(solutions):
             continue
         ours = report.solutions.q[row]
         d = oracle.distance(report.screw, solutions[:, None], ours[None]).min(axis=1, initial=np.inf)
-        out += [(int(row), q) for q in solutions[d > 1e-5]]
-    return out
+        unlisted += [(int(row), q) for q in solutions[d > 1e-5]]
+    return unlisted

@@ -138,13 +138,13 @@ class Field:
             start = self.over(b, c), self.over(a, c)
         else:
             two, three = self.root[2], self.root[3]
-            quadrant, rest = k // 6, k % 6
+            quadrant, remainder = k // 6, k % 6
             # 0, 15, .. 75 degrees
             cosines = [
                 1, self.over(two * (three + 1), 4), self.over(three, 2), self.over(two, 2), self.over(1, 2),
                 self.over(two * (three - 1), 4),
             ]  # fmt: skip
-            start = cosines[rest] % p, (cosines[6 - rest] if rest else 0) % p
+            start = cosines[remainder] % p, (cosines[6 - remainder] if remainder else 0) % p
         c, s = start
         for _ in range(quadrant):
             c, s = -s % p, c
@@ -164,9 +164,9 @@ class Field:
             A[[k, i]] = A[[i, k]]
             order[k], order[i] = order[i], order[k]
             A[k] = A[k] * pow(int(A[k, j]), -1, p) % p
-            other = np.flatnonzero(A[:, j])
-            other = other[other != k]
-            A[other] = (A[other] - A[other, j, None] * A[k] % p) % p
+            others_rows = np.flatnonzero(A[:, j])
+            others_rows = others_rows[others_rows != k]
+            A[others_rows] = (A[others_rows] - A[others_rows, j, None] * A[k] % p) % p
             columns.append(j)
             if len(columns) == len(A):
                 break
@@ -204,11 +204,11 @@ class Series:
     def times(self, a: Ints, b: Ints) -> Ints:
         """Products of polynomials (..., P)."""
         a, b = np.broadcast_arrays(a, b)
-        out = np.zeros(a.shape, np.int64)
+        product = np.zeros(a.shape, np.int64)
         for i, (with_, to) in enumerate(self.products):
             if a[..., i].any():
-                out[..., to] = (out[..., to] + a[..., i, None] * b[..., with_]) % self.p
-        return out
+                product[..., to] = (product[..., to] + a[..., i, None] * b[..., with_]) % self.p
+        return product
 
 
 # ---- the arm
@@ -260,18 +260,18 @@ def structure(field: Field, arm: str, letters: str) -> Posture:
     """What a posture is."""
     p, n = field.p, len(letters)
     linear = Series(field, n, 1)
-    at = linear.zeros(n)
-    at[np.arange(n), [linear.place[tuple(row)] for row in np.eye(n, dtype=int).tolist()]] = 1
-    place = at.argmax(axis=1)
-    J = equations(field, linear, arm, letters, at)[:, place]
+    variables = linear.zeros(n)
+    variables[np.arange(n), [linear.place[tuple(row)] for row in np.eye(n, dtype=int).tolist()]] = 1
+    place = variables.argmax(axis=1)
+    J = equations(field, linear, arm, letters, variables)[:, place]
     _, solved, rows = field.reduced(J)
     lost = n - len(solved)
     if not lost:
         return Posture(arm, letters, 0, 1, "")
     series = Series(field, lost, DEGREE[lost])
-    kept = [j for j in range(n) if j not in solved]
+    unsolved = [j for j in range(n) if j not in solved]
     t = series.zeros(n)
-    for k, j in enumerate(kept):
+    for k, j in enumerate(unsolved):
         t[j, series.place[tuple(int(i == k) for i in range(lost))]] = 1
     back = field.inverse(J[np.ix_(rows, solved)])
     for _ in range(int(series.degrees.max())):  # each makes the series right by one degree more
@@ -290,13 +290,13 @@ def _multiplicity(field: Field, series: Series, g: Ints) -> int:
     """The sum of the Hilbert function of the ideal of g (m, P); 0 if it does not end within the series' degree."""
     multiples = []
     for e in series.powers:
-        one = series.zeros()
-        one[series.place[e]] = 1
-        multiples.append(series.times(g, one))
+        monomial = series.zeros()
+        monomial[series.place[e]] = 1
+        multiples.append(series.times(g, monomial))
     every, before = np.concatenate(multiples), 0
     for degree in range(int(series.degrees.max()) + 1):
-        some = series.degrees <= degree
-        dimension = int(some.sum()) - field.rank(every[:, some])
+        low = series.degrees <= degree
+        dimension = int(low.sum()) - field.rank(every[:, low])
         if dimension == before:
             return dimension
         before = dimension
@@ -307,17 +307,17 @@ def rows(rng: np.random.Generator, number: int, choices: list[list[int]], count:
     """Lines of the file: so many postures of an arm, of letters as choices say."""
     arm, (_, kinds, _) = list(ARMS.items())[number]
     first, second = map(Field, PRIMES)
-    seen: dict[str, str] = {}
-    while len(seen) < count:
+    row_of: dict[str, str] = {}
+    while len(row_of) < count:
         choice = choices[int(rng.integers(len(choices)))]
         letters = "".join(
             LETTERS[int(rng.integers(len(SLIDES)) if kind == "P" else rng.choice(choice))] for kind in kinds
         )
-        if letters not in seen:
-            found = structure(first, arm, letters)
-            assert not found.lost or found == structure(second, arm, letters)
-            seen[letters] = f"{number} {letters} {found.lost} {found.multiplicity} {found.moving or '-'}"
-    return list(seen.values())
+        if letters not in row_of:
+            posture = structure(first, arm, letters)
+            assert not posture.lost or posture == structure(second, arm, letters)
+            row_of[letters] = f"{number} {letters} {posture.lost} {posture.multiplicity} {posture.moving or '-'}"
+    return list(row_of.values())
 
 
 def main() -> None:

@@ -100,21 +100,21 @@ def random_joints(arm: Arm, count: int, seed: int) -> Array:
     return np.where(arm[1], rng.uniform(-500, 500, (count, 6)), rng.uniform(-np.pi, np.pi, (count, 6)))
 
 
-def distance(arm: Arm, q: Array, other: Array) -> Array:
+def distance(arm: Arm, q: Array, q_other: Array) -> Array:
     """Largest joint difference, modulo whole turns and in scaled lengths; infinite where a row is NaN."""
-    step = q - other
+    step = q - q_other
     step = np.where(arm[1], step / size(arm), step - 2 * np.pi * np.round(step / (2 * np.pi)))
     return np.asarray(np.nan_to_num(np.abs(step).max(axis=-1), nan=np.inf))
 
 
-def miss(arm: Arm, q: Array, found: Array) -> Array:
+def miss(arm: Arm, q: Array, branches: Array) -> Array:
     """How far the nearest of the answers (N, B, 6) is from the joints (N, 6) that made the target."""
-    return np.asarray(distance(arm, found, q[:, None]).min(axis=1, initial=np.inf))
+    return np.asarray(distance(arm, branches, q[:, None]).min(axis=1, initial=np.inf))
 
 
-def pose_residual(arm: Arm, found: Array, T: Array) -> float:
+def pose_residual(arm: Arm, branches: Array, T: Array) -> float:
     """The largest pose error of all answers (N, B, 6) for targets (N, 4, 4), lengths scaled."""
-    difference = forward(arm, found) - T[:, None]
+    difference = forward(arm, branches) - T[:, None]
     difference[..., :3, 3] /= size(arm)
     return float(np.nanmax(np.sqrt(np.sum(difference**2, axis=(-2, -1))), initial=0.0))
 

@@ -99,8 +99,8 @@ def spatial(rng: Rng, pattern: str, w: list[Any], q: list[Any], **more: Any) -> 
 def unit(rng: Rng) -> Array:
     """A random direction."""
     v = rng.standard_normal(3)
-    out: Array = v / np.linalg.norm(v)
-    return out
+    direction: Array = v / np.linalg.norm(v)
+    return direction
 
 
 def either(rng: Rng, v: Array) -> Array:

@@ -125,22 +125,22 @@ def forward_and_jacobian(screw: Screws, q: Array) -> tuple[Array, Array]:
     """
     M, n = q.shape
     s, c1 = np.sin(q.T), 2 * np.sin(q.T / 2) ** 2
-    R, at = np.repeat(np.eye(3)[..., None], M, axis=2), np.zeros((3, M))
+    R, position = np.repeat(np.eye(3)[..., None], M, axis=2), np.zeros((3, M))
     axes, points = np.empty((n, 3, M)), np.empty((n, 3, M))
     for i, slides in enumerate(screw.prismatic):
         w, p = screw.w[i], screw.p[i]
         K, twice = _generators(w.tobytes())
         constant = np.column_stack([w, p, K @ p, twice @ p, K, twice])
         moved = (constant.T @ R.reshape(3, -1)).reshape(10, 3, M)
-        axes[i], points[i] = moved[0], moved[1] + at
+        axes[i], points[i] = moved[0], moved[1] + position
         if slides:
-            at = at + q[:, i] * moved[0]
+            position = position + q[:, i] * moved[0]
         else:
             R = R + s[i] * moved[4:7] + c1[i] * moved[7:10]
-            at = at - s[i] * moved[2] - c1[i] * moved[3]
+            position = position - s[i] * moved[2] - c1[i] * moved[3]
     T = np.zeros((4, 4, M))
     T[:, :3] = (screw.M[:3].T @ R.reshape(3, -1)).reshape(4, 3, M)
-    T[3, :3] += at
+    T[3, :3] += position
     T[3, 3] = 1.0
     lever, slide = T[3, :3] - points, screw.prismatic[:, None, None]
     ahead, behind = [1, 2, 0], [2, 0, 1]
@@ -190,8 +190,8 @@ def missing(screw: Screws, goals: Goal, q: Array) -> tuple[Array, Array]:
     mm = np.linalg.norm((T - goals.T)[:, : goals.position, 3], axis=1)
     parts = [np.zeros((len(q), 1))]
     if len(goals.sums):
-        off = q @ goals.sums.T + goals.offsets - goals.sum_values
-        parts.append(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
+        error = q @ goals.sums.T + goals.offsets - goals.sum_values
+        parts.append(error - 2 * np.pi * np.rint(error / (2 * np.pi)))
     if goals.orientation != "none":
         first = 2 if goals.orientation == "axis" else 0
         parts.append((T - goals.T)[:, :3, first:3].reshape(len(q), 3 * (3 - first)))
@@ -203,8 +203,8 @@ def _residual(screw: Screws, goals: Goal, q: Array) -> tuple[Array, Array]:
     T, J = forward_and_jacobian(screw, q)
     r = [(goals.T - T)[:, : goals.position, 3] / screw.size]
     if len(goals.sums):
-        off = goals.sum_values - goals.offsets - q @ goals.sums.T
-        r.append(off - 2 * np.pi * np.rint(off / (2 * np.pi)))
+        error = goals.sum_values - goals.offsets - q @ goals.sums.T
+        r.append(error - 2 * np.pi * np.rint(error / (2 * np.pi)))
     if goals.orientation == "full":
         r.append(0.5 * np.cross(T[:, :3, :3], goals.T[:, :3, :3], axis=1).sum(axis=2))
     if goals.orientation == "axis":
@@ -240,10 +240,10 @@ def newton(screw: Screws, goals: Goal, q: Array, steps: int = 40) -> tuple[Array
         step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         trial = q[active] + step * unit
         r_new, J_new = _residual(screw, goals.take(active), trial)
-        now = np.einsum("mr,mr->m", r_new, r_new)
-        better = now < cost[active]
+        trial_cost = np.einsum("mr,mr->m", r_new, r_new)
+        better = trial_cost < cost[active]
         rows = active[better]
-        q[rows], r[rows], J[rows], cost[rows] = trial[better], r_new[better], J_new[better], now[better]
+        q[rows], r[rows], J[rows], cost[rows] = trial[better], r_new[better], J_new[better], trial_cost[better]
         damping[active] = np.where(better, damping[active] * 0.1, damping[active] * 8.0)
         damping[active] = np.clip(damping[active], 1e-14, 1e8)
         active = active[(cost[active] > 1e-30) & (damping[active] < 1e6)]
@@ -262,15 +262,15 @@ def branches(screw: Screws, goals: Goal, starts: int, seed: int) -> list[Array]:
     )
     mm, rad = missing(screw, goals.take(np.repeat(np.arange(count), starts)), q)
     good = (size < 1e-11) & (mm < 1e-8 * screw.size) & (rad < 1e-8)
-    out = []
+    sets = []
     for k in range(count):
         rows = q[k * starts : (k + 1) * starts][good[k * starts : (k + 1) * starts]]
-        kept: list[Array] = []
+        distinct: list[Array] = []
         while len(rows):
-            kept.append(rows[0])
+            distinct.append(rows[0])
             rows = rows[distance(screw, rows, rows[0]) > 1e-4]
-        out.append(np.array(kept).reshape(-1, n))
-    return out
+        sets.append(np.array(distinct).reshape(-1, n))
+    return sets
 
 
 def distance(screw: Screws, a: Array, b: Array) -> Array:

@@ -44,8 +44,8 @@ def test_round_postures_and_singular_surfaces_of_right_angled_arms(seed: int) ->
     q = np.concatenate(list(kinds.values()))
     target = goal(definition, screw, q).array()
     for near in (None, q):
-        verdict, what = truth.judged(arm, screw, kinds, target, near, task)
-        assert verdict, what
+        verdict, report = truth.judged(arm, screw, kinds, target, near, task)
+        assert verdict, report
 
 
 @pytest.mark.parametrize(

@@ -28,18 +28,18 @@ def leads_to(screw: Screws, goals: Goal, q: Array, to: Array) -> Bool:
     way = np.repeat([1.0, -1.0], len(q))
     goals, q, to = goals.take(np.tile(np.arange(len(q)), 2)), np.tile(q, (2, 1)), np.tile(to, (2, 1, 1))
     met = np.zeros(to.shape[:2], bool)
-    at, last, going = q.copy(), np.zeros_like(q), np.ones(len(q), bool)
+    standing, last, going = q.copy(), np.zeros_like(q), np.ones(len(q), bool)
     for step in range(250):
         k = np.flatnonzero(going)
-        _, J = oracle._residual(screw, goals.take(k), at[k])
+        _, J = oracle._residual(screw, goals.take(k), standing[k])
         ahead = np.linalg.svd(J)[2][:, -1]
         side = (ahead * last[k]).sum(axis=1) if step else way * ahead[:, np.abs(ahead[0]).argmax()]
         last[k] = ahead * np.sign(side)[:, None]
-        there = truth.across(screw, goals.take(k), at[k] + STEP * last[k], weak=1e-4)
-        at[k] = truth.across(screw, goals.take(k), there, weak=1e-4)
-        met[k] |= oracle.distance(screw, to[k], at[k][:, None]) < 0.75 * STEP
-        back = (step > 2) & (np.linalg.norm(truth._way(screw, q[k], at[k]), axis=1) < 0.6 * STEP)
-        stray = np.linalg.norm(oracle._residual(screw, goals.take(k), at[k])[0], axis=1) > 1e-7
+        beside = truth.across(screw, goals.take(k), standing[k] + STEP * last[k], weak=1e-4)
+        standing[k] = truth.across(screw, goals.take(k), beside, weak=1e-4)
+        met[k] |= oracle.distance(screw, to[k], standing[k][:, None]) < 0.75 * STEP
+        back = (step > 2) & (np.linalg.norm(truth._way(screw, q[k], standing[k]), axis=1) < 0.6 * STEP)
+        stray = np.linalg.norm(oracle._residual(screw, goals.take(k), standing[k])[0], axis=1) > 1e-7
         going[k] = ~(back | stray)
         if not going.any():
             break
@@ -58,11 +58,11 @@ def test_each_circuit_is_listed_once(name: str, surface: str, sample: Callable[[
     s = armkin.ik(arm, goals.array())
     k = np.flatnonzero((s.status == Status.SINGULAR) & (s.free.sum(axis=1) > 2))
     assert len(k) > sample(15, 7)
-    here = oracle.distance(screw, s.q[k], q[k][:, None]).min(axis=1) < 1e-3
+    is_listed = oracle.distance(screw, s.q[k], q[k][:, None]).min(axis=1) < 1e-3
     held = np.where(s.free[k, None], 0.0, np.abs(truth._way(screw, q[k][:, None], s.q[k]))).max(axis=2)
-    on = leads_to(screw, goals.take(k), q[k], s.q[k]) & (held < 1e-4)
-    assert (here | on.any(axis=1)).all(), q[k[~(here | on.any(axis=1))]]
-    assert (on.sum(axis=1) <= 1).all(), q[k[on.sum(axis=1) > 1]]
+    leads = leads_to(screw, goals.take(k), q[k], s.q[k]) & (held < 1e-4)
+    assert (is_listed | leads.any(axis=1)).all(), q[k[~(is_listed | leads.any(axis=1))]]
+    assert (leads.sum(axis=1) <= 1).all(), q[k[leads.sum(axis=1) > 1]]
 
 
 def test_circuits_that_nearly_meet_are_two() -> None:
@@ -85,9 +85,9 @@ def test_of_a_self_motion_with_two_ends_the_posture_nearest_to_near_is_listed(de
     """A folded wrist all but on two axes: 0.2 rad long, and both of its roots were taken for self-motions."""
     arm, q = armkin.load("puma560"), np.radians(degrees)
     s = armkin.ik(arm, armkin.fk(arm, q))
-    off = np.abs(np.angle(np.exp(1j * (s.q[s.valid] - q)))).max(axis=1)
-    assert off.min() < 1e-6  # nearer to home than the other root of the same component
-    assert (off < 0.25).sum() == 1
+    distance = np.abs(np.angle(np.exp(1j * (s.q[s.valid] - q)))).max(axis=1)
+    assert distance.min() < 1e-6  # nearer to home than the other root of the same component
+    assert (distance < 0.25).sum() == 1
 
 
 @pytest.mark.parametrize(

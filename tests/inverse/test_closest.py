@@ -48,12 +48,12 @@ def test_no_legal_pose_nearby_is_better(name: str, task: str | None, target: lis
     np.testing.assert_allclose(closest.position, T[:3, 3], atol=1e-9)
     p = task_for(arm, task).position
     assert closest.distance == pytest.approx(np.linalg.norm(T[:p, 3] - np.array(target)[:p]), abs=1e-9)
-    here = cost(arm, task, np.array(target), closest.q[None])[0]
+    closest_cost = cost(arm, task, np.array(target), closest.q[None])[0]
     rng = np.random.default_rng(1)
     for size in (1e-4, 1e-3, 1e-2, 0.1):
         step = rng.normal(size=(2000, arm.n)) * size * np.where(arm.prismatic, arm.reach / 5, 1.0)
         around = np.clip(closest.q + step, arm.lower, arm.upper)
-        assert cost(arm, task, np.array(target), around).min() >= here * (1 - 1e-9) - 1e-9
+        assert cost(arm, task, np.array(target), around).min() >= closest_cost * (1 - 1e-9) - 1e-9
 
 
 def test_poses_that_five_joints_cannot_reach() -> None:
@@ -64,18 +64,20 @@ def test_poses_that_five_joints_cannot_reach() -> None:
     assert s.status == armkin.Status.EXACT
     assert s.valid.any()
     assert s.complete
-    off = T.copy()
-    off[:3, :3] = off[:3, :3] @ np.array([[1, 0, 0], [0, np.cos(0.2), -np.sin(0.2)], [0, np.sin(0.2), np.cos(0.2)]])
-    s = armkin.ik(arm, off, "pose")
+    tilted = T.copy()
+    tilted[:3, :3] = tilted[:3, :3] @ np.array(
+        [[1, 0, 0], [0, np.cos(0.2), -np.sin(0.2)], [0, np.sin(0.2), np.cos(0.2)]]
+    )
+    s = armkin.ik(arm, tilted, "pose")
     assert s.status == armkin.Status.UNREACHABLE
-    closest = armkin.closest(arm, off, "pose")
+    closest = armkin.closest(arm, tilted, "pose")
     assert closest.converged
     assert 0.0 < closest.angle < 0.25
-    here = cost(arm, "pose", off, closest.q[None])[0]
+    closest_cost = cost(arm, "pose", tilted, closest.q[None])[0]
     rng = np.random.default_rng(2)
     for size in (1e-3, 1e-2, 0.1):
         around = np.clip(closest.q + rng.normal(size=(2000, 5)) * size, arm.lower, arm.upper)
-        assert cost(arm, "pose", off, around).min() >= here * (1 - 1e-9)
+        assert cost(arm, "pose", tilted, around).min() >= closest_cost * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(("name", "count"), [("three_dof", 3), ("ra02", 4), ("moveo", 5), ("labvolt_5150", 5)])

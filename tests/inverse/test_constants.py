@@ -38,8 +38,8 @@ OFFSETS = np.array([0.0, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3,
 def part(head: str) -> dict[str, ast.expr]:
     """The constants below a heading, name to value."""
     lines = TEXT.split(f"# ---- {head}")[1].split("\n# ----")[0].split("\n", 1)[1]
-    found = (node for node in ast.parse(lines).body if isinstance(node, ast.Assign))
-    return {ast.unparse(node.targets[0]): node.value for node in found}
+    assignments = (node for node in ast.parse(lines).body if isinstance(node, ast.Assign))
+    return {ast.unparse(node.targets[0]): node.value for node in assignments}
 
 
 ALL = {*part("what decides a word"), *part("what follows from these")}
@@ -83,8 +83,8 @@ def test_at_most_twelve_constants_decide_and_each_is_derived() -> None:
 
 def words(sets: list[tuple[armkin.Arm, truth.Array, truth.Array | None]]) -> truth.Array:
     """Status, number of branches, completeness, number of free joints of each target."""
-    found = [armkin.ik(arm, target, near=near) for arm, target, near in sets]
-    rows = [np.column_stack([s.status, s.valid.sum(axis=1), s.complete, s.free.sum(axis=1)]) for s in found]
+    answers = [armkin.ik(arm, target, near=near) for arm, target, near in sets]
+    rows = [np.column_stack([s.status, s.valid.sum(axis=1), s.complete, s.free.sum(axis=1)]) for s in answers]
     return np.concatenate(rows).astype(float)
 
 

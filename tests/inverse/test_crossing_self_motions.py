@@ -32,15 +32,15 @@ def test_self_motions_that_meet_are_listed_once_each_and_none_by_its_corner(q: l
     arm, screw = shipped("fanuc_crx10ia")
     task, _ = solver(arm, "pose")
     joints = np.radians([q])
-    at = goal(task, screw, joints)
+    goals = goal(task, screw, joints)
     for near in (None, joints):
-        verdict = truth.judge(arm, screw, "pose", joints, at.array(), near)
+        verdict = truth.judge(arm, screw, "pose", joints, goals.array(), near)
         assert verdict, verdict
-        found = verdict.solutions.q[0][verdict.solutions.valid[0]]
-        across = np.abs(np.cos(found[:, 0])) < 1e-12  # joint 1 at 90 or -90: joints 2 and 5 move
-        assert sorted(np.sin(found[across, 0]).round(9)) == [-1, 1]
-        assert sorted(np.cos(found[~across, 1]).round(9)) == [-1, 1]  # joint 2 at 180 or 0: joints 1 and 4
-        assert weakness(screw, at.take([0] * 4), found).max() < 1e-15
+        listed = verdict.solutions.q[0][verdict.solutions.valid[0]]
+        across = np.abs(np.cos(listed[:, 0])) < 1e-12  # joint 1 at 90 or -90: joints 2 and 5 move
+        assert sorted(np.sin(listed[across, 0]).round(9)) == [-1, 1]
+        assert sorted(np.cos(listed[~across, 1]).round(9)) == [-1, 1]  # joint 2 at 180 or 0: joints 1 and 4
+        assert weakness(screw, goals.take([0] * 4), listed).max() < 1e-15
 
 
 @pytest.mark.parametrize(
@@ -108,8 +108,8 @@ def test_self_motions_that_cross_are_found_from_anywhere() -> None:
     arm, _ = shipped("wx250s")
     target = armkin.fk(arm, np.radians([0.0, 90.0, 90.0, 90.0, 180.0, 0.0]))
     near = np.radians([[47, -79, -158, -166, 108, 142], [123, -160, 79, -112, 125, 14], [32, -56, -37, 134, -94, 42]])
-    for one in near:
-        assert armkin.ik(arm, target, near=one).valid.sum() == 8
+    for posture in near:
+        assert armkin.ik(arm, target, near=posture).valid.sum() == 8
 
 
 def test_a_self_motion_that_hardly_turns_joint_6_is_listed_once() -> None:

@@ -264,8 +264,8 @@ def test_round_angles_and_lengths(sample: Callable[[int, int], int]) -> None:
         q = np.where(rng.random((40, 3)) < 0.3, rng.uniform(-3, 3, (40, 3)), q)
         report = examine(c.arm, c.screw, "xyz", np.where(c.screw.prismatic, rng.integers(-2, 3, (40, 3)) * 50.0, q))
         s = report.solutions
-        off = distance(c.screw, s.q, report.q[:, None]).min(axis=1)
-        assert not ((s.status != Status.SINGULAR) & (off > np.where(report.weak < 1e-6, 2e-2, 1e-6))).any()
+        distances = distance(c.screw, s.q, report.q[:, None]).min(axis=1)
+        assert not ((s.status != Status.SINGULAR) & (distances > np.where(report.weak < 1e-6, 2e-2, 1e-6))).any()
 
 
 def test_two_slides_that_become_parallel() -> None:

@@ -46,8 +46,8 @@ def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped:
     """Guesses (M, 6) moved onto their targets (M, 4, 4), and the residuals (M,), lengths over the links' sum."""
     length = float(np.linalg.norm(link[1:, :3, 3], axis=1).sum()) or 300.0
     unit = np.where(prismatic, length, 1.0)
-    found = refine(shrunk(link, length), prismatic, q / unit, shrunk(T, length), steps, damped)
-    return found.q * unit, found.residual
+    refined = refine(shrunk(link, length), prismatic, q / unit, shrunk(T, length), steps, damped)
+    return refined.q * unit, refined.residual
 
 
 def solve(arm: Arm, T: Array) -> tuple[Array, Bool]:
@@ -71,16 +71,16 @@ def test_polish_converges_to_the_nearby_solution(name: str, damped: bool) -> Non
     q = random_joints(arm, 50, 2)
     q = q[smallest_singular_value(arm, q) > 0.02]
     near = q + np.where(arm[1], 1.0, 1e-3) * np.random.default_rng(3).uniform(-1, 1, q.shape)
-    found, residual = polish(*arm, near, forward(arm, q), steps=10, damped=damped)
+    polished, residual = polish(*arm, near, forward(arm, q), steps=10, damped=damped)
     assert residual.max() < 1e-13
-    assert distance(arm, found, q).max() < 1e-10
+    assert distance(arm, polished, q).max() < 1e-10
 
 
 def test_polish_keeps_the_best_point_and_says_how_far_it_is() -> None:
     arm = ARMS["JACO"]
     q = random_joints(arm, 5, 4)
-    found, residual = polish(*arm, q + 0.1, forward(arm, q), steps=0)
-    np.testing.assert_array_equal(found, q + 0.1)
+    polished, residual = polish(*arm, q + 0.1, forward(arm, q), steps=0)
+    np.testing.assert_array_equal(polished, q + 0.1)
     assert residual.min() > 1e-3
 
 
@@ -116,8 +116,8 @@ def test_generating_joints_are_among_the_branches(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["PUMA", "STANFORD"])
 def test_spherical_wrists_are_slower_but_found(name: str) -> None:
-    found, _ = check(ARMS[name], random_joints(ARMS[name], 60, 1))
-    assert (~np.isnan(found[..., 0])).sum(axis=1).max() == 8
+    branches, _ = check(ARMS[name], random_joints(ARMS[name], 60, 1))
+    assert (~np.isnan(branches[..., 0])).sum(axis=1).max() == 8
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -129,18 +129,18 @@ def test_general_arms(seed: int) -> None:
 @pytest.mark.parametrize("pattern", PRISMATIC_PATTERNS)
 def test_prismatic_joints_anywhere(pattern: str) -> None:
     arm = random_arm(len(pattern) + PRISMATIC_PATTERNS.index(pattern), pattern)
-    found, _ = check(arm, random_joints(arm, 40, 5))
+    branches, _ = check(arm, random_joints(arm, 40, 5))
     if pattern.count("P") == 3:
-        assert found.shape[1] == 2
+        assert branches.shape[1] == 2
 
 
 def test_sixteen_branches() -> None:
     """A pose of the Manocha-Canny arm on which all sixteen branches are real."""
     arm = ARMS["MC"]
     q = np.array([[-0.552, 1.427, 0.77, -2.413, -2.23, 1.76]])
-    found, _ = check(arm, q)
-    assert found.shape == (1, 16, 6)
-    assert not np.isnan(found).any()
+    branches, _ = check(arm, q)
+    assert branches.shape == (1, 16, 6)
+    assert not np.isnan(branches).any()
 
 
 # ---- against an independent oracle -------------------------------------------------------------------------
@@ -153,11 +153,11 @@ def oracle(arm: Arm, T: Array, starts: int, seed: int) -> list[Array]:
         q = random_joints(arm, starts, seed)
         q, residual = polish(*arm, q, np.repeat(pose[None], starts, axis=0), steps=40, damped=True)
         q = q[residual < 1e-11]
-        kept: list[Array] = []
+        distinct: list[Array] = []
         while len(q):
-            kept.append(q[0])
+            distinct.append(q[0])
             q = q[distance(arm, q, q[0]) > 1e-5]
-        sets.append(np.array(kept).reshape(-1, 6))
+        sets.append(np.array(distinct).reshape(-1, 6))
     return sets
 
 
@@ -165,11 +165,11 @@ def oracle(arm: Arm, T: Array, starts: int, seed: int) -> list[Array]:
 def test_branches_equal_a_multi_start_oracle(name: str) -> None:
     arm = random_arm(21, name) if "P" in name else random_arm(20) if name == "random" else ARMS[name]
     T = forward(arm, random_joints(arm, 6, 8))
-    found, _ = solve(arm, T)
-    for branches, known in zip(found, oracle(arm, T, 500, 9), strict=True):
+    listed, _ = solve(arm, T)
+    for branches, expected in zip(listed, oracle(arm, T, 500, 9), strict=True):
         rows = branches[~np.isnan(branches[:, 0])]
-        assert len(rows) == len(known)
-        assert distance(arm, rows[:, None], known[None]).min(axis=1).max() < 1e-7
+        assert len(rows) == len(expected)
+        assert distance(arm, rows[:, None], expected[None]).min(axis=1).max() < 1e-7
 
 
 # ---- where elimination is known to be hard -----------------------------------------------------------------
@@ -177,16 +177,16 @@ def test_branches_equal_a_multi_start_oracle(name: str) -> None:
 OFF = [0.0, 1e-15, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3]
 
 
-@pytest.mark.parametrize("off", OFF)
-def test_axes_that_are_almost_parallel(off: float) -> None:
+@pytest.mark.parametrize("tilt", OFF)
+def test_axes_that_are_almost_parallel(tilt: float) -> None:
     jaco = dh(
-        [90, 180 + np.degrees(off), 90, 60, 60, 180],
+        [90, 180 + np.degrees(tilt), 90, 60, 60, 180],
         [0, 410, 0, 0, 0, 0],
         [275.5, 0, -9.8, -250.081655, -85.56331, -202.781655],
         [0, -90, 90, 0, -180, 90],
     )
     check(jaco, random_joints(jaco, 60, 6))
-    angle = np.degrees(off)
+    angle = np.degrees(tilt)
     ur = dh(
         [90, angle, -angle, 90, -90, 0],
         [0, -425, -392.2, 0, 0, 0],
@@ -196,10 +196,10 @@ def test_axes_that_are_almost_parallel(off: float) -> None:
     check(ur, random_joints(ur, 60, 6))
 
 
-@pytest.mark.parametrize("off", [1e-6, 1e-4, 1e-2, 10.0])
-def test_axes_that_almost_meet(off: float) -> None:
+@pytest.mark.parametrize("offset", [1e-6, 1e-4, 1e-2, 10.0])
+def test_axes_that_almost_meet(offset: float) -> None:
     """A spherical wrist with its fifth link this long [mm]."""
-    puma = dh([90, 0, -90, 90, -90, 0], [0, 431.8, 20.3, 0, off, 0], [671.83, 0, 150.05, 431.8, 0, 0], [0.0] * 6)
+    puma = dh([90, 0, -90, 90, -90, 0], [0, 431.8, 20.3, 0, offset, 0], [671.83, 0, 150.05, 431.8, 0, 0], [0.0] * 6)
     check(puma, random_joints(puma, 40, 12))
 
 
@@ -212,9 +212,9 @@ def test_frames_far_along_near_parallel_axes() -> None:
         [0, 90, 90, 90, 180, 90],
     )
     q = random_joints(arm, 60, 2)
-    found, _ = solve(arm, forward(arm, q))
+    branches, _ = solve(arm, forward(arm, q))
     # At 4e7 mm of lever arm a double's rounding is 1e-8 mm, and joints 2 and 3 share it.
-    assert miss(arm, q, found).max() < 1e-6
+    assert miss(arm, q, branches).max() < 1e-6
 
 
 @pytest.mark.parametrize("name", ["JACO", "CRX", "MD16", "MC", "GEN3L", "UR5e", "IRB2400"])
@@ -226,9 +226,9 @@ def test_joints_at_round_angles(name: str) -> None:
     q = np.where(rng.random((80, 6)) < 0.5, round_angles, random_joints(arm, 80, 11))
     q = q[smallest_singular_value(arm, q) > 5e-3]
     T = forward(arm, q)
-    found, _ = solve(arm, T)
-    assert miss(arm, q, found).max() < 1e-6
-    assert pose_residual(arm, found, T) < 1e-9
+    branches, _ = solve(arm, T)
+    assert miss(arm, q, branches).max() < 1e-6
+    assert pose_residual(arm, branches, T) < 1e-9
 
 
 @pytest.mark.parametrize("nearness", [1e-3, 1e-5, 1e-7])
@@ -238,10 +238,10 @@ def test_near_singular_poses(name: str, nearness: float) -> None:
     arm = ARMS[name]
     q = singular_joints(arm, 25)
     q[:, 4] += nearness
-    found, near_singular = solve(arm, forward(arm, q))
+    branches, near_singular = solve(arm, forward(arm, q))
     # The two may be told apart down to 2e-6; below, one answer between them is as good as the pose tells.
-    assert miss(arm, q, found).max() < max(1e-6, 3e-7 if nearness > 1e-6 else 3e-6)
-    assert (~np.isnan(found[..., 0])).sum(axis=1).max() <= 16
+    assert miss(arm, q, branches).max() < max(1e-6, 3e-7 if nearness > 1e-6 else 3e-6)
+    assert (~np.isnan(branches[..., 0])).sum(axis=1).max() <= 16
     if nearness < 1e-4:
         assert near_singular.all()
 
@@ -268,10 +268,10 @@ def singular_joints(arm: Arm, count: int) -> Array:
 def test_double_root_on_the_singularity_is_one_answer() -> None:
     arm = ARMS["JACO"]
     q = singular_joints(arm, 20)
-    found, near_singular = solve(arm, forward(arm, q))
-    assert miss(arm, q, found).max() < 1e-4  # a double root: the square root of rounding
+    listed, near_singular = solve(arm, forward(arm, q))
+    assert miss(arm, q, listed).max() < 1e-4  # a double root: the square root of rounding
     assert near_singular.all()
-    for branches, generating in zip(found, q, strict=True):
+    for branches, generating in zip(listed, q, strict=True):
         assert (distance(arm, branches, generating) < 1e-3).sum() == 1
 
 
@@ -320,11 +320,11 @@ def test_a_pose_has_the_same_branches_in_any_batch(monkeypatch: pytest.MonkeyPat
     arm = ARMS["CRX"]
     plan = method.prepare(*arm)
     T = forward(arm, random_joints(arm, 600, 15))
-    whole, doubt, *_ = method.solve(plan, T)
+    in_one_batch, doubt, *_ = method.solve(plan, T)
     monkeypatch.setattr(method, "BLOCK", 512)
     together, near_singular, *_ = method.solve(plan, T)
-    np.testing.assert_array_equal(np.isnan(together), np.isnan(whole))
-    np.testing.assert_allclose(together, whole, atol=1e-9)
+    np.testing.assert_array_equal(np.isnan(together), np.isnan(in_one_batch))
+    np.testing.assert_allclose(together, in_one_batch, atol=1e-9)
     np.testing.assert_array_equal(near_singular, doubt)
     together, _, *_ = method.solve(plan, T)
     for i in (0, 255, 256, 599):
@@ -341,10 +341,10 @@ def test_base_and_tool_anywhere() -> None:
     moved = link.copy()
     moved[0], moved[6] = base @ link[0], link[6] @ tool
     q = random_joints((moved, prismatic), 50, 17)
-    found, _ = solve((moved, prismatic), forward((moved, prismatic), q))
+    branches, _ = solve((moved, prismatic), forward((moved, prismatic), q))
     plain, _ = solve((link, prismatic), forward((link, prismatic), q))
-    assert miss((moved, prismatic), q, found).max() < 1e-7
-    np.testing.assert_array_equal(np.isnan(found), np.isnan(plain))
+    assert miss((moved, prismatic), q, branches).max() < 1e-7
+    np.testing.assert_array_equal(np.isnan(branches), np.isnan(plain))
 
 
 def test_arms_with_redundant_axes_are_doubtful_not_fatal() -> None:
@@ -361,6 +361,6 @@ def test_answers_of_equal_keys_are_not_taken_for_one() -> None:
     """Eight regular branches, two of which have the same number in the projection that sorts them."""
     arm = armkin.load("jaco_j2n6s300")
     q = np.deg2rad([-108.9918203, 6.12739868, -75.65079096, 170.20650872, -116.97452296, 22.97350995])
-    for found in (armkin.ik(arm, armkin.fk(arm, q)), armkin.compile(arm).ik(armkin.fk(arm, q))):
-        assert found.valid.sum() == 8
-        assert bool(found.complete)
+    for solutions in (armkin.ik(arm, armkin.fk(arm, q)), armkin.compile(arm).ik(armkin.fk(arm, q))):
+        assert solutions.valid.sum() == 8
+        assert bool(solutions.complete)

@@ -48,17 +48,17 @@ def test_no_root_of_a_branch_is_called_empty(name: int | str, monkeypatch: pytes
     closed = elimination.loop
     q = np.random.default_rng(5).uniform(-np.pi, np.pi, (200, 6)) * np.where(arm.prismatic, 100.0, 1.0)
     T = armkin.fk(arm, q)
-    known = method.solve(elimination, T).q
-    seen = 0
+    branches = method.solve(elimination, T).q
+    count = 0
     for pencil in elimination.plans[:3]:
         seed, joint = roots.seeds(pencil, inverse(closed.goal(T)), 0.02), pencil.hidden_joint
         unit = closed.length if arm.prismatic[joint] else 1.0
-        away = np.abs(known[seed.pose, :, joint] / unit - seed.q[:, None, joint])
+        away = np.abs(branches[seed.pose, :, joint] / unit - seed.q[:, None, joint])
         away = np.where(np.isnan(away), np.inf, away if arm.prismatic[joint] else np.abs(np.angle(np.exp(1j * away))))
         stands = (seed.tilt == 0) & (seed.gap > ALONE) & (away.min(axis=1) < 1e-6)
-        seen += int(stands.sum())
+        count += int(stands.sum())
         assert seed.defect[stands].max() < 1e-6
-    assert seen > 300
+    assert count > 300
 
 
 def test_steps_are_not_spent_on_complex_roots_that_stand_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,9 +67,9 @@ def test_steps_are_not_spent_on_complex_roots_that_stand_for_nothing(monkeypatch
     armkin.method(arm)
 
     def watched(*arguments: Any, **more: Any) -> polish.Polished:
-        done = polish.refine(*arguments, **more)
-        missed.append(int((done.guess > 1.0).sum()))
-        return done
+        refined = polish.refine(*arguments, **more)
+        missed.append(int((refined.guess > 1.0).sum()))
+        return refined
 
     monkeypatch.setattr(passes, "refine", watched)
     armkin.ik(arm, armkin.fk(arm, np.random.default_rng(0).uniform(-np.pi, np.pi, (300, 6))), examine=False)

@@ -46,15 +46,15 @@ def mixed(vectors: list[Array], weights: Array) -> Array:
 )
 def test_all_products_come_back_from_any_mixture(solutions: list[tuple[float, float]], wide: bool) -> None:
     rng = np.random.default_rng(0)
-    wanted = [product(*solution, wide) for solution in solutions]
+    products = [product(*solution, wide) for solution in solutions]
     for _ in range(20):
-        v = mixed(wanted, rng.normal(size=(len(wanted), len(wanted))))
+        v = mixed(products, rng.normal(size=(len(products), len(products))))
         weights, real, good = equal_roots.products(v)
         assert good.all()
         assert real.all()
-        found = (weights[0] @ v.reshape(len(wanted), -1)).reshape(-1, *wanted[0].shape)
-        for one in wanted:
-            cosines = [abs((f * one).sum()) / np.linalg.norm(f) / np.linalg.norm(one) for f in found]
+        recovered = (weights[0] @ v.reshape(len(products), -1)).reshape(-1, *products[0].shape)
+        for expected in products:
+            cosines = [abs((f * expected).sum()) / np.linalg.norm(f) / np.linalg.norm(expected) for f in recovered]
             assert max(cosines) == pytest.approx(1.0, abs=1e-10)
 
 
@@ -108,8 +108,8 @@ def test_solutions_that_differ_in_the_end_joints_alone_are_one_root_and_not_forg
 def test_a_shared_root_that_rounding_makes_a_complex_pair_is_two_solutions() -> None:
     """Of targets that differ by 1e-13 mm 72 in 400 had six branches, not eight, and said complete."""
     locked_arm = armkin.lock(armkin.load("kinova_gen3"), {"J7": np.deg2rad(75.6)})
-    own = np.deg2rad([-45.0, -90, 90, -180, 90, -45])
-    targets = np.repeat(armkin.fk(locked_arm, own)[None], 50, axis=0)
+    posture = np.deg2rad([-45.0, -90, 90, -180, 90, -45])
+    targets = np.repeat(armkin.fk(locked_arm, posture)[None], 50, axis=0)
     targets[:, :3, 3] += np.random.default_rng(0).uniform(-1e-13, 1e-13, (50, 3))
     s = armkin.ik(locked_arm, targets)
     assert (s.valid.sum(axis=1) == 8).all()

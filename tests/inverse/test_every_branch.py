@@ -75,8 +75,8 @@ def locked(screw: Screws, joint: int, value: float) -> Screws:
     w, p = screw.w.copy(), screw.p.copy()
     w[joint + 1 :] = w[joint + 1 :] @ E[:3, :3].T
     p[joint + 1 :] = p[joint + 1 :] @ E[:3, :3].T + E[:3, 3]
-    kept = [i for i in range(len(w)) if i != joint]
-    return Screws(w[kept], p[kept], screw.prismatic[kept], E @ screw.M)
+    free = [i for i in range(len(w)) if i != joint]
+    return Screws(w[free], p[free], screw.prismatic[free], E @ screw.M)
 
 
 def between_axes(screw: Screws) -> tuple[list[bool], list[float], list[bool]]:
@@ -92,9 +92,9 @@ def between_axes(screw: Screws) -> tuple[list[bool], list[float], list[bool]]:
 
 @pytest.mark.parametrize("name", ALIKE)
 def test_arms_called_alike_are(name: str) -> None:
-    one, other = (between_axes(shipped(each)[1]) for each in (name, ALIKE[name]))
-    assert (one[0], one[2]) == (other[0], other[2])
-    np.testing.assert_allclose(one[1], other[1], atol=1e-9)
+    first, second = (between_axes(shipped(arm_name)[1]) for arm_name in (name, ALIKE[name]))
+    assert (first[0], first[2]) == (second[0], second[2])
+    np.testing.assert_allclose(first[1], second[1], atol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -137,14 +137,14 @@ def is_special(name: str) -> bool:
 
 @pytest.mark.parametrize("name", sorted(name for name in COSTLY if is_special(name)))
 def test_random_arms_with_six_joints(name: str, sample: Callable[[int, int], int]) -> None:
-    others = 0
+    eliminated = 0
     for seed in range(sample(*SEEDS)):
         case = random_case(name, seed)
         report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 20, seed))
         check(report)
         s = report.solutions  # two of the arms happen to be within 1e-5 of a more special one
-        others += s.method == "general elimination" and "named after that class" not in s.why
-    assert others <= (1 if name.startswith("three") else 0)  # an arm of which the quartic is ill-conditioned
+        eliminated += s.method == "general elimination" and "named after that class" not in s.why
+    assert eliminated <= (1 if name.startswith("three") else 0)  # an arm of which the quartic is ill-conditioned
 
 
 @pytest.mark.parametrize("name", sorted(name for name in COSTLY if not is_special(name)))

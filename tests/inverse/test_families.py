@@ -214,19 +214,19 @@ def test_the_arm_angle_knows_all_families_of_a_class_whatever_its_zeros_and_elbo
     limits = np.stack([arm.lower, arm.upper], axis=1)
     limits[2] = -4.0, 1.0
     limits[6] = -np.inf, np.inf
-    other = from_links(links, [False] * 7, limits=limits)
+    turned_arm = from_links(links, [False] * 7, limits=limits)
     q = rng.uniform(np.maximum(limits[:, 0], -3), np.minimum(limits[:, 1], 3), (40, 7))
-    s = armkin.ik(other, armkin.fk(other, q), near=q)
+    s = armkin.ik(turned_arm, armkin.fk(turned_arm, q), near=q)
     assert s.why.endswith("arm angle")
     assert s.complete.all()
     assert np.nanmax(s.residual()) <= 1e-9
     assert s.motion[np.arange(40), s.best].max() <= 1e-9
-    s = armkin.ik(other, armkin.fk(other, q[:1]))
+    s = armkin.ik(turned_arm, armkin.fk(turned_arm, q[:1]))
     assert s.interval is not None
     legal = s.interval[0][s.within_limits[0]]
     for value in rng.uniform(-np.pi, np.pi, 8):
-        own = held_answers(other, 6, float(value), s.target[0], None)
-        assert covers(other, legal, float(value), 0.0).sum() == len(own)
+        postures = held_answers(turned_arm, 6, float(value), s.target[0], None)
+        assert covers(turned_arm, legal, float(value), 0.0).sum() == len(postures)
 
 
 def test_a_target_that_only_postures_outside_the_limits_reach_has_no_legal_interval() -> None:
@@ -264,8 +264,8 @@ def test_gaps_and_families_between_two_samples_are_listed(degrees: list[float], 
     target = armkin.fk(arm, np.deg2rad(degrees))
     s = armkin.ik(arm, target)
     assert s.interval is not None
-    own = held_answers(arm, 6, value, target, None)
-    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == len(own)
+    postures = held_answers(arm, 6, value, target, None)
+    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == len(postures)
 
 
 def axis_targets(arm: armkin.Arm, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -295,9 +295,9 @@ def test_a_joint_that_turns_about_the_tool_is_redundant_where_its_axis_alone_is_
     assert np.nanmax(rad) <= 1e-9
     turned = np.where(s.valid[..., None], s.q, 0.0)
     turned[..., 5] = 0.5
-    there = armkin.fk(arm, turned)
-    off = np.abs(np.concatenate([there[..., :3, 3], there[..., :3, 2]], axis=-1) - target[:, None])
-    assert off[s.valid].max() <= 1e-9 * arm.reach
+    poses = armkin.fk(arm, turned)
+    error = np.abs(np.concatenate([poses[..., :3, 3], poses[..., :3, 2]], axis=-1) - target[:, None])
+    assert error[s.valid].max() <= 1e-9 * arm.reach
     fast = armkin.compile(arm, "xyz_axis").ik(target, "xyz_axis", near=q)
     np.testing.assert_allclose(fast.q, s.q, atol=1e-9)
     assert (fast.complete == s.complete).all()
@@ -320,8 +320,8 @@ def test_a_batch_of_a_redundant_arm_may_be_compiled() -> None:
     """`--compiled` with a task by name was refused: 7 joints for 6 constraints."""
     arm = armkin.load("panda")
     q, target = postures(arm, None, 2, 7)
-    fast, own = armkin.compile(arm).ik(target, "pose", near=q), armkin.ik(arm, target, near=q)
-    np.testing.assert_allclose(fast.q, own.q, atol=1e-9)
+    fast, python = armkin.compile(arm).ik(target, "pose", near=q), armkin.ik(arm, target, near=q)
+    np.testing.assert_allclose(fast.q, python.q, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -336,11 +336,11 @@ def test_a_batch_of_a_redundant_arm_may_be_compiled() -> None:
 )
 def test_a_target_whose_changes_nobody_explains_is_sampled_alone_as_in_a_batch(degrees: list[int]) -> None:
     arm = armkin.load("panda")
-    T, other = (armkin.fk(arm, np.radians(q)) for q in (degrees, [10, -20, 30, -90, 40, 100, 50]))
-    alone, both = armkin.ik(arm, T), armkin.ik(arm, np.stack([T, other]))
+    T, second_target = (armkin.fk(arm, np.radians(q)) for q in (degrees, [10, -20, 30, -90, 40, 100, 50]))
+    alone, batch = armkin.ik(arm, T), armkin.ik(arm, np.stack([T, second_target]))
     count = alone.valid.sum()
     assert alone.interval is not None
-    assert both.interval is not None
-    np.testing.assert_array_equal(alone.interval[:count], both.interval[0, :count])
-    assert count == both.valid[0].sum() > 0
+    assert batch.interval is not None
+    np.testing.assert_array_equal(alone.interval[:count], batch.interval[0, :count])
+    assert count == batch.valid[0].sum() > 0
     assert not alone.complete

@@ -24,8 +24,8 @@ def test_tool_and_jacobian_are_those_of_the_exponentials(path: Path) -> None:
     assert np.abs(T - expected).max() < 1e-9
     assert np.abs(J - jacobian).max() < 1e-9
     assert np.abs(T[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2) - np.eye(3)).max() < 1e-14
-    one = np.array([armkin.fk(arm, row) for row in q[:50]])
-    assert np.abs(one - expected[:50]).max() < 1e-9
+    row_by_row = np.array([armkin.fk(arm, row) for row in q[:50]])
+    assert np.abs(row_by_row - expected[:50]).max() < 1e-9
 
 
 @pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
@@ -55,10 +55,10 @@ def test_few_poses_have_the_bits_of_many(name: str) -> None:
     arm = armkin.load(Path(__file__).parents[1] / "robots/ratio_arm.yaml" if name == "ratio_arm" else name)
     q = np.random.default_rng(3).uniform(-3.0, 3.0, (300, arm.n))
     for compute in (armkin.fk, armkin.jacobian, armkin.frames, position):
-        whole = compute(arm, q)
+        of_all = compute(arm, q)
         for _ in range(6):  # from the fifth call on it is recorded
             for count in (2, 3, 16, 17, 100):
-                assert np.array_equal(compute(arm, q[:count]), whole[:count])
+                assert np.array_equal(compute(arm, q[:count]), of_all[:count])
 
 
 def test_manipulability_and_condition_tell_a_singularity() -> None:

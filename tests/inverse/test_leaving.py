@@ -39,8 +39,10 @@ def test_the_word_changes_in_one_order_and_never_back(name: str) -> None:
             s = armkin.ik(arm, target, near=q)
             rank = np.array([RANK.get(Status(int(word)), 3) for word in s.status])
             assert (np.diff(rank) <= 0).all(), f"{family}: {[Status(int(word)).name for word in s.status]}"
-            own = local_structure(arm, task, q, target)
-            sure = own.known & (own.second > 1e-3)
-            assert (rank[sure & own.manifold] == 2).all(), family
-            short = own.high - own.low < 6e-4  # of longer ones a closed form does not say that two roots are close
-            assert (rank[sure & own.boundary & short] >= 1).all(), family
+            structure = local_structure(arm, task, q, target)
+            sure = structure.known & (structure.second > 1e-3)
+            assert (rank[sure & structure.manifold] == 2).all(), family
+            short = (
+                structure.high - structure.low < 6e-4
+            )  # of longer ones a closed form does not say that two roots are close
+            assert (rank[sure & structure.boundary & short] >= 1).all(), family

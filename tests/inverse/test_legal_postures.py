@@ -41,9 +41,9 @@ def test_a_legal_posture_of_an_edge_is_listed(name: str, task: str | None, q: li
     mm, rad = missing(screw, goal(s.task, screw, joints[None]), legal[None])
     assert mm[0] < 1e-9 * arm.reach
     assert rad[0] < 1e-8
-    other = armkin.fk(arm, joints * 0.9)
-    other = np.array([*other[:3, 3], *other[:3, 2]]) if task is not None else other
-    batch = armkin.ik(arm, np.array([other, target]), task)
+    second_target = armkin.fk(arm, joints * 0.9)
+    second_target = np.array([*second_target[:3, 3], *second_target[:3, 2]]) if task is not None else second_target
+    batch = armkin.ik(arm, np.array([second_target, target]), task)
     np.testing.assert_array_equal(batch.q[1][batch.valid[1]], s.q[s.valid])
 
 
@@ -53,9 +53,9 @@ def test_what_else_was_found_stays_beside_a_legal_posture() -> None:
     q = np.radians([0.0, 90, 90, 180, 180, 180])
     s = armkin.ik(arm, armkin.fk(arm, q), near=q)
     assert s.best >= 0
-    found = s.q[s.valid]
-    assert len(found) == 8
-    same = np.abs(newton.difference(arm, found, q))[:, [0, 1, 2, 4]].max(axis=1) < 1e-9
+    listed = s.q[s.valid]
+    assert len(listed) == 8
+    same = np.abs(newton.difference(arm, listed, q))[:, [0, 1, 2, 4]].max(axis=1) < 1e-9
     assert same.sum() == 1
 
 

@@ -19,21 +19,21 @@ def test_all_at_once_is_as_posture_by_posture(name: str, monkeypatch: pytest.Mon
     q[:, 4] = 0.0
     q[8:] = np.pi / 4 * rng.integers(-3, 4, (8, 6))
     T, near = armkin.fk(arm, q), rng.uniform(-1.0, 1.0, 6)
-    seen = []
+    settled = []
     settle = linkages.settle
 
-    def kept(*given: object) -> linkages.Linkages:
-        seen.append(settle(*given))  # type: ignore[arg-type]
-        return seen[-1]
+    def kept(*arguments: object) -> linkages.Linkages:
+        settled.append(settle(*arguments))  # type: ignore[arg-type]
+        return settled[-1]
 
-    def nothing(goals: object, *given: object) -> linkages.Linkages:
-        found = settle(goals, *given)  # type: ignore[arg-type]
-        none = np.zeros_like(found.known)
-        return found._replace(known=none, lacking=none)
+    def nothing(goals: object, *arguments: object) -> linkages.Linkages:
+        settled_one = settle(goals, *arguments)  # type: ignore[arg-type]
+        none = np.zeros_like(settled_one.known)
+        return settled_one._replace(known=none, lacking=none)
 
     monkeypatch.setattr(linkages, "settle", kept)
     fast = armkin.ik(arm, T, near=near)
-    assert sum(found.known.sum() for found in seen) > 7
+    assert sum(settled_one.known.sum() for settled_one in settled) > 7
     monkeypatch.setattr(linkages, "settle", nothing)
     slow = armkin.ik(arm, T, near=near)
     np.testing.assert_array_equal(fast.status, slow.status)

@@ -31,6 +31,6 @@ def beyond(name: str, count: int) -> float:
 
 @pytest.mark.parametrize("name", ["three_dof", "puma560", "ur5e"])
 def test_memory_beyond_the_results_does_not_grow_with_the_batch(name: str) -> None:
-    few, many = beyond(name, 20_000), beyond(name, 60_000)
-    assert many < 20, f"{many:.1f} MB"
-    assert many - few < 3, f"{few:.1f} MB, {many:.1f} MB with three times as many"
+    small_batch, large_batch = beyond(name, 20_000), beyond(name, 60_000)
+    assert large_batch < 20, f"{large_batch:.1f} MB"
+    assert large_batch - small_batch < 3, f"{small_batch:.1f} MB, {large_batch:.1f} MB with three times as many"

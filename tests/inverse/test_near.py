@@ -26,17 +26,17 @@ def test_near_as_a_batch_is_near_one_by_one(name: str, sample: Callable[[int, in
     target = goal(task, screw, q).array()
     near = q + rng.choice([0.0, 1.0], (40, 1)) * rng.normal(size=q.shape) * np.where(arm.prismatic, 50.0, 1.0)
     near[::4] = np.where(arm.prismatic, 0.0, np.pi / 2 * rng.integers(-2, 3, near[::4].shape))
-    many = armkin.ik(arm, target, near=near)
+    batch = armkin.ik(arm, target, near=near)
     for k in range(0, 40, 40 // sample(40, 13)):
         single = armkin.ik(arm, target[k], near=near[k])
-        assert (single.status, single.complete, single.best) == (many.status[k], many.complete[k], many.best[k])
-        assert single.free.tolist() == many.free[k].tolist()
-        rows, count = many.valid[k], single.valid.sum()
+        assert (single.status, single.complete, single.best) == (batch.status[k], batch.complete[k], batch.best[k])
+        assert single.free.tolist() == batch.free[k].tolist()
+        rows, count = batch.valid[k], single.valid.sum()
         assert rows.sum() == count
-        assert many.within_limits[k][rows].tolist() == single.within_limits[single.valid].tolist()
-        np.testing.assert_allclose(many.q[k][rows], single.q[single.valid], rtol=0, atol=1e-7)
+        assert batch.within_limits[k][rows].tolist() == single.within_limits[single.valid].tolist()
+        np.testing.assert_allclose(batch.q[k][rows], single.q[single.valid], rtol=0, atol=1e-7)
         if geometry.pairs:  # others are numbered along a path
-            assert many.branch[k][rows].tolist() == single.branch[single.valid].tolist()
+            assert batch.branch[k][rows].tolist() == single.branch[single.valid].tolist()
 
 
 @pytest.mark.parametrize("near", [0.0, -90.0, 90.0])
@@ -44,8 +44,8 @@ def test_half_a_turn_from_near_is_above_it(near: float) -> None:
     arm = shipped("ur5e")[0]  # limits of 360 degrees, so that both copies are legal, but for joint 3
     q = np.radians([[180.0, -90.0, 90.0, -90.0, -90.0, 180.0], [90.0, 180.0, 45.0, 0.0, 90.0, -90.0]])
     target, close = armkin.fk(arm, q), np.full(6, np.radians(near))
-    for found in (armkin.ik(arm, target, near=close), armkin.ik(arm, target[0], near=close)):
-        away = np.degrees(found.q - found.near[..., None, :])[..., [0, 1, 3, 4, 5]]
+    for solutions in (armkin.ik(arm, target, near=close), armkin.ik(arm, target[0], near=close)):
+        away = np.degrees(solutions.q - solutions.near[..., None, :])[..., [0, 1, 3, 4, 5]]
         half = np.abs(np.abs(away) - 180.0) < 1e-7
         assert half.any()
         assert (away[half] > 0.0).all()
@@ -58,16 +58,16 @@ def test_a_posture_on_its_limits_stays_where_its_target_is_rounded(name: str) ->
     task, _ = solver(arm, None)
     rng = np.random.default_rng(12)
     q = rng.uniform(np.clip(arm.lower, -np.pi, np.pi), np.clip(arm.upper, -np.pi, np.pi), (30, arm.n))
-    on = rng.random(q.shape) < 0.5
+    on_limit = rng.random(q.shape) < 0.5
     ends = np.where(rng.random(q.shape) < 0.5, arm.lower, arm.upper)
-    q = np.where(on & np.isfinite(ends), ends, q)
+    q = np.where(on_limit & np.isfinite(ends), ends, q)
     target = goal(task, screw, q).array()
     kinds = {f"{n} digits": truth.typed(task, target, n) for n in (11, 12)}
-    verdict, what = truth.judged(
+    verdict, report = truth.judged(
         arm, screw, dict.fromkeys(kinds, q), np.concatenate(list(kinds.values())), np.tile(q, (2, 1))
     )
     verdict.lost = []
-    assert verdict, what
+    assert verdict, report
 
 
 def test_a_posture_on_its_limit_stays_alone_and_in_a_batch() -> None:
@@ -75,10 +75,10 @@ def test_a_posture_on_its_limit_stays_alone_and_in_a_batch() -> None:
     q = np.radians([0.0, 45.0, 0.0, 0.0, 90.0, 0.0])
     T = armkin.fk(arm, q)
     T[:3, 3] = np.round(T[:3, 3], 6)
-    one, many = armkin.ik(arm, T, near=q), armkin.ik(arm, np.stack([T] * 3), near=q)
-    np.testing.assert_allclose(one.q[one.best], q, atol=1e-12)
-    np.testing.assert_allclose(many.q[np.arange(3), many.best], [q] * 3, atol=1e-12)
-    assert one.status == Status.EXACT
+    alone, batch = armkin.ik(arm, T, near=q), armkin.ik(arm, np.stack([T] * 3), near=q)
+    np.testing.assert_allclose(alone.q[alone.best], q, atol=1e-12)
+    np.testing.assert_allclose(batch.q[np.arange(3), batch.best], [q] * 3, atol=1e-12)
+    assert alone.status == Status.EXACT
 
 
 @pytest.mark.parametrize("name", ["yaw_two_link", "three_dof", "ur5e", "puma560", "irb120", "jaco_j2n6s300"])
@@ -92,8 +92,8 @@ def test_a_posture_that_solves_a_rounded_target_stays_beside_singular_ones(name:
     q = np.clip(q, arm.lower, arm.upper)  # some have a joint on its limit
     target = goal(task, screw, q).array()
     for digits in (9, 10, 12):
-        seen = truth.typed(task, target, digits)
-        verdict = truth.judge(arm, screw, None, q, seen, near=q)
+        rounded_target = truth.typed(task, target, digits)
+        verdict = truth.judge(arm, screw, None, q, rounded_target, near=q)
         assert not verdict.moves, f"{digits} digits: {verdict}"
         assert not verdict.false, f"{digits} digits: {verdict}"
 

@@ -20,13 +20,13 @@ from armkin.model.arm import Arm
 OFF = (1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-4, 1e-3)
 
 
-def moved(arm: Arm, off: float, seed: int) -> tuple[Arm, Screws]:
-    """Every axis turned and shifted a little, by up to `off` [rad] and a third of `off` [of the reach]."""
+def moved(arm: Arm, size: float, seed: int) -> tuple[Arm, Screws]:
+    """Every axis turned and shifted a little, by up to `size` [rad] and a third of `size` [of the reach]."""
     rng = np.random.default_rng(seed)
     link = arm.link.copy()
     for i in range(1, arm.n):
-        x, y = np.degrees(off * rng.uniform(-1, 1, 2))
-        link[i] = link[i] @ rotation("x", x) @ rotation("y", y) @ shift(*(off * arm.reach / 3 * rng.uniform(-1, 1, 3)))
+        x, y = np.degrees(size * rng.uniform(-1, 1, 2))
+        link[i] = link[i] @ rotation("x", x) @ rotation("y", y) @ shift(*(size * arm.reach / 3 * rng.uniform(-1, 1, 3)))
     P, w, p = np.eye(4), [], []
     for i in range(arm.n):
         P = P @ link[i]
@@ -35,18 +35,18 @@ def moved(arm: Arm, off: float, seed: int) -> tuple[Arm, Screws]:
     return replace(arm, link=link), Screws(np.array(w), np.array(p), arm.prismatic, P @ link[-1])
 
 
-def check(name: str, off: float, seed: int, count: int) -> Report:
+def check(name: str, size: float, seed: int, count: int) -> Report:
     case = random_case(name, seed)
-    arm, screw = moved(case.arm, off, seed)
+    arm, screw = moved(case.arm, size, seed)
     report = examine(arm, screw, case.task, random_joints(screw, count, seed))
-    assert not report.lost.any(), f"{off:.0e}: {report.lost.sum()} lost; {report.weak[report.lost]}"
+    assert not report.lost.any(), f"{size:.0e}: {report.lost.sum()} lost; {report.weak[report.lost]}"
     assert report.mm < 1e-9 * arm.reach
     assert report.deg < 1e-9
     assert report.duplicates == 0
     return report
 
 
-@pytest.mark.parametrize("off", range(0, len(OFF), 2))
+@pytest.mark.parametrize("first", range(0, len(OFF), 2))
 @pytest.mark.parametrize(
     "name",
     [
@@ -57,15 +57,15 @@ def check(name: str, off: float, seed: int, count: int) -> Report:
         "pitch arm, 4 joints, usual table", "pitch arm, 5 joints, usual table", "pitch arm, 4 joints, slide first",
     ],
 )  # fmt: skip
-def test_short_arms(name: str, off: int, sample: Callable[[int, int], int]) -> None:
+def test_short_arms(name: str, first: int, sample: Callable[[int, int], int]) -> None:
     """Of two neighbouring sizes the gate takes one for half the arms, the other for the rest."""
-    two = OFF[off : off + 2] if len(name) % 2 else OFF[off : off + 2][::-1]
+    two = OFF[first : first + 2] if len(name) % 2 else OFF[first : first + 2][::-1]
     for size in two[: sample(2, 1)]:
         for seed in range(sample(2, 1)):
             check(name, size, seed, sample(40, 16))
 
 
-@pytest.mark.parametrize("off", [1e-13, 1e-11, 1e-8, 1e-5, 1e-3])
+@pytest.mark.parametrize("size", [1e-13, 1e-11, 1e-8, 1e-5, 1e-3])
 @pytest.mark.parametrize(
     "name",
     [
@@ -76,12 +76,12 @@ def test_short_arms(name: str, off: int, sample: Callable[[int, int], int]) -> N
         "three parallel axes 3, 4, 5",
     ],
 )
-def test_six_joints(name: str, off: float) -> None:
-    report = check(name, off, 1, 30)
+def test_six_joints(name: str, size: float) -> None:
+    report = check(name, size, 1, 30)
     # nobody claims to have proved what rests on the neighbour of an arm
     s = report.solutions
     assert s.complete.any() == (not s.method.startswith("near"))
-    if off > 1e-12 and s.method.startswith("near"):
+    if size > 1e-12 and s.method.startswith("near"):
         assert "corrected on the true arm" in s.why
 
 
@@ -131,11 +131,11 @@ def test_rounded_tables() -> None:
     assert report.mm < 1e-9
 
 
-@pytest.mark.parametrize("off", [1e-8, 1e-5, 1e-3])
+@pytest.mark.parametrize("size", [1e-8, 1e-5, 1e-3])
 @pytest.mark.parametrize("name", ["three_dof", "labvolt_5150", "ur5e", "irb120"])
-def test_singular_neighbourhoods(name: str, off: float, sample: Callable[[int, int], int]) -> None:
+def test_singular_neighbourhoods(name: str, size: float, sample: Callable[[int, int], int]) -> None:
     """Some poses of thousands lie as close to a singularity as the arm to its class; none is lost."""
-    arm, screw = moved(shipped(name)[0], off, 1)
+    arm, screw = moved(shipped(name)[0], size, 1)
     report = examine(arm, screw, None, random_joints(screw, sample(3000, 1000), 1))
     assert not report.lost.any(), f"{report.weak[report.lost]}"
 
@@ -148,48 +148,48 @@ def test_folds_far_apart() -> None:
     assert not report.lost.any()
 
 
-@pytest.mark.parametrize("off", [1e-5, 1e-4, 1e-3, 1e-2])
-def test_four_roots_of_three_joints_are_all(off: float, sample: Callable[[int, int], int]) -> None:
+@pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3, 1e-2])
+def test_four_roots_of_three_joints_are_all(size: float, sample: Callable[[int, int], int]) -> None:
     """Seeds and Newton steps in straight-line code: `complete` where four are there, by the quartic's degree."""
-    arm, screw = moved(armkin.load("three_dof"), off, 5)
+    arm, screw = moved(armkin.load("three_dof"), size, 5)
     case_joints = random_joints(screw, sample(2000, 500), 5)
     report = examine(arm, screw, "xyz", case_joints)
-    found = report.solutions
+    solutions = report.solutions
     assert not report.lost.any()
     assert report.duplicates == 0
-    four = found.valid.sum(axis=1) == 4
+    four = solutions.valid.sum(axis=1) == 4
     assert four.mean() > 0.94
-    assert found.complete.all()  # where seeds do not lead to four, the pencil has them all
-    compiled = armkin.compile(arm).ik(found.target)
-    assert (compiled.valid == found.valid).all()
-    assert (compiled.complete == found.complete).all()
-    near = np.isclose(compiled.q, found.q, atol=1e-7, rtol=0.0) | ~found.valid[..., None]
+    assert solutions.complete.all()  # where seeds do not lead to four, the pencil has them all
+    compiled = armkin.compile(arm).ik(solutions.target)
+    assert (compiled.valid == solutions.valid).all()
+    assert (compiled.complete == solutions.complete).all()
+    near = np.isclose(compiled.q, solutions.q, atol=1e-7, rtol=0.0) | ~solutions.valid[..., None]
     assert near.mean() > 0.999
     k = np.flatnonzero(four)[0]
-    alone = armkin.ik(arm, found.target[k])
-    assert np.allclose(alone.q[alone.valid], found.q[k][found.valid[k]], atol=1e-9)
+    alone = armkin.ik(arm, solutions.target[k])
+    assert np.allclose(alone.q[alone.valid], solutions.q[k][solutions.valid[k]], atol=1e-9)
 
 
-@pytest.mark.parametrize("off", [1e-8, 1e-6, 1e-4, 1e-3])
+@pytest.mark.parametrize("size", [1e-8, 1e-6, 1e-4, 1e-3])
 @pytest.mark.parametrize("name", ["RRR 1 meets 2", "RRR 1 || 2", "RRR anthropomorphic"])
-def test_the_pencil_has_all_roots_of_a_near_arm(name: str, off: float) -> None:
+def test_the_pencil_has_all_roots_of_a_near_arm(name: str, size: float) -> None:
     """Generating joints are among the real roots; the others come in complex pairs.
 
     Beyond the reach no root is real; where it begins, two of them meet.
     """
-    arm, screw = moved(random_case(name, 1).arm, off, 2)
+    arm, screw = moved(random_case(name, 1).arm, size, 2)
     _, geometry = solver(arm, "xyz")
     assert geometry.doubts is not None
     assert geometry.doubts.rows is not None
     q = random_joints(screw, 300, 3)
     target = armkin.fk(arm, q)[:, :3, 3]
-    found = geometry.doubts.rows(target)
-    away = newton.wrapped_distance(arm, found.q, q[:, None])
+    seeds = geometry.doubts.rows(target)
+    away = newton.wrapped_distance(arm, seeds.q, q[:, None])
     hit = np.nanmin(np.where(np.isnan(away), 9.0, away), axis=1) < 1e-6
-    assert (hit | found.doubt).all()
-    assert found.doubt.mean() < 0.02
-    assert (np.isfinite(found.q[..., 0]).sum(axis=1)[~found.doubt] % 2 == 0).all()  # complex roots come in pairs
-    assert found.complete.all()
+    assert (hit | seeds.doubt).all()
+    assert seeds.doubt.mean() < 0.02
+    assert (np.isfinite(seeds.q[..., 0]).sum(axis=1)[~seeds.doubt] % 2 == 0).all()  # complex roots come in pairs
+    assert seeds.complete.all()
     beyond = geometry.doubts.rows(target * (3.0 * arm.reach / np.linalg.norm(target, axis=1))[:, None])
     assert np.isnan(beyond.q).all()
     assert not beyond.doubt.any()
@@ -199,29 +199,31 @@ def test_the_pencil_has_all_roots_of_a_near_arm(name: str, off: float) -> None:
 def test_no_target_at_all(name: str) -> None:
     case = random_case(name, 1)
     arm, screw = moved(case.arm, 1e-5, 1)
-    one = examine(arm, screw, case.task, random_joints(screw, 1, 1))
-    s = armkin.ik(arm, one.goals.array()[:0], case.task)
-    assert (s.q.shape, s.method) == ((0, *s.q.shape[1:]), one.solutions.method)
+    single_report = examine(arm, screw, case.task, random_joints(screw, 1, 1))
+    s = armkin.ik(arm, single_report.goals.array()[:0], case.task)
+    assert (s.q.shape, s.method) == ((0, *s.q.shape[1:]), single_report.solutions.method)
 
 
-@pytest.mark.parametrize("off", [1e-5, 1e-4, 1e-3])
-def test_both_branches_of_a_stretched_scara(off: float) -> None:
+@pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3])
+def test_both_branches_of_a_stretched_scara(size: float) -> None:
     """Where the elbow is nearly straight, corrections of one seed each leave it open; the pair keeps its names."""
-    arm, screw = moved(armkin.load("cobra600"), off, 5)
+    arm, screw = moved(armkin.load("cobra600"), size, 5)
     q = random_joints(screw, 400, 6)
     rng = np.random.default_rng(7)
     q[:, 1] = np.pi * rng.integers(0, 2, 400) + rng.choice([-1, 1], 400) * 10 ** rng.uniform(-2.9, -1, 400)
     report = examine(arm, screw, "xyz_yaw", q)
-    found = report.solutions
+    solutions = report.solutions
     assert not report.lost.any()
     assert report.duplicates == 0
-    two = (found.valid.sum(axis=1) == 2) & (found.branch[:, :2] == [0, 1]).all(axis=1)  # none of a number of its own
+    two = (solutions.valid.sum(axis=1) == 2) & (solutions.branch[:, :2] == [0, 1]).all(
+        axis=1
+    )  # none of a number of its own
     assert two.mean() > 0.99
-    bent = newton.wrapped_distance(arm, found.q[two, 0], found.q[two, 1]) > 0.0
-    side = np.sin(found.q[two, 0, 1] - found.q[two, 1, 1]) * np.cos(found.q[two, 0, 1])
+    bent = newton.wrapped_distance(arm, solutions.q[two, 0], solutions.q[two, 1]) > 0.0
+    side = np.sin(solutions.q[two, 0, 1] - solutions.q[two, 1, 1]) * np.cos(solutions.q[two, 0, 1])
     assert bent.all()
     assert (side > 0.0).all()  # one elbow is on one side of the fold, wherever that is
-    assert not found.complete.any()
-    target = found.target.reshape(400, -1)
+    assert not solutions.complete.any()
+    target = solutions.target.reshape(400, -1)
     for k in range(30):  # the plain numbers of one target know no infinity
-        assert armkin.ik(arm, target[k]).valid.sum() == found.valid[k].sum()
+        assert armkin.ik(arm, target[k]).valid.sum() == solutions.valid[k].sum()

@@ -21,12 +21,12 @@ def test_an_answer_is_that_of_its_target(name: str, count: int, part: int) -> No
     assert len(np.unique(together.status)) > 1
     for start in range(0, count, part):
         rows = slice(start, start + part)
-        few = armkin.ik(arm, T[rows])
-        width = min(few.q.shape[1], together.q.shape[1])
+        subset = armkin.ik(arm, T[rows])
+        width = min(subset.q.shape[1], together.q.shape[1])
         for field in ("q", "valid", "within_limits", "branch"):
-            np.testing.assert_array_equal(getattr(few, field)[:, :width], getattr(together, field)[rows, :width])
+            np.testing.assert_array_equal(getattr(subset, field)[:, :width], getattr(together, field)[rows, :width])
         for field in ("status", "free", "complete"):
-            np.testing.assert_array_equal(getattr(few, field), getattr(together, field)[rows])
+            np.testing.assert_array_equal(getattr(subset, field), getattr(together, field)[rows])
 
 
 def test_a_self_motion_is_told_alone_as_beside_a_corner() -> None:

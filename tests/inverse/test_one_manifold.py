@@ -26,15 +26,15 @@ FLAT = [0.8487981197583796, -1.5834526887369684, 1.617782823941284, 0.3378108023
         -2.4097472431493117]  # fmt: skip
 
 
-@pytest.mark.parametrize("others", [0, 60])
-def test_a_wrist_beside_straight_is_listed_once_a_shoulder(others: int) -> None:
+@pytest.mark.parametrize("neighbours", [0, 60])
+def test_a_wrist_beside_straight_is_listed_once_a_shoulder(neighbours: int) -> None:
     """On either side of the straight wrist lie candidates that miss by nothing; those between them miss by 5e-10.
 
     They were two or three rows, the number depending on what else was in the batch.
     """
     arm = armkin.load("stanford")
-    rest = np.pi / 2 * np.random.default_rng(1).integers(-2, 3, (others, arm.n))
-    q = np.concatenate([[BESIDE], np.where(arm.prismatic, BESIDE[2], rest)])
+    round_angles = np.pi / 2 * np.random.default_rng(1).integers(-2, 3, (neighbours, arm.n))
+    q = np.concatenate([[BESIDE], np.where(arm.prismatic, BESIDE[2], round_angles)])
     solutions = armkin.ik(arm, armkin.fk(arm, q), near=q)
     rows = solutions.q[0][solutions.valid[0]]
     assert solutions.status[0] == armkin.Status.SINGULAR

@@ -64,17 +64,17 @@ def test_branches_that_are_not_examined_are_what_examining_finds(name: str, monk
     rng = np.random.default_rng(9)
     q = np.concatenate([beside_folds(arm), rng.integers(-4, 4, (24, arm.n)) * np.pi / 4])
     target = np.asarray(targets_of(task_for(arm), armkin.fk(arm, q), q))
-    short, doubts, kept = armkin.ik(arm, target), edges._doubts, 0
+    short, doubts, count = armkin.ik(arm, target), edges._doubts, 0
 
     def all_examined(*arguments: Any) -> Any:
-        nonlocal kept
-        found = doubts(*arguments)
-        kept += found.simple.sum()
-        return found._replace(simple=np.zeros_like(found.simple))
+        nonlocal count
+        doubted = doubts(*arguments)
+        count += doubted.simple.sum()
+        return doubted._replace(simple=np.zeros_like(doubted.simple))
 
     monkeypatch.setattr(edges, "_doubts", all_examined)
     long = armkin.ik(arm, target)
-    assert kept > 0
+    assert count > 0
     for field in ("status", "valid", "free", "complete", "branch"):
         assert np.array_equal(getattr(short, field), getattr(long, field)), field
     np.testing.assert_allclose(np.nan_to_num(short.q), np.nan_to_num(long.q), atol=1e-9)
@@ -88,24 +88,24 @@ def test_what_two_jacobians_tell_is_what_examining_finds(
     name: str, task: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arm = armkin.load(name)
-    which, tell, told = task_for(arm, task), folds.tell, 0
+    chosen_task, tell, told_count = task_for(arm, task), folds.tell, 0
     rng = np.random.default_rng(12)
     q = np.concatenate([beside_folds(arm, 80), rng.uniform(-np.pi, np.pi, (40, arm.n))])
     q[80:110, arm.n - 2] = rng.choice([-1.0, 1.0], 30) * np.geomspace(1e-6, 1e-3, 30)
     q[110:, 1:] = rng.integers(-4, 4, (10, arm.n - 1)) * np.pi / 4
-    target = np.asarray(targets_of(which, armkin.fk(arm, q), q))
+    target = np.asarray(targets_of(chosen_task, armkin.fk(arm, q), q))
 
     def counted(*arguments: Any) -> Any:
-        nonlocal told
+        nonlocal told_count
         left = tell(*arguments)
-        told += len(arguments[3].rows) - len(left)
+        told_count += len(arguments[3].rows) - len(left)
         return left
 
     monkeypatch.setattr(chunks, "tell", counted)
     short = armkin.ik(arm, target, task)
     monkeypatch.setattr(chunks, "tell", lambda goals, runner, out, at: at.rows)
     long = armkin.ik(arm, target, task)
-    assert told > 20
+    assert told_count > 20
     assert {0, 1} <= set(short.status.tolist())
     for field in ("status", "valid", "free", "complete", "branch", "within_limits"):
         assert np.array_equal(getattr(short, field), getattr(long, field)), field
@@ -116,7 +116,7 @@ def test_a_component_is_followed_as_far_as_it_goes() -> None:
     """On 10 degrees the curve of this posture, with a wrist 2e-7 rad off a straight one, is not smooth."""
     arm = armkin.load("puma560")
     q = np.array([[0.75 * np.pi, 0.75 * np.pi, -0.5 * np.pi, -4.28440518e-03, 1.89039945e-07, -0.781113759]])
-    found = local_structure.local_structure(arm, task_for(arm), q, armkin.fk(arm, q))
-    assert found.known.all()
-    assert not (found.manifold | found.boundary).any()
-    assert 0.03 < found.high[0] - found.low[0] < 0.05
+    structure = local_structure.local_structure(arm, task_for(arm), q, armkin.fk(arm, q))
+    assert structure.known.all()
+    assert not (structure.manifold | structure.boundary).any()
+    assert 0.03 < structure.high[0] - structure.low[0] < 0.05

@@ -26,8 +26,8 @@ def targets(arm: armkin.Arm, count: int, seed: int) -> np.ndarray:
     wild = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
     wild *= np.sign(np.linalg.det(wild))[:, None, None]
     size = np.array([3.0, 0.05, 0.0])[np.arange(count) % 3][:, None, None]
-    off = rng.normal(size=(count, 3))
-    skew = np.cross(np.eye(3), off[:, None, :]) * size
+    axis = rng.normal(size=(count, 3))
+    skew = np.cross(np.eye(3), axis[:, None, :]) * size
     little = np.linalg.solve(np.eye(3) - skew / 2, np.eye(3) + skew / 2)  # Cayley's rotation
     T[:, :3, :3] = np.where(size > 1, wild, little @ T[:, :3, :3])
     return T
@@ -36,8 +36,8 @@ def targets(arm: armkin.Arm, count: int, seed: int) -> np.ndarray:
 def by_brute_force(arm: armkin.Arm, T: np.ndarray, grid: int) -> np.ndarray:
     """The least angle (N,) [rad] over a grid of all joints but three, these by their own closed form."""
     names = arm.joint_names[3:]
-    kept = [arm.joint_names.index(name) for name in names]
-    low, high = np.maximum(arm.lower, -np.pi)[kept], np.minimum(arm.upper, np.pi)[kept]
+    joints = [arm.joint_names.index(name) for name in names]
+    low, high = np.maximum(arm.lower, -np.pi)[joints], np.minimum(arm.upper, np.pi)[joints]
     least = np.full(len(T), np.inf)
     count = grid if len(names) == 2 else grid * grid
     for values in itertools.product(*(np.linspace(a, b, count) for a, b in zip(low, high, strict=True))):
@@ -61,9 +61,11 @@ def test_no_posture_of_a_grid_is_nearer(name: str, sample: Callable[[int, int], 
     assert np.abs(armkin.fk(arm, best)[:, :3, 3] - T[:, :3, 3]).max() <= 1e-9 * arm.reach
     assert ((best >= arm.lower - 1e-9) & (best <= arm.upper + 1e-9)).all()
     assert (s.angle[:, 0] <= by_brute_force(arm, T, sample(8, 5)) + 1e-8).all()
-    own = np.arange(24) % 3 == 2
-    assert (s.status[own] == Status.EXACT).all()
-    assert (s.status[~own] == Status.POSITION).sum() >= 14  # a turn about an axis may be one that the arm can make
+    is_own_pose = np.arange(24) % 3 == 2
+    assert (s.status[is_own_pose] == Status.EXACT).all()
+    assert (
+        s.status[~is_own_pose] == Status.POSITION
+    ).sum() >= 14  # a turn about an axis may be one that the arm can make
 
 
 def test_small_basins_on_limits_are_found() -> None:
@@ -92,13 +94,13 @@ def test_rows_are_minima_each_once_by_angle(name: str) -> None:
             for _ in range(6):
                 step = np.random.default_rng(k).normal(size=arm.n) * 3e-3
                 step -= np.linalg.pinv(J) @ (J @ step)
-                there = np.clip(row + step, arm.lower, arm.upper)
+                beside = np.clip(row + step, arm.lower, arm.upper)
                 for _ in range(4):
-                    miss = T[k, :3, 3] - armkin.fk(arm, there)[:3, 3]
-                    there = np.clip(
-                        there + np.linalg.pinv(armkin.jacobian(arm, there)[:3]) @ miss, arm.lower, arm.upper
+                    miss = T[k, :3, 3] - armkin.fk(arm, beside)[:3, 3]
+                    beside = np.clip(
+                        beside + np.linalg.pinv(armkin.jacobian(arm, beside)[:3]) @ miss, arm.lower, arm.upper
                     )
-                F = armkin.fk(arm, there)
+                F = armkin.fk(arm, beside)
                 if np.abs(F[:3, 3] - T[k, :3, 3]).max() < 1e-9:
                     cosine = (np.trace(F[:3, :3].T @ T[k, :3, :3]) - 1) / 2
                     assert cosine <= np.cos(least) + 1e-9
@@ -156,31 +158,31 @@ def test_an_exact_answer_that_hits_something_comes_after_a_free_one(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ("ik so101 250 50 150 180 0 --position-first", "for task pose, not xyz_pitch_roll"),
         ("ik ur5e 400 0 400 0 0 0 --position-first", "4 or 5 joints; ur5e has 6"),
         ("ik so101 250 50 150 180 0 0 --task pose --position-first --compiled", "no compiled solver"),
     ],
 )
-def test_what_position_first_is_not_for_is_a_usage_error(words: str, said: str) -> None:
+def test_what_position_first_is_not_for_is_a_usage_error(words: str, message: str) -> None:
     completed = run(*words.split())
     assert completed.code == 2
-    assert said in completed.err
+    assert message in completed.err
 
 
 def test_a_batch_gives_what_each_row_alone_gives(tmp_path: Path) -> None:
     rows = ["250,50,150,180,0,0", "950,50,150,180,0,0", "200,-80,100,170,10,20"]
     (tmp_path / "t.csv").write_text("\n".join(rows) + "\n")
     words = "--task", "pose", "--position-first", "--json"
-    many = run("ik", "so101", *words, "--batch", tmp_path / "t.csv")
-    assert (many.code, len(many.lines)) == (3, 3)
-    for row, other in zip(rows, many.lines, strict=True):
-        one = run("ik", "so101", *row.split(","), *words).json
-        assert one["status"] == other["status"]
-        assert one["best"] == other["best"]
-        if one["best"] is not None:
-            assert one["branches"][0]["joints"] == pytest.approx(other["branches"][0]["joints"], abs=1e-6)
+    completed = run("ik", "so101", *words, "--batch", tmp_path / "t.csv")
+    assert (completed.code, len(completed.lines)) == (3, 3)
+    for row, line in zip(rows, completed.lines, strict=True):
+        alone = run("ik", "so101", *row.split(","), *words).json
+        assert alone["status"] == line["status"]
+        assert alone["best"] == line["best"]
+        if alone["best"] is not None:
+            assert alone["branches"][0]["joints"] == pytest.approx(line["branches"][0]["joints"], abs=1e-6)
     table = run("ik", "so101", *words[:-1], "--batch", tmp_path / "t.csv").out
     assert table.splitlines()[1].startswith("1,position,minimum 1,")
 

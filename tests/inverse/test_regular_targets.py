@@ -29,8 +29,8 @@ def nearly_singular(name: str, least: float, most: float) -> tuple[Arm, armkin.S
     task, _ = solver(arm, None)
     rng = np.random.default_rng(3)
     q = np.concatenate(list(truth.singular_postures(arm, screw, None, 12, seed=3).values()))
-    off = 10.0 ** rng.uniform(least, most, (len(q), 1)) * rng.uniform(-1, 1, q.shape)
-    q = q + off * np.where(arm.prismatic, arm.reach, 1.0)
+    steps = 10.0 ** rng.uniform(least, most, (len(q), 1)) * rng.uniform(-1, 1, q.shape)
+    q = q + steps * np.where(arm.prismatic, arm.reach, 1.0)
     return arm, armkin.ik(arm, goal(task, screw, q).array())
 
 
@@ -41,8 +41,8 @@ def nearly_singular(name: str, least: float, most: float) -> tuple[Arm, armkin.S
 def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float) -> None:
     """Off singular postures by what makes folds, and by so little that the arm all but moves by itself."""
     arm, at_once = nearly_singular(name, least, most)
-    some = np.random.default_rng(5).choice(len(at_once.target), 24)
-    for k in some:
+    sampled = np.random.default_rng(5).choice(len(at_once.target), 24)
+    for k in sampled:
         alone = armkin.ik(arm, at_once.target[k], near=at_once.near[k])
         a, b = alone.q[alone.valid], at_once.q[k][at_once.valid[k]]
         assert len(a) == len(b)
@@ -57,11 +57,11 @@ def test_all_at_once_is_as_one_by_one(name: str, least: float, most: float) -> N
 def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Random targets of which two branches lie 3e-5 to 3e-4 rad apart: most are told by their Jacobians, the others at
     once."""
-    known = []
+    doubtful_counts = []
     examine = components.examine
 
     def counted(goals: Goals, *more: Any) -> Examined:
-        known.append(len(goals.target))
+        doubtful_counts.append(len(goals.target))
         return examine(goals, *more)
 
     monkeypatch.setattr(components, "examine", counted)
@@ -73,8 +73,8 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
     straight = {"three_dof": 0.0, "puma560": np.arctan2(20.32, 431.8) - np.pi / 2, "ur5e": 0.0}[name]
     q[:, 2] = straight + 10.0 ** rng.uniform(-4.5, -3.6, 100) * rng.choice([-1.0, 1.0], 100)
     answers = armkin.ik(arm, goal(task, screw, q).array())
-    assert len(known) <= 1
-    assert sum(known) < 20
+    assert len(doubtful_counts) <= 1
+    assert sum(doubtful_counts) < 20
     assert set(np.unique(answers.status)) == {Status.EXACT, Status.BOUNDARY}
 
 
@@ -111,12 +111,12 @@ def test_a_little_beyond_a_stretched_arm_is_proved_unreachable(name: str, monkey
         U, S, _ = np.linalg.svd(J[0])
         assert S[-1] < 1e-9 < 1e-3 < S[-2]
         for size in (1e-6, 1e-5, 1e-4):
-            by = np.resize(U[:, -1], 6) * (np.arange(6) < len(U)) * size
-            both = [armkin.ik(arm, moved(arm, task, target, sign * by)) for sign in (1.0, -1.0)]
-            assert sorted(bool(found.valid.any()) for found in both) == [False, True]
-            out = next(found for found in both if not found.valid.any())
-            assert out.status[0] == Status.UNREACHABLE
-            assert out.complete[0]
+            shift = np.resize(U[:, -1], 6) * (np.arange(6) < len(U)) * size
+            two_sides = [armkin.ik(arm, moved(arm, task, target, sign * shift)) for sign in (1.0, -1.0)]
+            assert sorted(bool(solutions.valid.any()) for solutions in two_sides) == [False, True]
+            beyond = next(solutions for solutions in two_sides if not solutions.valid.any())
+            assert beyond.status[0] == Status.UNREACHABLE
+            assert beyond.complete[0]
 
 
 @pytest.mark.parametrize("name", ["three_dof", "puma560"])

@@ -41,15 +41,15 @@ def test_its_own_pose_in_few_digits_moves_no_joint(name: str) -> None:
     arm, q = postures(name, 4, 3)
     T = armkin.fk(arm, q)
     for number, digits in enumerate(DIGITS):
-        given = rounded(T, digits)
-        many = armkin.ik(arm, given, near=q)
-        assert (many.best >= 0).all(), digits
-        best = many.q[np.arange(len(q)), many.best]
+        rounded_T = rounded(T, digits)
+        batch = armkin.ik(arm, rounded_T, near=q)
+        assert (batch.best >= 0).all(), digits
+        best = batch.q[np.arange(len(q)), batch.best]
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
         k = number % len(q)
-        single = armkin.ik(arm, given[k], near=q[k])
+        single = armkin.ik(arm, rounded_T[k], near=q[k])
         np.testing.assert_array_equal(single.q[single.best], best[k])
-        assert single.status == many.status[k]
+        assert single.status == batch.status[k]
 
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560"])
@@ -57,8 +57,8 @@ def test_machine_code_stays_as_python_does(name: str) -> None:
     arm, q = postures(name, 4, 5)
     T, fast = armkin.fk(arm, q), armkin.compile(armkin.load(name))
     for digits in ("7f", "float32"):
-        found, slow = fast.ik(rounded(T, digits), near=q), armkin.ik(arm, rounded(T, digits), near=q)
-        best = found.q[np.arange(len(q)), found.best]
+        compiled, slow = fast.ik(rounded(T, digits), near=q), armkin.ik(arm, rounded(T, digits), near=q)
+        best = compiled.q[np.arange(len(q)), compiled.best]
         np.testing.assert_array_equal(best, slow.q[np.arange(len(q)), slow.best])
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6)
 
@@ -104,14 +104,14 @@ def test_a_rotation_by_right_angles_hides_its_rounding_but_the_position_shows_it
     T, fast = armkin.fk(arm, q), armkin.compile(arm)
     np.testing.assert_allclose(T[:, :3, :3], np.rint(T[:, :3, :3]), atol=1e-14)
     for digits in ("6g", "7g", "8f", "9g", "float32"):
-        given = np.asarray(rounded(T, digits), float)
-        found, coded = armkin.ik(arm, given, near=q), fast.ik(given, near=q)
-        best = found.q[np.arange(len(q)), np.maximum(found.best, 0)]
+        rounded_T = np.asarray(rounded(T, digits), float)
+        solutions, coded = armkin.ik(arm, rounded_T, near=q), fast.ik(rounded_T, near=q)
+        best = solutions.q[np.arange(len(q)), np.maximum(solutions.best, 0)]
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
         np.testing.assert_array_equal(coded.q[np.arange(len(q)), coded.best], best)
         for k in range(len(q)):
-            for one in (armkin.ik(arm, given[k], near=q[k]), fast.ik(given[k], near=q[k])):
-                np.testing.assert_array_equal(one.q[one.best], best[k])
+            for alone in (armkin.ik(arm, rounded_T[k], near=q[k]), fast.ik(rounded_T[k], near=q[k])):
+                np.testing.assert_array_equal(alone.q[alone.best], best[k])
 
 
 def test_a_position_that_is_typed_beside_right_angles_is_exact() -> None:
@@ -155,9 +155,9 @@ def test_a_rounding_that_is_none_is_refused(wrong: float | list[float]) -> None:
 
 def test_printed_decimals_are_counted_from_the_third_on() -> None:
     rows = np.array([[390.0, 400.5, 12.25], [390.125, 0.0, 0.0], [0.123456, -2.5, 1.0 / 3.0]])
-    off = printed(["mm", "mm", "deg"], rows, 1000.0)
+    rounding = printed(["mm", "mm", "deg"], rows, 1000.0)
     np.testing.assert_allclose(
-        off,
+        rounding,
         [
             0.0,
             np.hypot(np.hypot(0.5e-6, 0.5e-6), np.radians(0.5e-3)),
@@ -168,8 +168,8 @@ def test_printed_decimals_are_counted_from_the_third_on() -> None:
 
 
 def test_zeros_that_are_printed_count_and_the_halves_of_angles_add() -> None:
-    off = printed(["mm", "mm", "deg", "deg"], np.array([[345.04, 400.0, 28.675, 0.0]]), 1000.0, [[3, 1, 4, 4]])
-    np.testing.assert_allclose(off, np.hypot(0.5e-6, np.radians(1e-4)))
+    rounding = printed(["mm", "mm", "deg", "deg"], np.array([[345.04, 400.0, 28.675, 0.0]]), 1000.0, [[3, 1, 4, 4]])
+    np.testing.assert_allclose(rounding, np.hypot(0.5e-6, np.radians(1e-4)))
 
 
 @pytest.mark.parametrize(

@@ -26,9 +26,9 @@ FIELDS = [f.name for f in fields(armkin.Solutions)]
 
 def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutions | None:
     """One target by the short way, and a check that it is as in a batch."""
-    one = one_target.prepared(arm, None)
-    assert one is not None
-    alone = one.solve(target, near)
+    single = one_target.prepared(arm, None)
+    assert single is not None
+    alone = single.solve(target, near)
     batch = armkin.ik(arm, target[None], near=None if near is None else near[None])
     if alone is None:
         return None
@@ -83,14 +83,14 @@ def test_what_is_not_plain_is_left_to_the_batch() -> None:
     arm = shipped("puma560")[0]
     T = armkin.fk(arm, np.full(6, 0.3))
     rounded = T.round(8)
-    one = one_target.prepared(arm, None)
-    assert one is not None
-    assert one.solve(T, None) is not None
-    assert one.solve(rounded, None) is None  # made a rotation first
-    assert one.solve(T * np.nan, None) is None
-    assert one.solve(np.array([T, T]), None) is None
-    assert one.solve(T, [0.0] * 5) is None
-    assert one.solve(armkin.fk(arm, np.zeros(6)), None) is None  # the wrist is singular
+    single = one_target.prepared(arm, None)
+    assert single is not None
+    assert single.solve(T, None) is not None
+    assert single.solve(rounded, None) is None  # made a rotation first
+    assert single.solve(T * np.nan, None) is None
+    assert single.solve(np.array([T, T]), None) is None
+    assert single.solve(T, [0.0] * 5) is None
+    assert single.solve(armkin.fk(arm, np.zeros(6)), None) is None  # the wrist is singular
 
 
 ANGLE = st.floats(-np.pi, np.pi)
@@ -98,8 +98,8 @@ EDGE = st.sampled_from([-2 * np.pi, -np.pi, -1.0, 0.0, 1.0, np.pi, 2 * np.pi, -n
 
 
 @given(ANGLE | EDGE.filter(lambda x: abs(x) <= np.pi), st.floats(-20, 20) | st.just(0.0), EDGE | ANGLE, EDGE | ANGLE)
-def test_a_number_has_the_copy_that_it_has_in_an_array(value: float, near: float, one: float, other: float) -> None:
-    lower, upper = min(one, other), max(one, other)
+def test_a_number_has_the_copy_that_it_has_in_an_array(value: float, near: float, first: float, other: float) -> None:
+    lower, upper = min(first, other), max(first, other)
     assume(lower < np.inf and upper > -np.inf)
     copy, inside = nearest_copy(np.array([value]), near, lower, upper)
     assert nearest_number(value, near, lower, upper, False) == (copy[0], np.broadcast_to(inside, 1)[0])

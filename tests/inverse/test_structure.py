@@ -19,19 +19,19 @@ STRAIGHT = np.radians([20.0, -50.0, 70.0, 30.0, 0.0, 40.0])
 def entered(arm: armkin.Arm, T: np.ndarray) -> set[tuple[str, str]]:
     """Files and functions of `inverse` that a second call for a pose enters; no comprehensions."""
     armkin.ik(arm, T)
-    found: set[tuple[str, str]] = set()
+    functions: set[tuple[str, str]] = set()
 
     def called(frame: FrameType, event: str, _: object) -> None:
         code = frame.f_code
         if event == "call" and code.co_filename.startswith(ROOM) and not code.co_name.startswith("<"):
-            found.add((code.co_filename, code.co_qualname))
+            functions.add((code.co_filename, code.co_qualname))
 
     sys.setprofile(called)
     try:
         armkin.ik(arm, T)
     finally:
         sys.setprofile(None)
-    return found
+    return functions
 
 
 @pytest.mark.parametrize(("name", "most"), [("puma560", (14, 45)), ("ur5e", (15, 50))])
@@ -40,13 +40,13 @@ def test_a_singular_pose_enters_few_files_and_functions(name: str, most: tuple[i
     arm = armkin.load(name)
     T = armkin.fk(arm, STRAIGHT)
     assert armkin.ik(arm, T).status == armkin.Status.SINGULAR
-    found = entered(arm, T)
-    assert len({file for file, _ in found}) <= most[0]
-    assert len(found) <= most[1]
+    functions = entered(arm, T)
+    assert len({file for file, _ in functions}) <= most[0]
+    assert len(functions) <= most[1]
 
 
 def test_a_regular_pose_enters_four_files() -> None:
     arm = armkin.load("puma560")
-    found = entered(arm, armkin.fk(arm, STRAIGHT + 0.3))
-    assert len({file for file, _ in found}) <= 4
-    assert len(found) <= 8
+    functions = entered(arm, armkin.fk(arm, STRAIGHT + 0.3))
+    assert len({file for file, _ in functions}) <= 4
+    assert len(functions) <= 8

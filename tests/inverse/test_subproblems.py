@@ -49,19 +49,19 @@ def test_a_circle_and_a_conic(kind: str) -> None:
     assert np.all(nothing.free)
     e = e[:, ~vanishing]
     scale = np.abs(e).sum(axis=0)
-    pair, told = trig_quadratic(list(e), 1.0)
+    pair, word = trig_quadratic(list(e), 1.0)
     c, s = cast("list[Array]", pair)
     q = np.arctan2(s, c).reshape(4, -1)
-    doubt = np.asarray(told.edge.reshape(-1, e.shape[1]).any(axis=0))
+    doubt = np.asarray(word.edge.reshape(-1, e.shape[1]).any(axis=0))
     on_circle = np.abs(c**2 + s**2 - 1).reshape(4, -1) < 1e-12
-    assert not np.any(told.free)
+    assert not np.any(word.free)
     root = on_circle & (np.abs(values(e, q)) < 1e-12 * scale)
     assert not (on_circle & ~root & ~doubt).any()
-    at = values(e, grid)
-    k, n = np.nonzero(at[:-1] * at[1:] < 0)
+    residuals = values(e, grid)
+    k, n = np.nonzero(residuals[:-1] * residuals[1:] < 0)
     # bisection: slow and sure
     low, high = grid[k, 0], grid[k + 1, 0]
-    below = at[k, n]
+    below = residuals[k, n]
     for _ in range(60):
         middle = (low + high) / 2
         left = values(e[:, n], middle) * below <= 0
@@ -80,24 +80,24 @@ def test_two_double_roots() -> None:
     x, y, z = (v[np.hypot(x, y) > 0.1] for v in (x, y, z))
     e = np.array([z * z, 2 * x * z, 2 * y * z, x * x, 2 * x * y, y * y])
     e *= 1 + 3e-16 * rng.integers(-1, 2, e.shape)
-    pair, told = trig_quadratic(list(e), 1.0)
+    pair, word = trig_quadratic(list(e), 1.0)
     middle, half = np.arctan2(y, x), np.arccos(-z / np.hypot(x, y))
     c, s = cast("list[Array]", pair)
     q = np.arctan2(s, c).reshape(4, -1)
-    for wanted in (middle + half, middle - half):
-        assert np.abs(np.exp(1j * q) - np.exp(1j * wanted)).min(axis=0).max() < 1e-5
-    assert np.asarray(told.edge.any(axis=(0, 1, 2))).all()
+    for root in (middle + half, middle - half):
+        assert np.abs(np.exp(1j * q) - np.exp(1j * root)).min(axis=0).max() < 1e-5
+    assert np.asarray(word.edge.any(axis=(0, 1, 2))).all()
 
 
 def test_a_conic_that_vanishes_on_the_circle_leaves_the_angle_free() -> None:
     """cos^2 + sin^2 - 1, in rounded multiples, beside one that is off by a little."""
     k = np.array([0.5, 1.0, 0.1, 7.3e-3, 0.7, 0.7])
     none = np.zeros(6)
-    off = np.array([0.0, 1e-16, 0.0, 0.0, 1e-9, 1e-3])
-    pair, told = trig_quadratic([-k, none, off, k + off, none, k], 1.0, Pair(0.6, 0.8))
+    errors = np.array([0.0, 1e-16, 0.0, 0.0, 1e-9, 1e-3])
+    pair, word = trig_quadratic([-k, none, errors, k + errors, none, k], 1.0, Pair(0.6, 0.8))
     c, s = cast("list[Array]", pair)
-    assert np.asarray(told.free).tolist() == [True] * 4 + [False] * 2
-    assert np.asarray(told.edge.any(axis=(0, 1, 2)))[:5].all()
+    assert np.asarray(word.free).tolist() == [True] * 4 + [False] * 2
+    assert np.asarray(word.edge.any(axis=(0, 1, 2)))[:5].all()
     assert (c[..., :4] == 0.6).all()
     assert (s[..., :4] == 0.8).all()
 
@@ -110,5 +110,5 @@ def test_quadratic() -> None:
     a = np.where(rng.random(2000) < 0.2, 0.0, 1.0)
     b, c = np.where(a == 0.0, 1.0, -d[0] - d[1]), np.where(a == 0.0, -d[0], d[0] * d[1])
     roots = cast("Array", quadratic(a, b, c, 0, 1.0, 1e-300, None)[0]).reshape(2, -1)
-    for wanted in (d[0], np.where(a == 0.0, d[0], d[1])):
-        assert (np.abs(roots - wanted).min(axis=0) / (1 + np.abs(wanted) + np.abs(d).max(axis=0))).max() < 1e-9
+    for root in (d[0], np.where(a == 0.0, d[0], d[1])):
+        assert (np.abs(roots - root).min(axis=0) / (1 + np.abs(root) + np.abs(d).max(axis=0))).max() < 1e-9

@@ -33,12 +33,12 @@ def _rows(q: list[float]) -> tuple[armkin.Arm, armkin.Solutions]:
 
 @pytest.mark.parametrize(("q", "count"), FOLDED)
 def test_a_folded_elbow_has_a_row_for_each_circuit_of_its_linkage(q: list[float], count: int) -> None:
-    rest, s = _rows(q)
+    resting_arm, s = _rows(q)
     rows = s.q[s.valid]
     assert s.status == armkin.Status.SINGULAR
     assert len(rows) == count
     np.testing.assert_allclose(np.cos(rows[:, 3]), -1.0, atol=1e-12)
-    z1, z2, z3, _, _, z6 = np.moveaxis(armkin.jacobian(rest, rows)[:, 3:], 2, 0)
+    z1, z2, z3, _, _, z6 = np.moveaxis(armkin.jacobian(resting_arm, rows)[:, 3:], 2, 0)
     if count == 2:
         assert sorted(np.sign((np.cross(z2, z6) * z3).sum(axis=1))) == [-1.0, 1.0]
     else:
@@ -98,8 +98,8 @@ def test_a_joint_that_rests_on_a_surface_at_a_double_root_is_not_free() -> None:
     arm = armkin.load("thor")
     target = armkin.fk(arm, np.deg2rad([90.0, 0, -180, 135, 0, 135]))
     starts = np.random.default_rng(1).uniform(-np.pi, np.pi, (4000, 6))
-    found, size = newton.correct(arm, task_for(arm, None), starts, np.tile(target, (4000, 1, 1)), steps=60)
-    solved = newton.difference(arm, found[size < 1e-12], np.deg2rad([0.0, 0, -180, 0, 0, 0]))
+    corrected, size = newton.correct(arm, task_for(arm, None), starts, np.tile(target, (4000, 1, 1)), steps=60)
+    solved = newton.difference(arm, corrected[size < 1e-12], np.deg2rad([0.0, 0, -180, 0, 0, 0]))
     assert len(solved) > 500
     moves = (np.abs(solved).max(axis=0) > 0.1).tolist()
     assert moves == [True, False, False, True, False, True]

@@ -20,21 +20,21 @@ SWEPT = choose_branch.Request(arm=ARM, task="xy", swept={"q1": np.linspace(-90, 
 @pytest.mark.parametrize("branch", [None, "elbow up", "elbow down"])
 def test_what_is_dropped_is_not_shown(branch: str | None) -> None:
     request = replace(SWEPT, branch=branch)
-    for few, every in zip(
+    for shortened, every in zip(
         choose_branch.solve(request, TARGETS), choose_branch.solve(replace(request, every=True), TARGETS), strict=True
     ):
-        assert (few.status, few.total, few.within_limits, few.refused) == (
+        assert (shortened.status, shortened.total, shortened.within_limits, shortened.refused) == (
             every.status,
             every.total,
             every.within_limits,
             every.refused,
         )
         assert every.total == len(every.branches)
-        assert every.within_limits == sum(one.within_limits for one in every.branches)
-        best = [None if one.best is None else one.branches[one.best].joints for one in (few, every)]
+        assert every.within_limits == sum(answer.within_limits for answer in every.branches)
+        best = [None if answer.best is None else answer.branches[answer.best].joints for answer in (shortened, every)]
         assert best[0] == best[1]
-        assert [one.joints for one in few.branches[:1]] == [one.joints for one in every.branches[:1]]
-    assert any(one.best is not None for one in choose_branch.solve(request, TARGETS))
+        assert [answer.joints for answer in shortened.branches[:1]] == [answer.joints for answer in every.branches[:1]]
+    assert any(answer.best is not None for answer in choose_branch.solve(request, TARGETS))
 
 
 def test_each_value_is_prepared_once_for_all_rows() -> None:
@@ -48,18 +48,18 @@ def test_each_value_is_prepared_once_for_all_rows() -> None:
 
 
 def test_branches_kept_do_not_grow_with_the_values(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept: list[int] = []
+    counts: list[int] = []
     add = choose_branch._Found.add
 
-    def noted(found: choose_branch._Found, *what: Any) -> None:
-        add(found, *what)
-        kept.append(len(found.branches))
+    def noted(collected: choose_branch._Found, *arguments: Any) -> None:
+        add(collected, *arguments)
+        counts.append(len(collected.branches))
 
     monkeypatch.setattr(choose_branch._Found, "add", noted)
     request = replace(SWEPT, swept={"q1": [0.0, 10.0, 20.0, 30.0, 40.0] * 40})
     [*_, most] = sorted(answer.total for answer in choose_branch.solve(request, TARGETS[:6]))
     assert most > 60
-    assert max(kept) < 30
+    assert max(counts) < 30
 
 
 def test_all_branches_of_many_values_are_solved_in_parts() -> None:

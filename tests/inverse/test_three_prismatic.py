@@ -82,15 +82,15 @@ def test_what_only_some_values_of_a_free_joint_reach_is_found(seed: int) -> None
     assert not verdict.solutions.complete.all()
 
 
-@pytest.mark.parametrize("off", [1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3])
-def test_nearly_in_line_nothing_is_lost(off: float) -> None:
+@pytest.mark.parametrize("angle", [1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3])
+def test_nearly_in_line_nothing_is_lost(angle: float) -> None:
     arm, screw, task = gantry("PPPRRR", "xyzzxz")
     definition, _ = solver(arm, task)
     q = np.random.default_rng(2).uniform(-3, 3, (20, 6)) * np.where(arm.prismatic, 100.0, 1.0)
-    q[:, 4] = off
+    q[:, 4] = angle
     verdict = truth.judge(arm, screw, task, q, goal(definition, screw, q).array())
     assert verdict, verdict
-    assert (verdict.solutions.status != Status.SINGULAR).all() == (off > 5e-8)
+    assert (verdict.solutions.status != Status.SINGULAR).all() == (angle > 5e-8)
 
 
 @pytest.mark.parametrize("rows", [(), (3,), (0,)])
@@ -105,11 +105,11 @@ def test_a_batch_without_any_branch_has_no_best_one(rows: tuple[int, ...]) -> No
     assert (s.best == -1).all()
 
 
-@pytest.mark.parametrize("off", [1e-9, 1e-7, 1e-5])
-def test_slides_millions_of_links_long_lose_nothing(off: float) -> None:
+@pytest.mark.parametrize("size", [1e-9, 1e-7, 1e-5])
+def test_slides_millions_of_links_long_lose_nothing(size: float) -> None:
     """Of a wrist all but in a point the loop's unit is as small: 5 of 200 targets were answered by one branch alone,
     and called complete."""
-    arm, screw = moved(random_case("PPP and spherical wrist", 1).arm, off, 1)
+    arm, screw = moved(random_case("PPP and spherical wrist", 1).arm, size, 1)
     report = examine(arm, screw, "pose", random_joints(screw, 200, 1))
     assert not report.lost.any()
     assert (report.counts == 2).all()

@@ -68,11 +68,11 @@ def test_special_axes_are_complete(name: str, kind: str) -> None:
     T = targets(arm, kind, 40)
     solutions = armkin.ik(arm, T)
     assert solutions.complete.all()
-    some = np.flatnonzero(solutions.valid.any(axis=1))
-    assert len(some) > 20
-    q = solutions.q[some, solutions.valid[some].argmax(axis=1)]
-    verdict = truth.judge(arm, screw, None, q, T[some])
-    truth.ask_oracle(arm, screw, verdict, T[some], np.arange(3), 250, 3)
+    solved = np.flatnonzero(solutions.valid.any(axis=1))
+    assert len(solved) > 20
+    q = solutions.q[solved, solutions.valid[solved].argmax(axis=1)]
+    verdict = truth.judge(arm, screw, None, q, T[solved])
+    truth.ask_oracle(arm, screw, verdict, T[solved], np.arange(3), 250, 3)
     assert verdict, verdict
 
 
@@ -80,7 +80,7 @@ def test_special_axes_are_complete(name: str, kind: str) -> None:
 def test_all_but_special_axes_are_complete(tilt: float) -> None:
     arm, _ = known("jaco_j2n6s300")
     for kind in ("parallel", "meeting"):
-        exact, beside = (armkin.ik(arm, targets(arm, kind, 40, off)) for off in (0.0, tilt))
+        exact, beside = (armkin.ik(arm, targets(arm, kind, 40, axis_tilt)) for axis_tilt in (0.0, tilt))
         assert beside.complete.all()
         same = exact.valid.sum(axis=1) == beside.valid.sum(axis=1)
         assert same.mean() >= (0.85 if tilt > 1e-3 else 1.0)
@@ -96,14 +96,14 @@ def test_a_wide_pencil_has_the_joints_of_its_pose(hidden: int) -> None:
     goal, known_q = closed.goal(T), armkin.ik(arm, T).q
     worst = {}
     for wide in (False, True):
-        off = []
+        errors = []
         for role in roles(closed.prismatic, 0, (hidden,), wide):
-            one = pencil.build(role, closed.links, closed.prismatic, choose_variable.PSI[0])
-            seed = roots.seeds(one, inverse(goal), 0.02, part=True)
+            built = pencil.build(role, closed.links, closed.prismatic, choose_variable.PSI[0])
+            seed = roots.seeds(built, inverse(goal), 0.02, part=True)
             for pose, q in enumerate(known_q):
                 step = q[~np.isnan(q[:, 0])][:, None] - seed.q[seed.pose == pose]
-                off += np.abs(np.angle(np.exp(1j * step))).max(axis=2).min(axis=1, initial=9.0).tolist()
-        worst[wide] = np.quantile(off, 0.9)
+                errors += np.abs(np.angle(np.exp(1j * step))).max(axis=2).min(axis=1, initial=9.0).tolist()
+        worst[wide] = np.quantile(errors, 0.9)
     assert worst[True] < 1e-6
     assert worst[False] > 1e-2
 
@@ -111,8 +111,10 @@ def test_a_wide_pencil_has_the_joints_of_its_pose(hidden: int) -> None:
 def test_only_what_stands_so_is_special() -> None:
     arm, _ = known("jaco_j2n6s300")
     elimination = method.prepare(arm.link, arm.prismatic)
-    for kind, wanted in (("parallel", choose_variable.Kind.PARALLEL), ("meeting", choose_variable.Kind.MEETING)):
-        assert (choose_variable.kinds(elimination.loop, elimination.loop.goal(targets(arm, kind, 50))) == wanted).all()
+    for kind, expected in (("parallel", choose_variable.Kind.PARALLEL), ("meeting", choose_variable.Kind.MEETING)):
+        assert (
+            choose_variable.kinds(elimination.loop, elimination.loop.goal(targets(arm, kind, 50))) == expected
+        ).all()
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (500, 6))
     assert (
         choose_variable.kinds(elimination.loop, elimination.loop.goal(armkin.fk(arm, q))) == choose_variable.Kind.PLAIN

@@ -88,12 +88,15 @@ def test_answers_do_not_depend_on_the_joint_whose_values_are_asked(monkeypatch: 
     near = armkin.ik(arm, target)
     assert "near spherical wrist" in near.why
     monkeypatch.setattr(curve_starts, "nearly_closed", lambda arm, free: free)
-    other = armkin.ik(arm, target)
+    by_other_joint = armkin.ik(arm, target)
     assert near.interval is not None
-    assert other.interval is not None
+    assert by_other_joint.interval is not None
     for k in range(len(target)):
-        own, same = near.interval[k][near.within_limits[k]], other.interval[k][other.within_limits[k]]
-        assert len(own) == len(same)
-        assert len(own)
-        away = np.abs(np.remainder(own[:, None] - same + np.pi, 2 * np.pi) - np.pi).max(axis=2)
+        legal, same = (
+            near.interval[k][near.within_limits[k]],
+            by_other_joint.interval[k][by_other_joint.within_limits[k]],
+        )
+        assert len(legal) == len(same)
+        assert len(legal)
+        away = np.abs(np.remainder(legal[:, None] - same + np.pi, 2 * np.pi) - np.pi).max(axis=2)
         assert away.min(axis=1).max() < 1e-9

@@ -30,10 +30,10 @@ def jumps(s: armkin.Solutions, name: int) -> np.ndarray:
     has = (s.branch == name).any(axis=1)
     column = (s.branch == name).argmax(axis=1)
     q = s.q[np.arange(len(has)), column]
-    both = has[1:] & has[:-1]
+    has_both = has[1:] & has[:-1]
     step = np.diff(q, axis=0)
     step = np.where(s.arm.prismatic, step / s.arm.reach, step - 2 * np.pi * np.rint(step / (2 * np.pi)))
-    return np.asarray(np.abs(step).max(axis=1)[both])
+    return np.asarray(np.abs(step).max(axis=1)[has_both])
 
 
 def test_the_published_circle() -> None:
@@ -47,11 +47,11 @@ def test_the_published_circle() -> None:
     for name in range(4):
         assert jumps(s, name).max() < 0.1
     first = np.degrees(s.q[0])
-    for wanted in ([0, 107.282, -124.565], [0, -17.282, 124.565]):
-        b = np.abs(first - wanted).max(axis=1).argmin()
-        np.testing.assert_allclose(first[b], wanted, atol=1e-3)
+    for published in ([0, 107.282, -124.565], [0, -17.282, 124.565]):
+        b = np.abs(first - published).max(axis=1).argmin()
+        np.testing.assert_allclose(first[b], published, atol=1e-3)
         assert np.degrees(s.q[np.arange(111), (s.branch == s.branch[0, b]).argmax(axis=1)])[0] == pytest.approx(
-            wanted, abs=1e-3
+            published, abs=1e-3
         )
 
 
@@ -66,8 +66,8 @@ def test_closed_forms_keep_names_through_joint_space(name: str) -> None:
         s = armkin.ik(arm, path_targets(arm, q))
         d = s.q - q[:, None]
         d = np.abs(np.where(arm.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))).max(axis=2)
-        own = np.nanargmin(d, axis=1)
-        assert len(set(s.branch[np.arange(300), own])) == 1
+        column = np.nanargmin(d, axis=1)
+        assert len(set(s.branch[np.arange(300), column])) == 1
 
 
 @pytest.mark.parametrize("name", ["jaco_j2n6s300", "panda", "moveo"])
@@ -78,8 +78,8 @@ def test_numbered_branches_follow_a_path(name: str) -> None:
     q = a + rng.uniform(-0.3, 0.3, arm.n) * np.linspace(0, 1, 120)[:, None]
     s = armkin.ik(arm, path_targets(arm, q))
     d = s.q - q[:, None]
-    own = np.nanargmin(np.abs(d - 2 * np.pi * np.rint(d / (2 * np.pi))).max(axis=2), axis=1)
-    assert len(set(s.branch[np.arange(120), own])) == 1
+    column = np.nanargmin(np.abs(d - 2 * np.pi * np.rint(d / (2 * np.pi))).max(axis=2), axis=1)
+    assert len(set(s.branch[np.arange(120), column])) == 1
     for row, valid in zip(s.branch, s.valid, strict=True):
         assert len(set(row[valid])) == valid.sum()
         assert (row[~valid] == -1).all()

@@ -32,25 +32,25 @@ def test_round_postures(name: str, sample: Callable[[int, int], int]) -> None:
     kinds = {f"multiples of {step}": truth.round_postures(arm, step, sample(24, 8), seed=1) for step in (90, 45)}
     q = np.concatenate(list(kinds.values()))
     for near in (None, q):
-        verdict, what = truth.judged(arm, screw, kinds, goal(task, screw, q).array(), near)
-        assert verdict, what
+        verdict, report = truth.judged(arm, screw, kinds, goal(task, screw, q).array(), near)
+        assert verdict, report
 
 
 @pytest.mark.parametrize("name", UNLIKE)
 def test_singular_surfaces(name: str, sample: Callable[[int, int], int]) -> None:
     arm, screw = shipped(name)
     task, _ = solver(arm, None)
-    found = truth.singular_postures(arm, screw, None, 12, seed=1)
-    kinds = {kind: q[: sample(12, 3)] for kind, q in found.items()}
+    postures_of = truth.singular_postures(arm, screw, None, 12, seed=1)
+    kinds = {kind: q[: sample(12, 3)] for kind, q in postures_of.items()}
     assert kinds, "no singular surface found"
     q = np.concatenate(list(kinds.values()))
     target = goal(task, screw, q).array()
     for near in (None, q):
-        verdict, what = truth.judged(arm, screw, kinds, target, near)
-        assert verdict, what
-    verdict, what = truth.judged(arm, screw, kinds, truth.typed(task, target, 9))
+        verdict, report = truth.judged(arm, screw, kinds, target, near)
+        assert verdict, report
+    verdict, report = truth.judged(arm, screw, kinds, truth.typed(task, target, 9))
     verdict.lost = []  # what solves a target by 1e-9 no more than just is not asked for
-    assert verdict, f"9 digits, {what}"
+    assert verdict, f"9 digits, {report}"
 
 
 @pytest.mark.parametrize(
@@ -72,8 +72,8 @@ def test_singular_surfaces_of_oblique_wrists(name: str) -> None:
     q = np.concatenate(list(kinds.values()))
     target = goal(definition, screw, q).array()
     for near in (None, q):
-        verdict, what = truth.judged(arm, screw, kinds, target, near, task)
-        assert verdict, what
+        verdict, report = truth.judged(arm, screw, kinds, target, near, task)
+        assert verdict, report
 
 
 @pytest.mark.parametrize("name", UNLIKE)
@@ -84,11 +84,11 @@ def test_rounded_targets(name: str) -> None:
     q = rng.uniform(-np.pi, np.pi, (24, arm.n))
     q = np.where(arm.prismatic, q * arm.reach / 10, q)
     target = goal(task, screw, q).array()
-    asked = {f"{n} digits": truth.typed(task, target, n) for n in (3, 4, 5, 6, 7, 7.5, 8, 10, 13, 16)}
+    targets_of = {f"{n} digits": truth.typed(task, target, n) for n in (3, 4, 5, 6, 7, 7.5, 8, 10, 13, 16)}
     if task.orientation == "full":
-        asked |= {f"matrices of {n} digits": truth.printed(target, n) for n in (7, 7.5, 8, 10, 13, 16)}
-    verdict, what = truth.judged(arm, screw, dict.fromkeys(asked, q), np.concatenate(list(asked.values())))
-    assert verdict, what
+        targets_of |= {f"matrices of {n} digits": truth.printed(target, n) for n in (7, 7.5, 8, 10, 13, 16)}
+    verdict, report = truth.judged(arm, screw, dict.fromkeys(targets_of, q), np.concatenate(list(targets_of.values())))
+    assert verdict, report
 
 
 @pytest.mark.parametrize("name", ["puma560", "ur5e", "jaco_j2n6s300", "moveo", "kinova_gen3"])
@@ -107,11 +107,11 @@ def test_the_fifth_call_is_the_first_bit_for_bit(name: str) -> None:
     q = np.where(arm.prismatic, 300 * q, q)
     task, _ = solver(arm, None)
     T = goal(task, screw, q).array()
-    first, few = armkin.ik(arm, T[0]).q.tobytes(), armkin.ik(arm, T).q.tobytes()
+    first, batch = armkin.ik(arm, T[0]).q.tobytes(), armkin.ik(arm, T).q.tobytes()
     armkin.ik(arm, np.repeat(T, 4, axis=0))  # enough to be recorded
     for _ in range(5):
         assert armkin.ik(arm, T[0]).q.tobytes() == first
-        assert armkin.ik(arm, T).q.tobytes() == few
+        assert armkin.ik(arm, T).q.tobytes() == batch
 
 
 def test_the_judge_notices_answers_spoilt_on_purpose(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,10 +159,10 @@ def test_the_judge_notices_a_self_motion_listed_by_two_of_its_postures(monkeypat
     right = armkin.ik(arm, target, near=q)
     assert not right.valid[:, -1].any()
     assert truth.judge(arm, screw, None, q, target)
-    two, there = right.q.copy(), right.valid.copy()
+    two, valid = right.q.copy(), right.valid.copy()
     along = np.sqrt(2) * np.linalg.svd(armkin.jacobian(arm, q))[2][:, -1]  # joints 4 and 6 at one rad/s
-    two[:, -1], there[:, -1] = q + np.array([0.5, 1, 2, np.pi, 3.5, 4, 5, 6])[:, None] * along, True
-    monkeypatch.setattr(armkin, "ik", lambda *_, **__: replace(right, q=two, valid=there))
+    two[:, -1], valid[:, -1] = q + np.array([0.5, 1, 2, np.pi, 3.5, 4, 5, 6])[:, None] * along, True
+    monkeypatch.setattr(armkin, "ik", lambda *_, **__: replace(right, q=two, valid=valid))
     assert truth.judge(arm, screw, None, q, target).twice == list(range(8))
 
 
@@ -188,40 +188,40 @@ def test_a_rounded_rotation_is_made_orthonormal_first() -> None:
     arm = shipped("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (300, 6))
     T = armkin.fk(arm, q)
-    for given in (np.asarray(T, np.float32), np.round(T, 7)):
-        s = armkin.ik(arm, given)
+    for rounded_T in (np.asarray(T, np.float32), np.round(T, 7)):
+        s = armkin.ik(arm, rounded_T)
         assert (s.valid.sum(axis=1) == 8).all()
         assert (s.rounding > 1e-9).all()
         assert (s.rounding < 1e-6).all()
         R = s.target[:, :3, :3]
         np.testing.assert_allclose(R @ np.swapaxes(R, 1, 2), np.tile(np.eye(3), (300, 1, 1)), atol=1e-15)
-        np.testing.assert_allclose(R, given[:, :3, :3], atol=1e-6)
+        np.testing.assert_allclose(R, rounded_T[:, :3, :3], atol=1e-6)
         assert np.nanmax(s.residual()[0]) < 1e-9
         assert np.nanmax(s.residual()[1]) < 1e-12
     assert (armkin.ik(arm, T).rounding < 1e-14).all()
-    off = T[0].copy()
-    off[0, 0] += 1e-5
+    skewed = T[0].copy()
+    skewed[0, 0] += 1e-5
     with pytest.raises(UsageError, match="a rotation to 5e-6"):
-        armkin.ik(arm, off)
+        armkin.ik(arm, skewed)
 
 
 def test_a_rounded_pose_takes_no_second_look(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does one of an arm a thousand times as long: the closed form's own answers are accepted."""
-    asked: list[int] = []
+    examined: list[int] = []
     examine = components.examine
 
-    def counted(goals: Goals, *rest: object) -> object:
-        asked.append(len(goals.target))
-        return examine(goals, *rest)  # type: ignore[arg-type]
+    def counted(goals: Goals, *arguments: object) -> object:
+        examined.append(len(goals.target))
+        return examine(goals, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(components, "examine", counted)
     arm = shipped("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (1000, 6))
     link = arm.link.copy()
     link[:, :3, 3] *= 1000
-    for one in (arm, from_links(link, arm.prismatic)):
-        s = armkin.ik(one, np.asarray(armkin.fk(one, q)), "pose")
+    for sized_arm in (arm, from_links(link, arm.prismatic)):
+        s = armkin.ik(sized_arm, np.asarray(armkin.fk(sized_arm, q)), "pose")
         assert (s.valid.sum(axis=1) == 8).all()
-        s = armkin.ik(one, np.round(armkin.fk(one, q), 7), "pose")
+        s = armkin.ik(sized_arm, np.round(armkin.fk(sized_arm, q), 7), "pose")
         assert (s.valid.sum(axis=1) == 8).all()
-    assert sum(asked) <= 8
+    assert sum(examined) <= 8

@@ -21,13 +21,13 @@ def test_all_roots_are_those_that_an_eigenvalue_problem_has() -> None:
     rng = np.random.default_rng(0)
     c = rng.normal(size=(100, DEGREE + 1)) + 1j * rng.normal(size=(100, DEGREE + 1))
     c[:, 0] = c[:, 0].real
-    found = roots(np.stack([values(one, sampled_at(DEGREE)) for one in c]), DEGREE)
-    assert found.decided.all()
-    for k, one in enumerate(c):
-        z = np.roots(np.concatenate([one[:0:-1], one[:1], one[1:].conj()]))
-        own = np.sort(np.remainder(np.angle(z[np.abs(np.abs(z) - 1) < 1e-7]), 2 * np.pi))
-        at = np.sort(np.remainder(found.at[found.which == k], 2 * np.pi))
-        assert np.allclose(at, own, atol=1e-9)
+    listed = roots(np.stack([values(coefficients, sampled_at(DEGREE)) for coefficients in c]), DEGREE)
+    assert listed.decided.all()
+    for k, coefficients in enumerate(c):
+        z = np.roots(np.concatenate([coefficients[:0:-1], coefficients[:1], coefficients[1:].conj()]))
+        expected = np.sort(np.remainder(np.angle(z[np.abs(np.abs(z) - 1) < 1e-7]), 2 * np.pi))
+        angles = np.sort(np.remainder(listed.at[listed.which == k], 2 * np.pi))
+        assert np.allclose(angles, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(("lift", "count", "decided"), [(-1e-9, 2, True), (1e-9, 0, True), (0.0, None, False)])
@@ -35,9 +35,9 @@ def test_two_roots_are_told_from_none_and_one_double_one_is_undecided(
     lift: float, count: int | None, decided: bool
 ) -> None:
     t = sampled_at(DEGREE)
-    found = roots(((1 + lift - np.cos(t - 0.7)) * (3 + np.cos(2 * t)))[None], DEGREE)
-    assert found.decided.tolist() == [decided]
-    assert count is None or len(found.at) == count
+    listed = roots(((1 + lift - np.cos(t - 0.7)) * (3 + np.cos(2 * t)))[None], DEGREE)
+    assert listed.decided.tolist() == [decided]
+    assert count is None or len(listed.at) == count
 
 
 def class_arm(rng: np.random.Generator, limits: np.ndarray) -> Arm:
@@ -63,8 +63,8 @@ def test_where_a_joint_stands_on_a_limit_there_is_a_place() -> None:
                 arm = class_arm(np.random.default_rng(100 + seed), limits)
                 of = boundaries(arm)
                 assert of is not None
-                [at], _ = places(of, armkin.fk(arm, q)[None])
-                assert np.abs(np.remainder(at - q[6] + np.pi, 2 * np.pi) - np.pi).min() < 1e-7
+                [values], _ = places(of, armkin.fk(arm, q)[None])
+                assert np.abs(np.remainder(values - q[6] + np.pi, 2 * np.pi) - np.pi).min() < 1e-7
 
 
 def test_an_arm_without_such_a_shoulder_or_wrist_has_none() -> None:

@@ -34,15 +34,15 @@ LIMITS = [
 @given(value=st.floats(-np.pi, np.pi), near=st.floats(-12, 12))
 def test_nearest_legal_copy(limits: tuple[float, float], value: float, near: float) -> None:
     lower, upper = np.radians(limits)
-    got, inside = nearest_copy(np.array([value]), near, lower, upper)
+    copy, inside = nearest_copy(np.array([value]), near, lower, upper)
     copies = value + 2 * np.pi * np.arange(-6, 7)
     legal = copies[(copies >= lower - 1e-9) & (copies <= upper + 1e-9)]
     assert bool(np.all(inside)) == (len(legal) > 0)
-    assert nearest_number(value, near, lower, upper, False) == (float(got[0]), len(legal) > 0)
-    turn = (got[0] - value) / (2 * np.pi)
+    assert nearest_number(value, near, lower, upper, False) == (float(copy[0]), len(legal) > 0)
+    turn = (copy[0] - value) / (2 * np.pi)
     assert turn == pytest.approx(round(turn), abs=1e-9)
     if len(legal):
-        assert abs(got[0] - near) == pytest.approx(np.abs(legal - near).min(), abs=1e-8)
+        assert abs(copy[0] - near) == pytest.approx(np.abs(legal - near).min(), abs=1e-8)
 
 
 def test_copies_are_the_legal_ones_nearest_to_near() -> None:
@@ -52,14 +52,14 @@ def test_copies_are_the_legal_ones_nearest_to_near() -> None:
     near = rng.uniform(-10, 10, len(value))
     turns = value[:, None] + 2 * np.pi * np.arange(-6, 7)
     for low, high in ((-np.pi, 2.0), (-2.0, np.pi), (-np.pi, np.pi), (-7, 1), (-1, 7), (-20, 20), (2, 5), (-9, -4)):
-        copy, ok = nearest_copy(value, near, float(low), float(high))
+        copy, is_legal = nearest_copy(value, near, float(low), float(high))
         legal = (turns >= low - 1e-9) & (turns <= high + 1e-9)
-        assert (np.broadcast_to(ok, value.shape) == legal.any(axis=1)).all(), (low, high)
+        assert (np.broadcast_to(is_legal, value.shape) == legal.any(axis=1)).all(), (low, high)
         apart = np.where(legal, np.abs(turns - near[:, None]), np.inf).min(axis=1)
-        some = legal.any(axis=1)
-        np.testing.assert_allclose(np.abs(copy - near)[some], apart[some], atol=1e-9)
+        has_legal = legal.any(axis=1)
+        np.testing.assert_allclose(np.abs(copy - near)[has_legal], apart[has_legal], atol=1e-9)
         principal = np.where(value == -np.pi, np.pi, value)
-        np.testing.assert_allclose(copy[~some], principal[~some], atol=1e-12)
+        np.testing.assert_allclose(copy[~has_legal], principal[~has_legal], atol=1e-12)
 
 
 def planar(limits: list[tuple[float, float]]) -> armkin.Arm:
@@ -86,8 +86,8 @@ def test_turns_are_all_legal_copies(limits: tuple[tuple[float, float], ...]) -> 
             assert (np.diff(motion) >= -1e-9).all()
             assert motion[0] == pytest.approx(np.abs(legal - near).sum(axis=1).min())
             np.testing.assert_allclose(got[0], row, atol=1e-9)  # the branch is given by the nearest one
-            wanted = legal[np.lexsort(legal.T)]
-            np.testing.assert_allclose(got[np.lexsort(got.round(9).T)], wanted, atol=1e-9)
+            expected = legal[np.lexsort(legal.T)]
+            np.testing.assert_allclose(got[np.lexsort(got.round(9).T)], expected, atol=1e-9)
 
 
 def test_a_ur_has_copies_by_the_dozen() -> None:

@@ -30,9 +30,9 @@ def test_results_do_not_depend_on_the_workers(
     q[::97, :] = np.round(q[::97, :] / (np.pi / 2)) * (np.pi / 2)  # targets on an edge, too
     q[:, arm.prismatic] *= 200  # [mm]
     goal = targets_of(solver(arm, None)[0], armkin.fk(arm, q), q)
-    one, three = armkin.ik(arm, goal), armkin.ik(arm, goal, workers=3)
-    for field in fields(one):
-        a, b = getattr(one, field.name), getattr(three, field.name)
+    alone, three = armkin.ik(arm, goal), armkin.ik(arm, goal, workers=3)
+    for field in fields(alone):
+        a, b = getattr(alone, field.name), getattr(three, field.name)
         if isinstance(a, np.ndarray):
             np.testing.assert_array_equal(a, b, err_msg=field.name)
         else:
@@ -42,9 +42,9 @@ def test_results_do_not_depend_on_the_workers(
 def test_a_chunk_gives_what_a_longer_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:
     arm, _ = shipped("ur5e")
     T = armkin.fk(arm, np.random.default_rng(12).uniform(-3, 3, (5000, arm.n)))
-    whole = armkin.ik(arm, T)
+    in_one_chunk = armkin.ik(arm, T)
     monkeypatch.setattr(arrays, "CHUNK", 700)
-    np.testing.assert_array_equal(armkin.ik(arm, T).q, whole.q)
+    np.testing.assert_array_equal(armkin.ik(arm, T).q, in_one_chunk.q)
 
 
 @pytest.mark.parametrize(("workers", "least", "step"), [(1, 10, 1), (2, 10, 1), (3, 256, 256), (16, 1, 1)])

@@ -62,14 +62,14 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
         q = rng.uniform(-np.pi, np.pi, (k, arm.n))
         return np.where(arm.prismatic, q / np.pi * arm.reach / 2, q)
 
-    found: dict[str, Array] = {}
+    postures: dict[str, Array] = {}
     valleys: list[tuple[int, Array, Array]] = []  # joint, postures, how far a minimum is along it
     for joint in np.flatnonzero(~arm.prismatic).tolist():
         values = np.array([0.0, 90.0, 180.0, -90.0])
         q = anywhere(4 * count).reshape(4, count, arm.n)
         q[:, :, joint] = np.radians(values)[:, None]
-        on = weak(q[:, :20].reshape(-1, arm.n)).reshape(4, -1).max(axis=1) < 1e-12
-        found |= {f"{arm.joint_names[joint]} = {value:g}": q[k] for k, value in enumerate(values) if on[k]}
+        on_surface = weak(q[:, :20].reshape(-1, arm.n)).reshape(4, -1).max(axis=1) < 1e-12
+        postures |= {f"{arm.joint_names[joint]} = {value:g}": q[k] for k, value in enumerate(values) if on_surface[k]}
         # from random postures on to the nearest minimum of the smallest singular value along this joint
         q1 = anywhere(3 * count)
         line = np.linspace(-0.3, 0.3, 13)
@@ -80,7 +80,7 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
         inside = (k > 0) & (k < len(line) - 1) & (size.min(axis=1) < 0.5 * size.max(axis=1))
         valleys.append((joint, q1[inside], line[k[inside]]))
     if not valleys:
-        return found
+        return postures
     q, centre = (np.concatenate([valley[part] for valley in valleys]) for part in (1, 2))
     along = np.eye(arm.n)[np.repeat([joint for joint, *_ in valleys], [len(rows) for _, rows, _ in valleys])]
     low, high = centre - 0.05, centre + 0.05
@@ -90,12 +90,12 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
         left = sizes[: len(q)] < sizes[len(q) :]
         low, high = np.where(left, low, a), np.where(left, b, high)
     q = q + 0.5 * (low + high)[:, None] * along
-    on = weak(q) < 1e-7
+    on_surface = weak(q) < 1e-7
     for joint, *_ in valleys:
-        mine = on & (along[:, joint] > 0)
+        mine = on_surface & (along[:, joint] > 0)
         if mine.sum() >= 5:
-            found[f"{arm.joint_names[joint]} moved"] = q[mine][:count]
-    return found
+            postures[f"{arm.joint_names[joint]} moved"] = q[mine][:count]
+    return postures
 
 
 # ---- targets -----------------------------------------------------------------------------------------------
@@ -113,13 +113,13 @@ def typed(task: Any, target: Array, digits: float) -> Array:
     """Targets as typed with that many digits: angles in degrees, orientations as roll, pitch, yaw."""
     if task.orientation == "full":
         angles = rounded(np.degrees(rpy(target[:, :3, :3])), digits)
-        out = np.zeros_like(target)
-        out[:, 3, 3] = 1.0
-        out[:, :3, 3] = rounded(target[:, :3, 3], digits)
+        typed_poses = np.zeros_like(target)
+        typed_poses[:, 3, 3] = 1.0
+        typed_poses[:, :3, 3] = rounded(target[:, :3, 3], digits)
         for k, (roll, pitch, yaw) in enumerate(angles):
             R = oracle.rotation("z", yaw) @ oracle.rotation("y", pitch) @ oracle.rotation("x", roll)
-            out[k, :3, :3] = R[:3, :3]
-        return out
+            typed_poses[k, :3, :3] = R[:3, :3]
+        return typed_poses
     unit = np.ones(target.shape[1])
     last = task.position + len(task.sums)
     unit[task.position : last] = 180 / np.pi
@@ -190,9 +190,9 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     s = armkin.ik(arm, target, task) if near is None else armkin.ik(arm, target, task, near=near)
     goals = goal_of(definition, target)
     # what the posture asked for becomes at the rounded target: itself if it solves it, else where Newton leads it
-    reached, asked = miss_of(arm, screw, goals, q) < 0.5 * SOLVES, q.copy()
+    reached, expected = miss_of(arm, screw, goals, q) < 0.5 * SOLVES, q.copy()
     led = np.flatnonzero(~reached)
-    asked[led], left = oracle.newton(screw, goals.take(led), q[led], 60)
+    expected[led], left = oracle.newton(screw, goals.take(led), q[led], 60)
     reached[led] = left < 1e-12
     verdict = Verdict(len(q), s)
     none = ~s.valid.any(axis=1)
@@ -216,29 +216,29 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
         d = a - b
         return np.abs(np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))) * unit
 
-    d = apart(s.q, asked[:, None])
-    here = np.nan_to_num(d.max(axis=2), nan=np.inf).min(axis=1, initial=np.inf)
-    weak = oracle.weakness(screw, goals, asked)
+    d = apart(s.q, expected[:, None])
+    distance = np.nan_to_num(d.max(axis=2), nan=np.inf).min(axis=1, initial=np.inf)
+    weak = oracle.weakness(screw, goals, expected)
     # as far as a posture is determined: its residual over the smallest singular value, or the root of it at a fold
-    known = here < 1e-6 + np.minimum(1e-9 / np.maximum(weak, 1e-300), 1e-3)
+    is_listed = distance < 1e-6 + np.minimum(1e-9 / np.maximum(weak, 1e-300), 1e-3)
     held = np.nan_to_num(np.where(s.free[:, None], 0.0, d).max(axis=2), nan=np.inf)
     on_curve = (s.status == Status.SINGULAR) & (np.where(s.valid, held, np.inf).min(axis=1, initial=np.inf) < 1e-4)
-    k = np.flatnonzero(reached & ~none & ~known & ~on_curve & ~stands.any(axis=1))
+    k = np.flatnonzero(reached & ~none & ~is_listed & ~on_curve & ~stands.any(axis=1))
     if len(k):
         # one with a branch further away, if the postures between them solve the target, too
         b = np.nan_to_num(d[k].max(axis=2), nan=np.inf).argmin(axis=1)
         # a longer valley is a self-motion, which the answer has to report
         long = (d[k, b].max(axis=1) > CLOSE) & (s.status[k] != Status.SINGULAR)
-        verdict.lost = k[long | ~_in_one_component(arm, screw, goals.take(k), asked[k], s.q[k, b])].tolist()
+        verdict.lost = k[long | ~_in_one_component(arm, screw, goals.take(k), expected[k], s.q[k, b])].tolist()
     pairs = [np.zeros((4, 0), int)]
     for i in range(s.q.shape[1]):
         for j in range(i):
-            both = s.valid[:, i] & s.valid[:, j]
+            both_valid = s.valid[:, i] & s.valid[:, j]
             with np.errstate(invalid="ignore"):
-                off = apart(s.q[:, i], s.q[:, j])
+                difference = apart(s.q[:, i], s.q[:, j])
                 # on one self-motion, perhaps: what it holds is alike
-                alike = (s.status == Status.SINGULAR) & (np.where(s.free, 0.0, off).max(axis=1) < 1e-4)
-                k = np.flatnonzero(both & (alike | (off.max(axis=1) < CLOSE)))
+                alike = (s.status == Status.SINGULAR) & (np.where(s.free, 0.0, difference).max(axis=1) < 1e-4)
+                k = np.flatnonzero(both_valid & (alike | (difference.max(axis=1) < CLOSE)))
             pairs.append(np.stack([k, np.full_like(k, i), np.full_like(k, j), alike[k]]))
     k, i, j, alike = np.concatenate(pairs, axis=1)
     if len(k):
@@ -248,11 +248,11 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
         straight[straight] = _straight(arm, screw, goals.take(k[straight]), a[straight], b[straight])
         verdict.twice = np.unique(k[close | straight]).tolist()
     if near is not None:
-        there = np.broadcast_to(near, q.shape)
-        solves = miss_of(arm, screw, goals, there) < 0.5 * SOLVES
-        legal = ((there >= arm.lower - 1e-9) & (there <= arm.upper + 1e-9)).all(axis=1)
+        standing = np.broadcast_to(near, q.shape)
+        solves = miss_of(arm, screw, goals, standing) < 0.5 * SOLVES
+        legal = ((standing >= arm.lower - 1e-9) & (standing <= arm.upper + 1e-9)).all(axis=1)
         best = np.take_along_axis(s.q, np.maximum(s.best, 0)[:, None, None], axis=1)[:, 0]
-        stays = (s.best >= 0) & (np.abs((best - there) * unit).max(axis=1) < 1e-9)
+        stays = (s.best >= 0) & (np.abs((best - standing) * unit).max(axis=1) < 1e-9)
         verdict.moves = np.flatnonzero(solves & legal & ~stays).tolist()
     return verdict
 
@@ -268,7 +268,7 @@ def judged(
     """Postures of several kinds and their targets, all judged in one call; and of which kind the wrong ones are."""
     q = np.concatenate(list(kinds.values()))
     verdict = judge(arm, screw, task, q, target, near)
-    kind = np.repeat(list(kinds), [len(each) for each in kinds.values()])
+    kind = np.repeat(list(kinds), [len(postures) for postures in kinds.values()])
     wrong = {*verdict.unreachable, *verdict.lost, *verdict.false, *verdict.twice, *verdict.moves}
     return verdict, f"{sorted({str(kind[k]) for k in wrong})}: {verdict}"
 
@@ -288,23 +288,23 @@ def _straight(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
     unit = np.where(screw.prismatic, screw.size, 1.0)
     d = _way(screw, a, b) / unit
     half = ~screw.prismatic & (np.pi - np.abs(d) < 1e-3)
-    out = np.zeros(len(a), bool)
+    joined = np.zeros(len(a), bool)
     for flip in itertools.product((False, True), repeat=a.shape[1]):
-        k = np.flatnonzero(~out & ~(np.array(flip) & ~half).any(axis=1))
+        k = np.flatnonzero(~joined & ~(np.array(flip) & ~half).any(axis=1))
         for parts in (PARTS[44::45], PARTS):  # three part most of them
             if not len(k):
                 break
             way = d[k] - 2 * np.pi * np.sign(d[k]) * np.array(flip)
             q = (a[k, None] + parts[:, None] * (way * unit)[:, None]).reshape(-1, a.shape[1])
             along = goals.take(np.repeat(k, len(parts)))
-            one = miss_of(arm, screw, along, q) < 0.01  # of more the next 1e-4 rad or sizes make no solution
-            r = np.flatnonzero(one)
-            there = across(screw, along.take(r), q[r])
-            one[r] = np.abs((there - q[r]) / unit).max(axis=1) <= 1e-4  # as far as roots of high order are off
-            one[r] &= miss_of(arm, screw, along.take(r), there) < 0.9 * SOLVES
-            k = k[one.reshape(len(k), len(parts)).all(axis=1)]
-        out[k] = True
-    return out
+            solves = miss_of(arm, screw, along, q) < 0.01  # of more the next 1e-4 rad or sizes make no solution
+            r = np.flatnonzero(solves)
+            corrected = across(screw, along.take(r), q[r])
+            solves[r] = np.abs((corrected - q[r]) / unit).max(axis=1) <= 1e-4  # as far as roots of high order are off
+            solves[r] &= miss_of(arm, screw, along.take(r), corrected) < 0.9 * SOLVES
+            k = k[solves.reshape(len(k), len(parts)).all(axis=1)]
+        joined[k] = True
+    return joined
 
 
 def _in_one_component(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
@@ -313,14 +313,14 @@ def _in_one_component(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) 
     Beside it means within a tenth of its length: that reaches neither of the two, so that what is found is a third
     solution. Isolated branches have none.
     """
-    d, one = _way(screw, a, b), np.ones(len(a), bool)
+    d, stays = _way(screw, a, b), np.ones(len(a), bool)
     for part in (0.25, 0.5, 0.75):
         q = a + part * d
-        there = across(screw, goals, q, weak=1e-4)  # of a component with two roots 1e-4 at most is lost
-        beside = np.abs(there - q).max(axis=1) <= 0.1 * np.abs(d).max(axis=1)
-        beside &= miss_of(arm, screw, goals, there) < 1.1 * SOLVES  # what is surely more parts them, and no less
-        one &= beside | (miss_of(arm, screw, goals, q) < 1.1 * SOLVES)
-    return one
+        corrected = across(screw, goals, q, weak=1e-4)  # of a component with two roots 1e-4 at most is lost
+        beside = np.abs(corrected - q).max(axis=1) <= 0.1 * np.abs(d).max(axis=1)
+        beside &= miss_of(arm, screw, goals, corrected) < 1.1 * SOLVES  # what is surely more parts them, and no less
+        stays &= beside | (miss_of(arm, screw, goals, q) < 1.1 * SOLVES)
+    return stays
 
 
 def across(screw: Screws, goals: Goal, q: Array, weak: float = 1e-6) -> Array:
@@ -344,29 +344,29 @@ def movable(screw: Screws, goals: Goal, q: Array, joint: int, way: float = 0.1) 
     The joint is held there, the others go by Newton steps of least norm: (M,).
     """
     unit = np.where(screw.prismatic, screw.size, 1.0)
-    others = unit * (np.arange(q.shape[1]) != joint)
-    there = q + way * (unit - others)
+    scale = unit * (np.arange(q.shape[1]) != joint)
+    shifted = q + way * (unit - scale)
     for _ in range(60):
-        r, J = oracle._residual(screw, goals, there)
-        U, S, Vt = np.linalg.svd(J * others, full_matrices=False)
+        r, J = oracle._residual(screw, goals, shifted)
+        U, S, Vt = np.linalg.svd(J * scale, full_matrices=False)
         gain = np.where(S > 1e-5, 1 / np.maximum(S, 1e-5), 0.0)
         step = np.einsum("mki,mk,mrk,mr->mi", Vt, gain, U, r, optimize=True)
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
-        there = there + others * step
-    size = np.linalg.norm(oracle._residual(screw, goals, there)[0], axis=1)
-    return np.asarray((size < 1e-10) & (np.abs((there - q) / unit).max(axis=1) < 1.0))
+        shifted = shifted + scale * step
+    size = np.linalg.norm(oracle._residual(screw, goals, shifted)[0], axis=1)
+    return np.asarray((size < 1e-10) & (np.abs((shifted - q) / unit).max(axis=1) < 1.0))
 
 
 def idle(screw: Screws, solutions: Any, target: Array) -> list[tuple[int, int]]:
     """Rows and joints that are called free, but of which no branch's self-motion moves the joint, either way."""
-    goals, out = goal_of(solutions.task, target), []
+    goals, idle_joints = goal_of(solutions.task, target), []
     for row in np.flatnonzero(solutions.free.any(axis=1)):
         q = solutions.q[row][solutions.valid[row]]
-        one = goals.take(np.full(len(q), row))
+        row_goals = goals.take(np.full(len(q), row))
         for joint in np.flatnonzero(solutions.free[row]).tolist():
-            if not any(movable(screw, one, q, joint, way).any() for way in (0.1, -0.1, 0.02, -0.02)):
-                out.append((int(row), int(joint)))
-    return out
+            if not any(movable(screw, row_goals, q, joint, way).any() for way in (0.1, -0.1, 0.02, -0.02)):
+                idle_joints.append((int(row), int(joint)))
+    return idle_joints
 
 
 def ask_oracle(
@@ -375,10 +375,10 @@ def ask_oracle(
     """Add to the verdict the isolated branches (sigma > 1e-6) that the oracle knows and a `complete` answer lacks."""
     s = verdict.solutions
     goals = goal_of(s.task, target).take(rows)
-    for row, known in zip(rows, oracle.branches(screw, goals, starts, seed), strict=True):
-        if not len(known) or not s.complete[row]:
+    for row, branches in zip(rows, oracle.branches(screw, goals, starts, seed), strict=True):
+        if not len(branches) or not s.complete[row]:
             continue
-        one = goal_of(s.task, target[row : row + 1]).take(np.zeros(len(known), int))
-        strong = oracle.weakness(screw, one, known) > 1e-6
-        d = oracle.distance(screw, known[:, None], s.q[row][None]).min(axis=1, initial=np.inf)
-        verdict.missed += [(int(row), q) for q in known[strong & (d > 1e-4)]]
+        row_goals = goal_of(s.task, target[row : row + 1]).take(np.zeros(len(branches), int))
+        strong = oracle.weakness(screw, row_goals, branches) > 1e-6
+        d = oracle.distance(screw, branches[:, None], s.q[row][None]).min(axis=1, initial=np.inf)
+        verdict.missed += [(int(row), q) for q in branches[strong & (d > 1e-4)]]
