@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from armkin.compiled.compiled_arm import CompiledArm
     from armkin.model.arm import Arm
 
-_load = toolchain.load
+_load = toolchain.load_library
 
 
 def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
-    """`toolchain.load`, whatever the level not optimised."""
+    """`toolchain.load_library`, whatever the level not optimised."""
     return _load(source, content, 0)
 
 
 def install() -> None:
     """For all tests of this process."""
-    toolchain.load = load
+    toolchain.load_library = load
 
 
 @lru_cache(maxsize=16)
@@ -43,11 +43,11 @@ def optimised(monkeypatch: pytest.MonkeyPatch) -> None:
     """`armkin.compile` as users have it."""
     import armkin.compiled.compiled_arm
 
-    monkeypatch.setattr(toolchain, "load", _load)
-    monkeypatch.setattr(armkin.compiled.compiled_arm, "_compiled", _optimised)
+    monkeypatch.setattr(toolchain, "load_library", _load)
+    monkeypatch.setattr(armkin.compiled.compiled_arm, "_compiled_arm", _optimised)
 
 
 @pytest.fixture
 def quickly(optimised: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Among tests of `armkin.compile` as users have it: an arm of a class of which another one is optimised."""
-    monkeypatch.setattr(toolchain, "load", load)
+    monkeypatch.setattr(toolchain, "load_library", load)

@@ -79,7 +79,7 @@ def position(arm: Arm, q: ArrayLike) -> Points:
 
 def point_numbers(arm: Arm) -> Callable[..., tuple[float, ...]]:
     """`position` in plain Python: takes the n joint values of one pose [rad | mm], returns x, y, z [mm]."""
-    return _recorded(arm, point_formula).always().numbers()
+    return _recorded(arm, point_formula).record_now().numbers()
 
 
 def frames(arm: Arm, q: ArrayLike) -> Frames:
@@ -211,7 +211,7 @@ def one_pose(arm: Arm, q: ArrayLike, name: str) -> Array:
 
 def as_joints(arm: Arm, q: ArrayLike) -> Joints:
     """``q`` as a float array with the arm's number of joints on its last axis."""
-    values = arrays.real(q, "joint values")
+    values = arrays.real_array(q, "joint values")
     if values.ndim == 0 or values.shape[-1] != arm.n:
         got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
         raise UsageError(
@@ -225,7 +225,7 @@ def tip_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's pose, row by row: 16 entries."""
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
-        P = pose.times(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
+        P = pose.compose(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
     return _rows(P)
 
 
@@ -235,8 +235,8 @@ def _frames(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
         P = move(arm, P, i, q[i])
-        out += _rows(pose.times(P, pose.constant(arm.frame[i])))
-        P = pose.times(P, pose.constant(arm.link[i + 1]))
+        out += _rows(pose.compose(P, pose.constant(arm.frame[i])))
+        P = pose.compose(P, pose.constant(arm.link[i + 1]))
     return out + _rows(P)
 
 
@@ -251,7 +251,7 @@ def _pose_and_jacobian(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     axes = []
     for i in range(arm.n):
         axes.append((P[6:9], P[9:12]))
-        P = pose.times(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
+        P = pose.compose(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
     columns = []
     for i, (z, origin) in enumerate(axes):
         lever = arrays.combine(1.0, P[9:12], -1.0, origin)
@@ -343,7 +343,7 @@ def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) 
     out = np.empty(values.shape[:-1] + shape)
     flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, math.prod(shape))
     if len(flat_q) > SMALL:
-        large = _recorded(arm, formula).always()
+        large = _recorded(arm, formula).record_now()
         workspace = large.workspace(min(len(flat_q), arrays.CHUNK))
         for start in range(0, len(flat_q), arrays.CHUNK):
             columns = np.ascontiguousarray(flat_q[start : start + arrays.CHUNK].T)

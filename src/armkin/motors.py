@@ -137,7 +137,7 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     [-30.009375, 4.998371, -4.995]
     """
     inverse = joints_per_pulse(arm)
-    values = arrays.real(p, "pulses")
+    values = arrays.real_array(p, "pulses")
     m = len(arm.motor_gain)
     if values.ndim == 0 or values.shape[-1] != m:
         got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"

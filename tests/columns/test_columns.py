@@ -70,12 +70,17 @@ def test_machine_code_prints_the_bytes_that_python_prints(table: Table, monkeypa
     near = [10.0 ** rng.uniform(-6, 18, 20_000), 2.0 ** np.arange(-1074, 1024), rng.uniform(-400, 400, 20_000).round(3)]
     for values in (doubles, *near):
         one: Table = {"row": np.arange(len(values)) - 7, "value": values, "far": -values}
-        assert csv_and_json_lines.csv(one, compiled_text.lines) == by_python(one, monkeypatch)[0]
-    fast = csv_and_json_lines.csv(table, compiled_text.lines), csv_and_json_lines.json_lines(table, compiled_text.lines)
+        assert csv_and_json_lines.csv(one, compiled_text.table_lines) == by_python(one, monkeypatch)[0]
+    fast = (
+        csv_and_json_lines.csv(table, compiled_text.table_lines),
+        csv_and_json_lines.json_lines(table, compiled_text.table_lines),
+    )
     assert fast == by_python(table, monkeypatch)
-    assert csv_and_json_lines.csv(part(one, slice(0, 0)), compiled_text.lines) == b""
+    assert csv_and_json_lines.csv(part(one, slice(0, 0)), compiled_text.table_lines) == b""
     whole = np.array([0, 9, 10, 99, 100, 2**32 - 1, 2**32, 10**8, 10**16, 2**63 - 1, -(2**63), -10])
-    assert csv_and_json_lines.csv({"a": whole}, compiled_text.lines).decode().split() == list(map(str, whole.tolist()))
+    assert csv_and_json_lines.csv({"a": whole}, compiled_text.table_lines).decode().split() == list(
+        map(str, whole.tolist())
+    )
 
 
 @given(st.lists(st.floats(-1e9, 1e9), min_size=4, max_size=4), st.sampled_from(["%r", " %r", "%.3f", "%.17e"]))
@@ -312,8 +317,13 @@ def test_machine_code_takes_the_same_branch() -> None:
         if B > 2:  # as far as another one, but for rounding
             q[::3, 1] = 2.0 * near - q[::3, 0] + 1e-12
         q[~wanted] = np.nan
-        there, fast = ik_columns.nearest(q, wanted, near, scale), compiled_nearest.nearest(q, wanted, near, scale)
+        there, fast = (
+            ik_columns.nearest(q, wanted, near, scale),
+            compiled_nearest.nearest_branches(q, wanted, near, scale),
+        )
         assert fast is not None
         assert (fast[0] == there[0]).all()
         assert (fast[1] == there[1])[there[0] >= 0].all()
-    assert compiled_nearest.nearest(np.zeros((1, 1, 8)), np.ones((1, 1), bool), np.zeros(8), np.ones(8)) is None
+    assert (
+        compiled_nearest.nearest_branches(np.zeros((1, 1, 8)), np.ones((1, 1), bool), np.zeros(8), np.ones(8)) is None
+    )

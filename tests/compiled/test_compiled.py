@@ -196,18 +196,18 @@ SOURCE = 'const char arm_content[] = "abc"; int answer(void); int answer(void) {
 
 
 def test_what_was_built_is_kept_and_used_again(cache: Path) -> None:
-    assert toolchain.load(SOURCE, "abc").answer() == 42
+    assert toolchain.load_library(SOURCE, "abc").answer() == 42
     [kept] = cache.glob("*.so")
     assert stat.S_IMODE(cache.stat().st_mode) == 0o700
     assert stat.S_IMODE(kept.stat().st_mode) == 0o700
     before = kept.stat().st_mtime_ns
-    assert toolchain.load(SOURCE, "abc").answer() == 42
+    assert toolchain.load_library(SOURCE, "abc").answer() == 42
     assert kept.stat().st_mtime_ns == before
 
 
 @pytest.mark.parametrize("harm", ["open folder", "open file", "link", "torn", "another"])
 def test_what_others_could_have_written_is_not_loaded(cache: Path, harm: str, tmp_path: Path) -> None:
-    toolchain.load(SOURCE, "abc")
+    toolchain.load_library(SOURCE, "abc")
     [kept] = cache.glob("*.so")
     evil = tmp_path / "evil.so"
     text = SOURCE.replace("42", "666").replace("abc", "abd" if harm == "another" else "abc")
@@ -220,14 +220,14 @@ def test_what_others_could_have_written_is_not_loaded(cache: Path, harm: str, tm
         kept.chmod(0o722 if harm == "open file" else 0o700)
     if harm == "open folder":
         cache.chmod(0o777)
-    assert toolchain.load(SOURCE, "abc").answer() == 42
+    assert toolchain.load_library(SOURCE, "abc").answer() == 42
 
 
 def test_without_a_place_to_keep_it_it_is_built_all_the_same(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(file))
-    assert toolchain.load(SOURCE, "abc").answer() == 42
+    assert toolchain.load_library(SOURCE, "abc").answer() == 42
 
 
 def test_without_a_compiler_one_line_says_what_to_install() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.compiled import toolchain
 from armkin.compiled.c_source import PARTS
-from armkin.export.c.source_parts import part
+from armkin.export.c.source_parts import part_text
 
 AROUND = """
 #define ARM_MOST 24
@@ -59,8 +59,8 @@ def built() -> ctypes.CDLL:
     """The two ways, without an arm."""
     head = (PARTS / "head.c").read_text().partition("typedef double arm_real")[0].replace("/* @about@ */", "")
     lanes = "".join((PARTS / f"{name}.c").read_text() for name in ("lanes", "lanes_eigenvalues"))
-    text = AROUND.replace("@head@", head).replace("@scalar@", part("linear_algebra")).replace("@lanes@", lanes)
-    return toolchain.load(text, "lanes", 2)
+    text = AROUND.replace("@head@", head).replace("@scalar@", part_text("linear_algebra")).replace("@lanes@", lanes)
+    return toolchain.load_library(text, "lanes", 2)
 
 
 def matrices(n: int, count: int) -> np.ndarray:

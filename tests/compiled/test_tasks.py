@@ -14,14 +14,14 @@ from armkin.compiled import compiled_arm, toolchain
 def loaded(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What libraries hold as `arm_content` from now on, one by one; no arm has any yet."""
     contents: list[str] = []
-    load = toolchain.load
+    load = toolchain.load_library
 
     def counted(source: str, content: str, level: int = 3) -> object:
         contents.append(content)
         return load(source, content, level)
 
-    monkeypatch.setattr(toolchain, "load", counted)
-    compiled_arm._compiled.cache_clear()
+    monkeypatch.setattr(toolchain, "load_library", counted)
+    compiled_arm._compiled_arm.cache_clear()
     return contents
 
 

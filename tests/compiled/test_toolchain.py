@@ -26,7 +26,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def answer(*words: str) -> subprocess.CompletedProcess[str]:
     """What a process of its own finds: a library that is torn may end it."""
-    code = f"from armkin.compiled.toolchain import load; print(load({SOURCE!r}, 'abc').answer())"
+    code = f"from armkin.compiled.toolchain import load_library; print(load_library({SOURCE!r}, 'abc').answer())"
     return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
 
 
@@ -41,7 +41,7 @@ def put(kept: Path, held: bytes, mode: int = 0o700) -> None:
 @pytest.mark.parametrize("size", [5000, 12288])
 def test_a_torn_library_is_built_again(cache: Path, size: int) -> None:
     """The system's loader ends the process at the first page that is missing."""
-    toolchain.load(SOURCE, "abc")
+    toolchain.load_library(SOURCE, "abc")
     [kept] = cache.glob("*.so")
     assert kept.stat().st_size > size
     put(kept, kept.read_bytes()[:size])
@@ -50,7 +50,7 @@ def test_a_torn_library_is_built_again(cache: Path, size: int) -> None:
 
 
 def test_a_library_with_a_byte_changed_is_built_again(cache: Path) -> None:
-    toolchain.load(SOURCE, "abc")
+    toolchain.load_library(SOURCE, "abc")
     [kept] = cache.glob("*.so")
     held = kept.read_bytes()
     place = held.index((42).to_bytes(4, "little"))
@@ -62,9 +62,9 @@ def test_a_library_with_a_byte_changed_is_built_again(cache: Path) -> None:
 @pytest.mark.parametrize("mode", [0o720, 0o702, 0o777])
 def test_a_library_that_others_may_have_written_is_built_again(cache: Path, mode: int) -> None:
     """It has the name of what it holds, and says that it is what was asked for."""
-    toolchain.load(SOURCE.replace("42", "43"), "abc")
+    toolchain.load_library(SOURCE.replace("42", "43"), "abc")
     [false] = cache.glob("*.so")
-    toolchain.load(SOURCE, "abc")
+    toolchain.load_library(SOURCE, "abc")
     [true] = set(cache.glob("*.so")) - {false}
     named = true.with_name(f"{true.stem.partition('-')[0]}-{false.stem.partition('-')[2]}.so")
     put(named, false.read_bytes())
@@ -76,18 +76,18 @@ def test_a_library_that_others_may_have_written_is_built_again(cache: Path, mode
 
 
 def test_a_library_of_another_user_is_not_loaded(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    toolchain.load(SOURCE, "abc")
+    toolchain.load_library(SOURCE, "abc")
     [kept] = cache.glob("*.so")
     name = kept.stem.partition("-")[0]
     assert toolchain._stored_library(cache, name, "abc") is not None
     monkeypatch.setattr(os, "geteuid", lambda: kept.stat().st_uid + 1)
     assert toolchain._stored_library(cache, name, "abc") is None
-    assert toolchain._folder() is None
+    assert toolchain._cache_folder() is None
 
 
 def test_a_library_by_a_link_is_not_loaded(cache: Path, tmp_path: Path) -> None:
     """What it leads to may be another's folder."""
-    toolchain.load(SOURCE, "abc")
+    toolchain.load_library(SOURCE, "abc")
     [kept] = cache.glob("*.so")
     kept.rename(tmp_path / kept.name)
     kept.symlink_to(tmp_path / kept.name)
@@ -96,28 +96,28 @@ def test_a_library_by_a_link_is_not_loaded(cache: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("above", [0, 1, 2])
 def test_a_cache_in_a_folder_that_others_may_write_is_not_used(cache: Path, above: int) -> None:
-    assert toolchain._folder() == cache
+    assert toolchain._cache_folder() == cache
     (cache, *cache.parents)[above].chmod(0o770)
-    assert toolchain._folder() is None
+    assert toolchain._cache_folder() is None
 
 
 def test_the_cache_is_used_under_a_umask_of_groups(cache: Path) -> None:
     """002 is what Fedora gives its users, whose folders are then open to their group."""
     before = os.umask(0o002)
     try:
-        toolchain.load(SOURCE, "abc")
+        toolchain.load_library(SOURCE, "abc")
     finally:
         os.umask(before)
     [kept] = cache.glob("*.so")
     assert {stat.S_IMODE(path.stat().st_mode) for path in (*kept.parents[:3], kept)} == {0o700}
     built = kept.stat().st_mtime_ns
-    toolchain.load(SOURCE, "abc")
+    toolchain.load_library(SOURCE, "abc")
     assert kept.stat().st_mtime_ns == built
 
 
 def test_the_compiler_may_have_options(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "cc -DHALF=21")
-    assert toolchain.load(SOURCE.replace("42", "2 * HALF"), "abc").answer() == 42
+    assert toolchain.load_library(SOURCE.replace("42", "2 * HALF"), "abc").answer() == 42
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_a_compiler_that_builds_nothing_is_named(
     path.chmod(0o700)
     monkeypatch.setenv("CC", str(path))
     with pytest.raises(armkin.ArmkinError, match=said):
-        toolchain.load(SOURCE, "abc")
+        toolchain.load_library(SOURCE, "abc")
     assert not list(cache.glob("*"))
 
 
@@ -145,14 +145,14 @@ def test_a_cache_that_takes_nothing_more_is_done_without(cache: Path, monkeypatc
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    assert toolchain.load(SOURCE, "abc").answer() == 42
+    assert toolchain.load_library(SOURCE, "abc").answer() == 42
     assert not list(cache.glob("*"))
 
 
 def test_no_place_to_build_is_said(cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
     with pytest.raises(armkin.FileError, match=r"no place to build the arm's code: .*TMPDIR"):
-        toolchain.load(SOURCE, "abc")
+        toolchain.load_library(SOURCE, "abc")
 
 
 def test_a_compiler_that_takes_too_long_to_optimise_does_not(
@@ -166,9 +166,9 @@ def test_a_compiler_that_takes_too_long_to_optimise_does_not(
     said: list[str] = []
     monkeypatch.setattr(toolchain, "announce", lambda: said.append("built"))
     source = 'const char arm_content[] = "slow"; int half(int x) { return x / 2; }\n'
-    assert toolchain.load(source, "slow").half(84) == 42
-    assert toolchain.load(source, "slow").half(84) == 42, "kept, and not waited for again"
+    assert toolchain.load_library(source, "slow").half(84) == 42
+    assert toolchain.load_library(source, "slow").half(84) == 42, "kept, and not waited for again"
     assert said == ["built"]
     monkeypatch.setattr(time, "time", lambda now=time.time: now() + 86_400)
-    assert toolchain.load(source, "slow").half(84) == 42
+    assert toolchain.load_library(source, "slow").half(84) == 42
     assert said == ["built"] * 2, "tried again the next day"

@@ -15,7 +15,7 @@ import armkin
 from armkin import robot_file
 from armkin.errors import UsageError
 from armkin.export import conventions
-from armkin.export.urdf_writer import urdf as write_urdf
+from armkin.export.urdf_writer import urdf_text as write_urdf
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.arm import actual, from_links
 from armkin.model.build_arm import build

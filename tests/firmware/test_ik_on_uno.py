@@ -13,7 +13,7 @@ from emulator import EmulatedBoard
 
 import armkin
 from armkin.export.c.c_program import identifier, program
-from armkin.formula.c_and_js_code import number
+from armkin.formula.c_and_js_code import number_text
 
 HERE = Path(__file__).parent
 ROBOTS = HERE.parents[1] / "robots"
@@ -25,8 +25,8 @@ def built(arm: armkin.Arm, target: np.ndarray, folder: Path) -> tuple[Path, dict
     texts, prefix = program(arm, "arm.c", None, single=True), identifier(arm.name)
     (folder / "arm.c").write_text(texts.source)
     (folder / "arm.h").write_text(texts.header)
-    rows = ", ".join("{" + ", ".join(number(float(v), True) for v in row) + "}" for row in target)
-    near = ", ".join(number(float(v), True) for v in arm.home)
+    rows = ", ".join("{" + ", ".join(number_text(float(v), True) for v in row) + "}" for row in target)
+    near = ", ".join(number_text(float(v), True) for v in arm.home)
     (folder / "questions.h").write_text(
         f"enum {{ QUESTIONS = {len(target)} }};\n"
         f"static const REAL targets[QUESTIONS][TARGET] = {{{rows}}};\nstatic const REAL near[JOINTS] = {{{near}}};\n"

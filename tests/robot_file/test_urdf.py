@@ -11,7 +11,7 @@ import pytest
 import armkin
 from armkin import robot_file
 from armkin.errors import ArmkinError, FileError, RobotFileError, UsageError
-from armkin.export.urdf_writer import urdf as write_urdf
+from armkin.export.urdf_writer import urdf_text as write_urdf
 from armkin.model.build_arm import build
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import format_robot_file, number_text, rpy_angles

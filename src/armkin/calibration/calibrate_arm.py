@@ -195,7 +195,7 @@ def _fixed_kinds(fix: Iterable[str]) -> set[str]:
 
 def _measurements(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
     c = as_joints(arm, q)
-    values = arrays.real(measured, "measured")
+    values = arrays.real_array(measured, "measured")
     if c.ndim != 2:
         raise UsageError(f"calibrate takes one row of joint values a pose: (M, {arm.n}); got {c.shape}")
     shapes = ((len(c), 3), (len(c), 4, 4))

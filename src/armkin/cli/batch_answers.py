@@ -112,9 +112,9 @@ def _table_encoder(job: Job) -> Callable[[Table], bytes]:
     format = format_of(f"x{job.format}")
     if not (job.compiled and format.is_text):
         return format.encoded
-    from armkin.compiled.table_lines import lines
+    from armkin.compiled.table_lines import table_lines
 
-    return partial(format.encoded, lines=lines)
+    return partial(format.encoded, lines=table_lines)
 
 
 def answer_piece(job: Job, piece: Piece) -> Done:

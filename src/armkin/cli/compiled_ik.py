@@ -36,4 +36,4 @@ def nearest(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDAr
     """`armkin.columns.ik_columns.nearest`, where it serves."""
     from armkin.compiled import least_motion as found
 
-    return found.nearest(q, candidates, near, scale)
+    return found.nearest_branches(q, candidates, near, scale)

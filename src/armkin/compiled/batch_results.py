@@ -36,9 +36,9 @@ class Results:
         self._room = room
         self._memory = (np.empty(N * room * n), np.empty(N * room, bool), np.empty(N * room, bool))
         self._indices = np.empty(N * room, np.int8)
-        self._shape()
+        self._shape_views()
 
-    def _shape(self) -> None:
+    def _shape_views(self) -> None:
         N, B, n = self.N, self.B, self.n
         q, valid, within = self._memory
         self.q: Array = q[: N * B * n].reshape(N, B, n)
@@ -50,15 +50,15 @@ class Results:
         """At least B columns; new ones are empty."""
         if B <= self.B:
             return
-        old: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
+        narrow_arrays: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
         before = self.B
         self.B = B
         if self._room < B:
             self._allocate(2 * B)
         else:
-            self._shape()
-        new: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
-        pairs = zip(old, new, (math.nan, False, False, -1), strict=True)
+            self._shape_views()
+        wide_arrays: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
+        pairs = zip(narrow_arrays, wide_arrays, (math.nan, False, False, -1), strict=True)
         for narrow, wide, none in pairs:
             # from the end: a row moves to where rows behind it have stood
             for start in reversed(range(0, self.N, BLOCK)):

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from armkin.export.c import arm_formulas, c_elimination, c_functions, c_program, keep_out_tables
-from armkin.export.c.source_parts import part
-from armkin.formula.c_and_js_code import number
+from armkin.export.c.source_parts import part_text
+from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.numeric.tolerances import (
     ACCEPTED,
     ARRIVED,
@@ -69,17 +69,19 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
     """
     solve, branches, level = "", 0, 3
     if task is not None and geometry is not None and c_program.has_form(geometry):
-        solve, branches = c_program.candidates(arm, task, geometry, prefer=False, lanes="".join(map(_part, _LOCKSTEP)))
+        solve, branches = c_program.candidates_code(
+            arm, task, geometry, prefer=False, lanes="".join(map(_part_text, _LOCKSTEP))
+        )
     fields = {
         "about": f"{c_program.identifier(arm.name)}: built for this computer by armkin.compile.",
         "joints": str(arm.n),
         "lanes": str(LANES),
     }
-    parts = [_part("head"), c_program.settings(), _fast_numbers()]
+    parts = [_part_text("head"), c_program.settings(), _fast_numbers()]
     parts += [c_functions.forward_kinematics(commanded), _joint_loop("Poses", "arm_pose", 16)]
-    parts += [c_functions.position(commanded), _joint_loop("Positions of the tool", "arm_point", 3)]
+    parts += [c_functions.position_code(commanded), _joint_loop("Positions of the tool", "arm_point", 3)]
     if commanded.keep_out and commanded.whole is None:
-        parts += [keep_out_tables.clearances(commanded), _part("clearances")]
+        parts += [keep_out_tables.clearances_code(commanded), _part_text("clearances")]
         parts += [_joint_loop("Least clearances and their pairs", "arm_clearance", 2)]
     if branches:
         assert task is not None
@@ -90,23 +92,23 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
-        jacobian, folds = _folds(arm, task, geometry, branches, fields)
-        parts += [*jacobian, _part("lane_sizes"), solve, part("whole_turns"), _choose(arm, branches)]
-        parts += [_part(gather), folds, _part("batch")]
-        parts += [_part("elimination_rows")] if has_rows(task, geometry) else []
-    text = c_program.filled("\n".join(parts), {**fields, "content": "@content@"})
+        jacobian, folds = _fold_code(arm, task, geometry, branches, fields)
+        parts += [*jacobian, _part_text("lane_sizes"), solve, part_text("whole_turns"), _choose_code(arm, branches)]
+        parts += [_part_text(gather), folds, _part_text("batch")]
+        parts += [_part_text("elimination_rows")] if has_rows(task, geometry) else []
+    text = c_program.fill_fields("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
     return Library(text.replace("@content@", content), content, branches, level)
 
 
-def _folds(
+def _fold_code(
     arm: Arm, task: Task, geometry: Geometry | None, branches: int, fields: dict[str, str]
 ) -> tuple[list[str], str]:
     """How targets on an edge are told, and in front of it the Jacobian where C tells them."""
-    if geometry is None or not _judges(arm, task, geometry) or branches > LANES:
-        return [], _part("no_folds")
-    text = _part("folds").replace("@followed@", _part("branch_to_fold") + "\n")
-    return [c_functions.jacobian(arm)], c_program.filled(text, _of_folds(arm, task) | fields)
+    if geometry is None or not _can_judge_folds(arm, task, geometry) or branches > LANES:
+        return [], _part_text("no_folds")
+    text = _part_text("folds").replace("@followed@", _part_text("branch_to_fold") + "\n")
+    return [c_functions.jacobian_code(arm)], c_program.fill_fields(text, _of_folds(arm, task) | fields)
 
 
 def has_rows(task: Task, geometry: Geometry | None) -> bool:
@@ -118,27 +120,27 @@ def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, 
     """What the parts of `ik` are filled in with."""
     most = ["ARM_FARTHEST"] * task.position + ["ARM_WILD"] * len(task.sums)
     if task.orientation == "axis":
-        most += [number(2.0)] * 3
+        most += [number_text(2.0)] * 3
     return {
         "branches": str(branches),
         "target": str(c_program.target_size(task)),
         "goal": str(arm_formulas.goal_size(task)),
-        "accepted": number(accepted),
-        "room": number(ROOM * arm.reach),
-        "coarse": number(COARSE * arm.reach),
-        "close": ", ".join(number(THERE * unit) for unit in radian_or_reach(arm).tolist()),
+        "accepted": number_text(accepted),
+        "room": number_text(ROOM * arm.reach),
+        "coarse": number_text(COARSE * arm.reach),
+        "close": ", ".join(number_text(THERE * unit) for unit in radian_or_reach(arm).tolist()),
         "slides": ", ".join(str(int(slides)) for slides in arm.prismatic.tolist()),
-        "lowest": ", ".join(number(v - SLACK) for v in arm.lower.tolist()),
-        "highest": ", ".join(number(v + SLACK) for v in arm.upper.tolist()),
+        "lowest": ", ".join(number_text(v - SLACK) for v in arm.lower.tolist()),
+        "highest": ", ".join(number_text(v + SLACK) for v in arm.upper.tolist()),
         "position": str(task.position),
         "first": str(9 if task.orientation == "full" else 0),
-        "farthest": number(_farthest(arm)),
+        "farthest": number_text(_farthest_coordinate(arm)),
         "most": ", ".join(most),
         "axis": str(int(task.orientation == "axis")),
     }
 
 
-def _judges(arm: Arm, task: Task, geometry: Geometry) -> bool:
+def _can_judge_folds(arm: Arm, task: Task, geometry: Geometry) -> bool:
     """Whether parts/folds.c can tell what branches on an edge are: of closed forms that list all of them, as many
     numbers as joints."""
     rows = 6 if task.orientation == "full" else task.position + len(task.sums)
@@ -154,65 +156,67 @@ def _of_folds(arm: Arm, task: Task) -> dict[str, str]:
         "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "high": HIGH,
         "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME,
     }  # fmt: skip
-    named = {name: number(value) for name, value in values.items()}
+    named = {name: number_text(value) for name, value in values.items()}
     named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it
     named |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
     named |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
     named |= {"fine": str(len(local_structure.FINE)), "points_count": str(len(local_structure.POINTS))}
     tables = {"nodes": local_structure.NODE, "points": local_structure.POINTS}
     tables |= {"fit": local_structure.TO_POWERS, "last": local_structure.TO_LAST}
-    named |= {name: ", ".join(number(float(v)) for v in table.ravel()) for name, table in tables.items()}
+    named |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
     named |= {"nodes_count": str(local_structure.NODES), "longer": str(LONGER)}
     sums = [[*row, offset] for row, offset in zip(task.sums.tolist(), task.offsets.tolist(), strict=True)]
-    named["weights"] = ", ".join("{" + ", ".join(map(number, row)) + "}" for row in sums)
+    named["weights"] = ", ".join("{" + ", ".join(map(number_text, row)) + "}" for row in sums)
     named["sums"] = str(len(sums))
-    return named | {"unit": ", ".join(number(unit) for unit in radian_or_reach(arm).tolist())}
+    return named | {"unit": ", ".join(number_text(unit) for unit in radian_or_reach(arm).tolist())}
 
 
-def _farthest(arm: Arm) -> float:
+def _farthest_coordinate(arm: Arm) -> float:
     """How large a coordinate may be [mm]; with slides, so that the target is no more than `FAR` reaches away."""
     if not arm.prismatic.any():
         return LARGEST
     return max((FAR * arm.reach - math.hypot(*arm.link[0][:3, 3])) / 2, 0.0)
 
 
-def _part(name: str) -> str:
+def _part_text(name: str) -> str:
     return (PARTS / f"{name}.c").read_text(encoding="utf-8")
 
 
 def _joint_loop(content: str, formula: str, size: int) -> str:
     """A loop over a batch of joint values."""
-    return c_program.filled(_part("joint_batches"), {"what": content, "formula": formula, "size": str(size)})
+    return c_program.fill_fields(_part_text("joint_batches"), {"what": content, "formula": formula, "size": str(size)})
 
 
 def _fast_numbers() -> str:
     """The numbers of double precision, with this file's own tan and atan2."""
-    numbers = part("numbers_double")
-    return numbers.partition("#ifndef ARM_TAN")[0] + part("fast_numbers")
+    numbers = part_text("numbers_double")
+    return numbers.partition("#ifndef ARM_TAN")[0] + part_text("fast_numbers")
 
 
-def _choose(arm: Arm, branches: int) -> str:
+def _choose_code(arm: Arm, branches: int) -> str:
     """`arm_choose`: every joint at its nearest legal copy, and whether all joints of a branch are within limits."""
     loops = []
     for j in range(arm.n):
-        lower, upper = (number(float(limit[j])) for limit in (arm.lower, arm.upper))
-        at = f"q[(b * {arm.n} + {j}) * ARM_LANES + i]"
+        lower, upper = (number_text(float(limit[j])) for limit in (arm.lower, arm.upper))
+        value = f"q[(b * {arm.n} + {j}) * ARM_LANES + i]"
         close = f"near[{j} * ARM_LANES + i]"
         if arm.prismatic[j]:
-            loops.append(_in_every_lane(f"in[i] &= ({at} >= {lower} - ARM_SLACK) & ({at} <= {upper} + ARM_SLACK);"))
+            loops.append(
+                _in_every_lane(f"in[i] &= ({value} >= {lower} - ARM_SLACK) & ({value} <= {upper} + ARM_SLACK);")
+            )
             continue
-        copied = _in_every_lane(f"{at} = arm_copy({at}, {close}, {lower}, {upper}, &in[i]);")
+        copied = _in_every_lane(f"{value} = arm_copy({value}, {close}, {lower}, {upper}, &in[i]);")
         if arm.lower[j] >= -math.pi and arm.upper[j] <= math.pi:
             loops.append(copied)
             continue
         # all that is within half a turn of `near` is legal, as a rule: the nearest copy is one
-        turned = _in_every_lane(f"{at} = arm_nearest({at}, {close});")
-        positive = _in_every_lane(f"{at} = arm_principal({at});")
+        turned = _in_every_lane(f"{value} = arm_nearest({value}, {close});")
+        positive = _in_every_lane(f"{value} = arm_principal({value});")
         wide = f"arm_wide(near + {j} * ARM_LANES, {lower}, {upper}, count)"
         choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, turned, positive), strict=True)
         loops.append(f"wide = {wide};\n" + " ".join(f"{when} {{\n{loop}\n}}" for when, loop in choices))
     body = "\n".join(f"        {line}" for line in "\n".join(loops).splitlines())
-    return f"""{_part("half_turn_in_limits")}
+    return f"""{_part_text("half_turn_in_limits")}
 static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,
     int count)
 {{

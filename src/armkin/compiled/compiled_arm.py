@@ -67,13 +67,13 @@ def compile(arm: Arm, task: str | None = None) -> CompiledArm:
     >>> fast.ik([390, 80, 300]).valid.sum()
     np.int64(4)
     """
-    found = _compiled(arm)
-    found._library_for(task)
-    return found
+    compiled = _compiled_arm(arm)
+    compiled._library_for(task)
+    return compiled
 
 
 @lru_cache(maxsize=16)
-def _compiled(arm: Arm) -> CompiledArm:
+def _compiled_arm(arm: Arm) -> CompiledArm:
     return CompiledArm(arm)
 
 
@@ -159,15 +159,15 @@ class CompiledArm:
 
     def _library_for(self, task: str | None) -> _CompiledTask:
         """The library for a task, built at its first use."""
-        found = self._tasks.get(task)
-        if found is None:
+        library = self._tasks.get(task)
+        if library is None:
             with self._lock:
-                found = self._tasks.get(task)
-                if found is None:
+                library = self._tasks.get(task)
+                if library is None:
                     name = task or self.arm.task or default_task(self.arm)
                     same = (built for built in self._tasks.values() if built.branches and built.task.name == name)
-                    found = self._tasks[task] = next(same, None) or _CompiledTask(self.arm, task)
-        return found
+                    library = self._tasks[task] = next(same, None) or _CompiledTask(self.arm, task)
+        return library
 
 
 class _CompiledTask:
@@ -176,11 +176,11 @@ class _CompiledTask:
     def __init__(self, arm: Arm, task: str | None) -> None:
         self.arm, self.name, self.n = arm, task, arm.n
         self.turned = actual(arm)  # formulas are those of actual joint values
-        which, form = _class_of(self.turned, task)
-        if which is not None and form is not None:  # an elimination named after a class is that elimination in C
-            form = c_program.plain_form(self.turned, which, form) if form.places is not None else form
-        library = c_source.library(arm, self.turned, which, form)
-        code = toolchain.load(library.text, library.content, library.level)
+        solved_task, form = _class_of(self.turned, task)
+        if solved_task is not None and form is not None:  # an elimination named after a class is that elimination in C
+            form = c_program.plain_form(self.turned, solved_task, form) if form.places is not None else form
+        library = c_source.library(arm, self.turned, solved_task, form)
+        code = toolchain.load_library(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self.joint_functions = JointFunctions(arm, code)
         self.branches = library.branches
@@ -192,106 +192,108 @@ class _CompiledTask:
         self._batch = code.arm_batch
         self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 7], size
         code.arm_single.argtypes, code.arm_single.restype = [pointer], size
-        self._single = self._quick(code.arm_single)
+        self._single = self._single_solver(code.arm_single)
         self._in_c: elimination_rows.InC | None = None
         if form is not None and c_source.has_rows(self.task, form):
             code.arm_rows.argtypes, code.arm_rows.restype = [size, *[pointer] * 3], None
             self._in_c = elimination_rows.InC(self.geometry, form, code.arm_rows, self.branches, self.n)
 
-    def ik(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None = None) -> Solutions:
+    def ik(
+        self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None = None
+    ) -> Solutions:
         """All branches of targets in the task's shape; said: how far the caller says that they are rounded."""
         if not self.branches:
-            return self._without_a_form(targets, near, said)
-        alone = self._single is not None and said is None
+            return self._without_a_form(targets, near, stated)
+        alone = self._single is not None and stated is None
         if (
             alone
             and type(targets) is np.ndarray
             and targets.shape == self.goal_shape
-            and (found := self._alone(targets, near)) is not None
+            and (solutions := self._solve_alone(targets, near)) is not None
         ):
-            return found
+            return solutions
         if self.turned is not self.arm:
-            return self._commanded(targets, near, workers, said)
-        return self._solve_batch(targets, near, workers, said)
+            return self._solve_commanded(targets, near, workers, stated)
+        return self._solve_batch(targets, near, workers, stated)
 
     def _solve_batch(
-        self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None
+        self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None
     ) -> Solutions:
         """As `ik`, of an arm whose joints move as they are commanded."""
-        given = arrays.real(targets, "targets")
+        array = arrays.real_array(targets, "targets")
         m = len(self.goal_shape)
-        if given.shape[-m:] != self.goal_shape or given.ndim < m:
-            return solve.ik(self.arm, targets, self.name, near=near, rounding=said)  # says what is wrong
-        lead = given.shape[: given.ndim - m]
-        close = self.arm.home if near is None else arrays.real(near, "near")
+        if array.shape[-m:] != self.goal_shape or array.ndim < m:
+            return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)  # says what is wrong
+        lead = array.shape[: array.ndim - m]
+        close = self.arm.home if near is None else arrays.real_array(near, "near")
         if close.shape not in ((self.n,), (*lead, self.n)) or not np.isfinite(close).all():
-            return solve.ik(self.arm, targets, self.name, near=near, rounding=said)
-        target = np.ascontiguousarray(given.reshape(-1, *self.goal_shape))
-        each, rounding = np.ascontiguousarray(close), np.zeros(len(target))
-        solved = self._solved if self.geometry.pairs is not None else self._in_blocks
-        out = solved(target, each, workers, read=False)
-        if out is None:
+            return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)
+        target = np.ascontiguousarray(array.reshape(-1, *self.goal_shape))
+        near_rows, rounding = np.ascontiguousarray(close), np.zeros(len(target))
+        solved = self._solve_rows if self.geometry.pairs is not None else self._solve_blocks
+        batch = solved(target, near_rows, workers, read=False)
+        if batch is None:
             values, _, rounding = read_targets(self.task, target)  # refuses what is no target
             target = np.ascontiguousarray(values)
-            out = solved(target, each, workers, read=True)
-            assert out is not None
+            batch = solved(target, near_rows, workers, read=True)
+            assert batch is not None
         single = arrays.is_single(targets)
-        shown = given.reshape(target.shape), rounding
-        rounding, most = target_rounding.of_targets(self.arm, self.task, target, shown, single, said, lead)
-        rows = near_itself.standing(self.arm, self.task, target, each, most)
+        shown = array.reshape(target.shape), rounding
+        rounding, most = target_rounding.of_targets(self.arm, self.task, target, shown, single, stated, lead)
+        rows = near_itself.standing(self.arm, self.task, target, near_rows, most)
         if len(rows):
-            self._by_python(out, rows, target, each.reshape(-1, self.n), most - SOLUTION)
-        self._finish(out, target)
-        target = target.copy() if np.may_share_memory(target, given) else target  # the caller's arrays may change
+            self._by_python(batch, rows, target, near_rows.reshape(-1, self.n), most - SOLUTION)
+        self._finish(batch, target)
+        target = target.copy() if np.may_share_memory(target, array) else target  # the caller's arrays may change
         close = close.copy()
-        q = out.q
+        q = batch.q
         B = q.shape[1]
         return Solutions(
             arm=self.arm,
             task=self.task,
-            target=target.reshape(given.shape),
+            target=target.reshape(array.shape),
             near=close if close.shape == (*lead, self.n) else np.broadcast_to(close, (*lead, self.n)),
             q=q.reshape(*lead, B, self.n),
-            valid=out.valid.reshape(*lead, B),
-            within_limits=out.within.reshape(*lead, B),
-            branch=out.branch.reshape(*lead, B),
-            status=out.status.reshape(lead),
-            free=out.free.reshape(*lead, self.n),
-            names=self._names(B),
+            valid=batch.valid.reshape(*lead, B),
+            within_limits=batch.within.reshape(*lead, B),
+            branch=batch.branch.reshape(*lead, B),
+            status=batch.status.reshape(lead),
+            free=batch.free.reshape(*lead, self.n),
+            names=self._branch_names(B),
             method=self.geometry.name,
             why=self.geometry.why,
-            complete=out.complete.reshape(lead),
+            complete=batch.complete.reshape(lead),
             rounding=rounding.reshape(lead),
         )
 
-    def _finish(self, out: Results, target: Array) -> None:
+    def _finish(self, batch: Results, target: Array) -> None:
         """What is known of far targets, and numbers of branches that have no order of their own."""
         if self.arm.prismatic.any():
-            out.complete[distance(self.arm, self.task, target) > FAR] = False
+            batch.complete[distance(self.arm, self.task, target) > FAR] = False
         if not self.geometry.ordered:
-            out.branch[...] = follow(self.arm, self.task, out.q, target)
+            batch.branch[...] = follow(self.arm, self.task, batch.q, target)
 
-    def _without_a_form(self, targets: ArrayLike, near: ArrayLike | None, said: ArrayLike | None) -> Solutions:
+    def _without_a_form(self, targets: ArrayLike, near: ArrayLike | None, stated: ArrayLike | None) -> Solutions:
         """As `armkin.ik`; of an arm with a redundant joint the others by machine code."""
         if (spare := redundancy(self.arm, self.name)) is not None:
-            return families(_of_others, self.arm, spare, targets, near, said)
-        return solve.ik(self.arm, targets, self.name, near=near, rounding=said)
+            return families(_of_others, self.arm, spare, targets, near, stated)
+        return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)
 
-    def _quick(self, call: Any) -> Single | None:
+    def _single_solver(self, call: Any) -> Single | None:
         """The short way of one target, for arms whose branches and joint values need no more than C gives."""
         if self.turned is not self.arm or self.geometry.places is not None:
             return None
-        names = None if self.geometry.pairs is not None else self._names
+        names = None if self.geometry.pairs is not None else self._branch_names
         same = {"arm": self.arm, "task": self.task, "names": self.names, "complete": self.geometry.complete}
         same |= {"method": self.geometry.name, "why": self.geometry.why}
         return Single(call, self.goal_shape, self.arm.home, self.branches, same, names)
 
-    def _names(self, count: int) -> tuple[str, ...]:
+    def _branch_names(self, count: int) -> tuple[str, ...]:
         if self.geometry.pairs is None:
             return branch_names(self.turned, self.task, self.geometry, count)
         return self.names + tuple(f"branch {i + 1}" for i in range(self.branches, count))
 
-    def _alone(self, target: Array, near: ArrayLike | None) -> Solutions | None:
+    def _solve_alone(self, target: Array, near: ArrayLike | None) -> Solutions | None:
         """One target the short way; None if there is more to it."""
         assert self._single is not None
         if target.dtype != np.float64:
@@ -303,73 +305,77 @@ class _CompiledTask:
             return None
         return self._single.solve(target, close.astype(np.float64))
 
-    def _solved(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
+    def _solve_rows(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
         """All branches of targets (N, ...); None if some must be read first. near: (n,) or (N, n)."""
-        out = Results(len(target), self.branches, self.n)
+        batch = Results(len(target), self.branches, self.n)
         step = self.n if near.size != self.n or len(target) == 1 else 0
-        each = near.reshape(-1, self.n)
+        near_rows = near.reshape(-1, self.n)
 
         def part(rows: slice) -> int:
-            arrays_ = (out.q, out.valid, out.within, out.branch, out.status, out.free, out.state)
+            arrays_ = (batch.q, batch.valid, batch.within, batch.branch, batch.status, batch.free, batch.state)
             pointers = (a[rows].ctypes.data for a in arrays_)
-            close = each[rows] if step else each
+            close = near_rows[rows] if step else near_rows
             count = rows.stop - rows.start
             return int(self._batch(count, target[rows].ctypes.data, close.ctypes.data, step, read, *pointers))
 
         least = WORTH if self.geometry.pairs is not None else WORTH // 64
         left = sum(shared(part, len(target), workers, least))
-        if left and not read and (out.state == UNREAD).any():
+        if left and not read and (batch.state == UNREAD).any():
             return None
-        out.complete[...] = self.geometry.complete
+        batch.complete[...] = self.geometry.complete
         if self.geometry.places is not None:
-            self._place(out, target)
+            self._place_branches(batch, target)
         if left:
-            rows = np.flatnonzero(out.state.view(np.bool_))  # all targets have been read: 0 or 1, which is quicker told
-            self._by_python(out, rows, target, each)
-        return out
+            rows = np.flatnonzero(
+                batch.state.view(np.bool_)
+            )  # all targets have been read: 0 or 1, which is quicker told
+            self._by_python(batch, rows, target, near_rows)
+        return batch
 
     def _by_python(
-        self, out: Results, rows: NDArray[np.intp], target: Array, near: Array, rounding: Array | None = None
+        self, batch: Results, rows: NDArray[np.intp], target: Array, near: Array, rounding: Array | None = None
     ) -> None:
         """Write the answers of some targets, all of which have been read; near: (1, n) or (N, n)."""
         sure = np.zeros(len(rows), bool) if self._in_c is None else self._in_c.settles(target[rows])
-        for some, geometry in ((rows[sure], self._in_c and self._in_c.geometry), (rows[~sure], self.geometry)):
-            if len(some) and geometry:
-                close, off = near[some] if len(near) > 1 else near[0], None if rounding is None else rounding[some]
-                out.write(some, solve.answered(self.arm, self.task, geometry, target[some], close, rounding=off))
+        for part, geometry in ((rows[sure], self._in_c and self._in_c.geometry), (rows[~sure], self.geometry)):
+            if len(part) and geometry:
+                close, of_rows = near[part] if len(near) > 1 else near[0], None if rounding is None else rounding[part]
+                batch.write(part, solve.answered(self.arm, self.task, geometry, target[part], close, rounding=of_rows))
 
-    def _place(self, out: Results, target: Array) -> None:
+    def _place_branches(self, batch: Results, target: Array) -> None:
         """Branches that C has found in the order and with the indices of the class that they are named after."""
         assert self.geometry.places is not None
-        done = np.flatnonzero(out.state == 0)
-        wide = int(out.valid[done].sum(axis=1).max(initial=0))  # branches stand in the first columns
-        q, valid, within = out.q[done, :wide], out.valid[done, :wide], out.within[done, :wide]
-        branch = self.geometry.places(q, target[done])
+        solved = np.flatnonzero(batch.state == 0)
+        wide = int(batch.valid[solved].sum(axis=1).max(initial=0))  # branches stand in the first columns
+        q, valid, within = batch.q[solved, :wide], batch.valid[solved, :wide], batch.within[solved, :wide]
+        branch = self.geometry.places(q, target[solved])
         order = np.argsort(np.where(valid, branch, np.iinfo(np.int8).max), axis=1, kind="stable")
-        out.q[done, :wide] = np.take_along_axis(q, order[:, :, None], axis=1)
-        for values, new in ((out.within, within), (out.branch, branch)):
-            values[done, :wide] = np.take_along_axis(new, order, axis=1)
+        batch.q[solved, :wide] = np.take_along_axis(q, order[:, :, None], axis=1)
+        for values, found_values in ((batch.within, within), (batch.branch, branch)):
+            values[solved, :wide] = np.take_along_axis(found_values, order, axis=1)
 
-    def _in_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
+    def _solve_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
         """As `_solved`, for an elimination: block by block, in no more columns than the batch needs."""
-        out = Results(len(target), 0, self.n)
+        batch = Results(len(target), 0, self.n)
         for start in range(0, max(len(target), 1), BLOCK):
             rows = slice(start, min(start + BLOCK, len(target)))
             close = near if near.size == self.n else near.reshape(-1, self.n)[rows]
-            found = self._solved(target[rows], close, workers, read=read)
-            if found is None:
+            block = self._solve_rows(target[rows], close, workers, read=read)
+            if block is None:
                 return None
-            found.narrow()
-            out.write(rows, found)
+            block.narrow()
+            batch.write(rows, block)
         if self.geometry.places is not None:
-            out.widen(max(self.geometry.branches or 0, int(out.branch.max(initial=-1)) + 1))
-        return out
+            batch.widen(max(self.geometry.branches or 0, int(batch.branch.max(initial=-1)) + 1))
+        return batch
 
-    def _commanded(self, targets: ArrayLike, near: ArrayLike | None, workers: int, said: ArrayLike | None) -> Solutions:
+    def _solve_commanded(
+        self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None
+    ) -> Solutions:
         """A calibrated arm, by way of its actual joint values."""
         inner = compile(self.turned, self.name)
         close = solve._actual_near(self.arm, near)
-        return solve._commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=said))
+        return solve._commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=stated))
 
 
 def _of_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = True, **options: Any) -> Solutions:

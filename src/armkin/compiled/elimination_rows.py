@@ -36,28 +36,28 @@ class InC:
 
     def settles(self, target: Array) -> Bool:
         """Which targets (N, 4, 4) have all their branches in C, each an isolated one: (N,)."""
-        return np.asarray(self._asked(target)[1] < SETTLED)
+        return np.asarray(self._call_c(target)[1] < SETTLED)
 
-    def _asked(self, target: Array) -> tuple[Array, NDArray[np.uint8]]:
+    def _call_c(self, target: Array) -> tuple[Array, NDArray[np.uint8]]:
         """Branches (N, B, n) of targets, nan behind the last, and what C says of each (N,)."""
         goal = np.ascontiguousarray(target)
-        q, said = np.empty((len(goal), *self._shape)), np.empty(len(goal), np.uint8)
-        self._call(len(goal), goal.ctypes.data, q.ctypes.data, said.ctypes.data)
-        return q, said
+        q, states = np.empty((len(goal), *self._shape)), np.empty(len(goal), np.uint8)
+        self._call(len(goal), goal.ctypes.data, q.ctypes.data, states.ctypes.data)
+        return q, states
 
     def _rows(self, target: Array) -> Rows:
         N, n = len(target), self._shape[1]
-        q, said = self._asked(target)
-        doubt, lost, complete = said > 0, np.zeros(N, bool), np.full(N, self._complete)
+        q, states = self._call_c(target)
+        doubt, lost, complete = states > 0, np.zeros(N, bool), np.full(N, self._complete)
         guesses = np.empty((N, 0, n))
-        if len(left := np.flatnonzero(said >= SETTLED)):
+        if len(left := np.flatnonzero(states >= SETTLED)):
             assert self._slow is not None
-            rest = self._slow(target[left])
-            assert rest.lost is not None
-            assert rest.guesses is not None
-            guesses = np.full((N, rest.guesses.shape[1], n), np.nan)
+            slow_rows = self._slow(target[left])
+            assert slow_rows.lost is not None
+            assert slow_rows.guesses is not None
+            guesses = np.full((N, slow_rows.guesses.shape[1], n), np.nan)
             q[left] = np.nan
-            q[left, : rest.q.shape[1]], guesses[left] = rest.q, rest.guesses
-            doubt[left], lost[left], complete[left] = rest.doubt, rest.lost, rest.complete
+            q[left, : slow_rows.q.shape[1]], guesses[left] = slow_rows.q, slow_rows.guesses
+            doubt[left], lost[left], complete[left] = slow_rows.doubt, slow_rows.lost, slow_rows.complete
         most = int((~np.isnan(q[:, :, 0])).sum(axis=1).max(initial=0))
         return Rows(q[:, :most], doubt, complete, lost, guesses)

@@ -43,8 +43,8 @@ class JointFunctions:
         values = forward.as_joints(self.arm, q)
         if self._clearances is None or not np.isfinite(values).all():
             return clearance(self.arm, values)
-        found = self._run(self._clearances, least_clearances, (2,), values, 1).reshape(-1, 2)
-        return named_clearance(self.arm, found[:, 0], found[:, 1].astype(np.intp), values.shape[:-1])
+        least = self._run(self._clearances, least_clearances, (2,), values, 1).reshape(-1, 2)
+        return named_clearance(self.arm, least[:, 0], least[:, 1].astype(np.intp), values.shape[:-1])
 
     def _run(
         self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int
@@ -52,13 +52,13 @@ class JointFunctions:
         """A function of joint values: in C, and in Python for angles that C leaves."""
         values = forward.as_joints(self.arm, q)
         flat = np.ascontiguousarray(values.reshape(-1, self.arm.n))
-        out, wild = np.empty((len(flat), *shape)), np.empty(len(flat), np.uint8)
+        results, wild = np.empty((len(flat), *shape)), np.empty(len(flat), np.uint8)
 
         def part(rows: slice) -> int:
-            pointers = (a[rows].ctypes.data for a in (flat, out, wild))
+            pointers = (a[rows].ctypes.data for a in (flat, results, wild))
             return int(call(rows.stop - rows.start, *pointers))
 
         if sum(shared(part, len(flat), workers, WORTH)):
             far = np.flatnonzero(wild)
-            out[far] = python(self.arm, flat[far])
-        return out.reshape(*values.shape[:-1], *shape)
+            results[far] = python(self.arm, flat[far])
+        return results.reshape(*values.shape[:-1], *shape)

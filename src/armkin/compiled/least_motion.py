@@ -19,14 +19,14 @@ SOURCE = Path(__file__).parent / "parts" / "least_motion.c"
 MOST = 7  # joints that numpy adds up from left to right
 
 
-def nearest(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
+def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
     """See `armkin.columns.ik_columns.nearest`; None for more joints than are added up one after the other."""
     N, B, n = q.shape
     if n > MOST:
         return None
     branch, motion, away = np.empty(N, np.int64), np.full(N, np.nan), np.empty(B * n)
     inputs = np.ascontiguousarray(q), np.ascontiguousarray(candidates), np.tile(near, B), np.tile(scale, B), away
-    pointers = (one.ctypes.data for one in inputs)
+    pointers = (array.ctypes.data for array in inputs)
     _library()(N, B, n, *pointers, 10.0**EQUAL, branch.ctypes.data, motion.ctypes.data)
     return branch, motion
 
@@ -36,7 +36,7 @@ def _library() -> Any:
     """`arm_nearest` of parts/least_motion.c. Raises MissingExtraError without a C compiler."""
     text = SOURCE.read_text(encoding="utf-8")
     content = hashlib.sha256(text.encode()).hexdigest()
-    found = toolchain.load(text.replace("@content@", content), content, 3).arm_nearest
+    function = toolchain.load_library(text.replace("@content@", content), content, 3).arm_nearest
     size, pointer = ctypes.c_int64, ctypes.c_void_p
-    found.argtypes, found.restype = [*[size] * 3, *[pointer] * 5, ctypes.c_double, *[pointer] * 2], None
-    return found
+    function.argtypes, function.restype = [*[size] * 3, *[pointer] * 5, ctypes.c_double, *[pointer] * 2], None
+    return function

@@ -19,14 +19,14 @@ LEFT = 4  # what `arm_single` returns for a target that it leaves to Python
 _FLAGS, _SMALL = np.dtype(np.bool_), np.dtype(np.int8)
 
 
-def _fixed(value: object) -> NDArray[Any]:
+def _read_only(value: object) -> NDArray[Any]:
     """An array () that solutions share, and so nobody may change."""
-    out = np.array(value)
-    out.flags.writeable = False
-    return out
+    array = np.array(value)
+    array.flags.writeable = False
+    return array
 
 
-_STATUS = tuple(_fixed(np.int8(status)) for status in sorted(Status))
+_STATUS = tuple(_read_only(np.int8(status)) for status in sorted(Status))
 
 
 class Single:
@@ -46,7 +46,10 @@ class Single:
         names: of that many branches, for classes that list no more rows than a target has branches; else None.
         """
         self._call, self._shape, self._home, self._names = call, shape, home, names
-        self._shared_fields = shared_fields | {"rounding": _fixed(0.0), "complete": _fixed(shared_fields["complete"])}
+        self._shared_fields = shared_fields | {
+            "rounding": _read_only(0.0),
+            "complete": _read_only(shared_fields["complete"]),
+        }
         self._n, self._branches = len(home), branches
         self._cuts: dict[int, tuple[Any, ...]] = {}
         self._local = threading.local()
@@ -69,10 +72,10 @@ class Single:
 
         q's shape follows its place.
         """
-        n, B, at = self._n, self._branches, self._bytes
-        masks = [slice(start, start + rows) for start in (at, at + B, at + 2 * B)]
+        n, B, first = self._n, self._branches, self._bytes
+        masks = [slice(start, start + rows) for start in (first, first + B, first + 2 * B)]
         same = self._shared_fields if self._names is None else {**self._shared_fields, "names": self._names(rows)}
-        self._cuts[rows] = slice(0, rows * n), (rows, n), *masks, slice(at + 3 * B, at + 3 * B + n), same
+        self._cuts[rows] = slice(0, rows * n), (rows, n), *masks, slice(first + 3 * B, first + 3 * B + n), same
         return self._cuts[rows]
 
     def solve(self, target: Array, near: Array | None) -> Solutions | None:
@@ -87,24 +90,24 @@ class Single:
         if close is not before:
             near_in[...] = close
             block[4] = self._home if near is None else None  # home does not change, other arrays may
-        said = self._call(address)
-        if said == LEFT:
+        state = self._call(address)
+        if state == LEFT:
             return None
-        found = results.copy()
-        flags, rows = found.view(_FLAGS), self._branches
+        values = results.copy()
+        flags, rows = values.view(_FLAGS), self._branches
         if self._names is not None:
             rows = int(flags[self._bytes : self._bytes + rows].sum())
         q, shape, valid, within, branch, free, same = self._cuts.get(rows) or self._split_block(rows)
-        out = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one, for two microseconds
-        out.__dict__.update(
+        solutions = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one, for two microseconds
+        solutions.__dict__.update(
             same,
             target=target.copy(),  # the caller's array may change
             near=close,
-            q=found[q].reshape(shape),
+            q=values[q].reshape(shape),
             valid=flags[valid],
             within_limits=flags[within],
-            branch=found.view(_SMALL)[branch],
+            branch=values.view(_SMALL)[branch],
             free=flags[free],
-            status=_STATUS[said],
+            status=_STATUS[state],
         )
-        return out
+        return solutions

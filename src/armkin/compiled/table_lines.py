@@ -21,43 +21,43 @@ SPARE = 64  # characters behind the last one that C may write
 BLOCK = 4_096  # rows printed at once: their text stays in the cache
 
 
-def lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
     """See `armkin.columns.csv_and_json_lines.Lines`."""
     count = rows(table)
     print_rows = _library()
-    texts = [_texts(column, quoted) for column in table.values()]
-    cells = [[before, missing, *own] for before, own in zip(between, texts, strict=False)] + [[between[-1]]]
-    flat = [text.encode() for one in cells for text in one]
+    texts = [_column_words(column, quoted) for column in table.values()]
+    cells = [[before, missing, *cell] for before, cell in zip(between, texts, strict=False)] + [[between[-1]]]
+    flat = [text.encode() for parts in cells for text in parts]
     ends = np.cumsum([0, *map(len, flat)], dtype=np.int64)
     first = np.cumsum([0, *map(len, cells[:-1])], dtype=np.int64)
     width = sum(map(len, between)) + len(table) * max(WIDEST, *map(len, flat))
-    words, out = b"".join(flat), np.empty(min(count, BLOCK) * width + SPARE, np.uint8)
-    done = []
+    words, buffer = b"".join(flat), np.empty(min(count, BLOCK) * width + SPARE, np.uint8)
+    printed = []
     for start in range(0, count, BLOCK):
-        some = part(table, slice(start, start + BLOCK))
-        kinds, values = zip(*map(_values, some.values()), strict=True)
+        block = part(table, slice(start, start + BLOCK))
+        kinds, values = zip(*map(_column_values, block.values()), strict=True)
         size = print_rows(
-            rows(some),
+            rows(block),
             len(kinds),
             (ctypes.c_int * len(kinds))(*kinds),
-            (ctypes.c_void_p * len(kinds))(*(one.ctypes.data for one in values)),
+            (ctypes.c_void_p * len(kinds))(*(parts.ctypes.data for parts in values)),
             words,
             ends.ctypes.data,
             first.ctypes.data,
-            out.ctypes.data,
+            buffer.ctypes.data,
         )
-        done.append(out[:size].tobytes())
-    return b"".join(done)
+        printed.append(buffer[:size].tobytes())
+    return b"".join(printed)
 
 
-def _texts(column: Column, quoted: Callable[[Any], str]) -> list[str]:
+def _column_words(column: Column, quoted: Callable[[Any], str]) -> list[str]:
     """The words of a column."""
     if isinstance(column, Words):
         return [quoted(name) for name in column.names]
     return ["false", "true"] if column.dtype == bool else []
 
 
-def _values(column: Column) -> tuple[int, np.ndarray[Any, Any]]:
+def _column_values(column: Column) -> tuple[int, np.ndarray[Any, Any]]:
     """What kind of column it is, and its values as C takes them."""
     if isinstance(column, Words):
         return 3, np.ascontiguousarray(column.index, np.int64)
@@ -76,11 +76,11 @@ def _library() -> Any:
     text = text.replace("@least@", str(LEAST)).replace("@count@", str(MOST - LEAST + 1))
     text = text.replace("@pairs@", "".join(f"{i:02d}" for i in range(100)))
     content = hashlib.sha256(text.encode()).hexdigest()
-    found = toolchain.load(text.replace("@content@", content), content, 2).arm_lines
+    function = toolchain.load_library(text.replace("@content@", content), content, 2).arm_lines
     pointer, size = ctypes.c_void_p, ctypes.c_int64
-    found.argtypes = [size, ctypes.c_int, pointer, pointer, ctypes.c_char_p, pointer, pointer, pointer]
-    found.restype = size
-    return found
+    function.argtypes = [size, ctypes.c_int, pointer, pointer, ctypes.c_char_p, pointer, pointer, pointer]
+    function.restype = size
+    return function
 
 
 def _power(k: int) -> tuple[int, int]:

@@ -38,57 +38,57 @@ def announce() -> None:
     """A library is built now: the command line puts its own words here."""
 
 
-def compiler() -> list[str]:
+def compiler_command() -> list[str]:
     """The compiler's path, and its options: those of $CC, or the first of cc, gcc, clang.
 
     Raises MissingExtraError if there is none.
     """
-    wanted = os.environ.get("CC", "").strip()
-    for words in [_words(wanted)] if wanted else [["cc"], ["gcc"], ["clang"]]:
+    named = os.environ.get("CC", "").strip()
+    for words in [_command_words(named)] if named else [["cc"], ["gcc"], ["clang"]]:
         if (path := shutil.which(words[0])) is not None:
             return [path, *words[1:]]
-    if wanted:
-        raise MissingExtraError(f"CC names the C compiler '{wanted}', which is not there; unset CC, or install it")
+    if named:
+        raise MissingExtraError(f"CC names the C compiler '{named}', which is not there; unset CC, or install it")
     raise MissingExtraError(
         "a C compiler is needed and none is installed: "
         "apt install gcc libc6-dev (Debian, Ubuntu), dnf install gcc (Fedora), xcode-select --install (macOS)"
     )
 
 
-def _words(wanted: str) -> list[str]:
+def _command_words(named: str) -> list[str]:
     """$CC as make reads it, such as ``ccache gcc``; a path with spaces in it stays one word."""
-    if shutil.which(wanted) is not None:
-        return [wanted]
+    if shutil.which(named) is not None:
+        return [named]
     try:
-        return shlex.split(wanted) or [wanted]
+        return shlex.split(named) or [named]
     except ValueError:  # a quote without its other half
-        return [wanted]
+        return [named]
 
 
-def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
+def load_library(source: str, content: str, level: int = 3) -> ctypes.CDLL:
     """A C file as a loaded library: from the cache, or built now.
 
     content: what the library must hold as `arm_content`; level: of optimisation, or none where that takes the
     compiler longer than LONGEST. Raises MissingExtraError without a compiler, or if it fails; FileError where there is
     no place to build.
     """
-    folder, commands = _folder(), {}
+    folder, commands = _cache_folder(), {}
     for way in dict.fromkeys((level, 0)):
-        command = [*compiler(), f"-O{way}", *FLAGS]
+        command = [*compiler_command(), f"-O{way}", *FLAGS]
         # a busy computer may have been too slow to optimise: one that did not is tried again the next day
         day = [] if way == level else [str(int(time.time() // _DAY))]
-        key = "\0".join([source, *command, _version(command[0]), _processor(), *day])
+        key = "\0".join([source, *command, _compiler_version(command[0]), _processor_text(), *day])
         commands[name := hashlib.sha256(key.encode()).hexdigest()] = command
-        if folder is not None and (found := _stored_library(folder, name, content)) is not None:
-            return found
+        if folder is not None and (library := _stored_library(folder, name, content)) is not None:
+            return library
     announce()
     try:
-        with tempfile.TemporaryDirectory(prefix="armkin-") as own:
-            built, name = _build(commands, source, Path(own))
+        with tempfile.TemporaryDirectory(prefix="armkin-") as build_folder:
+            built, name = _build(commands, source, Path(build_folder))
             if folder is not None:
-                _store(built, folder, name)
-                if (found := _stored_library(folder, name, content)) is not None:
-                    return found
+                _store_library(built, folder, name)
+                if (library := _stored_library(folder, name, content)) is not None:
+                    return library
             return ctypes.CDLL(str(built))
     except OSError as error:  # a full disk, a folder from which nothing may be run
         raise FileError(
@@ -100,21 +100,23 @@ def _build(commands: dict[str, list[str]], source: str, folder: Path) -> tuple[P
     """Compile in a folder of one's own, by the first command that ends in time; the library and that command's name."""
     (folder / "arm.c").write_text(source, encoding="utf-8")
     for name, command in commands.items():
-        done = _run([*command, "arm.c", "-o", "arm.so", "-lm"], folder, LONGEST if name != [*commands][-1] else None)
-        if done is not None:
+        run = _run_compiler(
+            [*command, "arm.c", "-o", "arm.so", "-lm"], folder, LONGEST if name != [*commands][-1] else None
+        )
+        if run is not None:
             break
     library = folder / "arm.so"
-    if done is None or done.returncode or not library.is_file():
-        lines = [] if done is None else done.stderr.splitlines()
-        said = next((line for line in lines if "error" in line), "\n".join(lines).strip()[:200])
+    if run is None or run.returncode or not library.is_file():
+        lines = [] if run is None else run.stderr.splitlines()
+        problem = next((line for line in lines if "error" in line), "\n".join(lines).strip()[:200])
         raise MissingExtraError(
-            f"the C compiler {command[0]} failed: {said or 'it wrote no library'}\n"
+            f"the C compiler {command[0]} failed: {problem or 'it wrote no library'}\n"
             "it needs the C library's headers (Debian, Ubuntu: apt install gcc libc6-dev)"
         )
     return library, name
 
 
-def _run(
+def _run_compiler(
     words: list[str], folder: Path | None = None, seconds: float | None = None
 ) -> subprocess.CompletedProcess[str] | None:
     """Run the compiler; None if it does not end in time. Raises MissingExtraError if it is no program."""
@@ -128,7 +130,7 @@ def _run(
         raise MissingExtraError(f"the C compiler {words[0]} cannot be run: {error.strerror or error}") from None
 
 
-def _store(built: Path, folder: Path, name: str) -> None:
+def _store_library(built: Path, folder: Path, name: str) -> None:
     """Put a library into the cache, whole; a full disk keeps nothing."""
     held = built.read_bytes()
     with suppress(OSError):
@@ -147,7 +149,7 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:32]
 
 
-def _folder() -> Path | None:
+def _cache_folder() -> Path | None:
     """The cache folder, made if need be; None if it is not this user's alone."""
     folder = user_folders.compiled_folder()
     if folder is None:
@@ -158,10 +160,10 @@ def _folder() -> Path | None:
         for path in (folder.parent, folder):  # one by one: `parents` would leave those above to the umask
             path.mkdir(mode=0o700, exist_ok=True)
         # who can write a folder above can put another in its place
-        own = all(_is_ours(path, path == folder) for path in (folder, folder.parent, base))
+        are_ours = all(_is_ours(path, path == folder) for path in (folder, folder.parent, base))
     except OSError:  # a file in the way, a full or read-only disk
         return None
-    return folder if own and os.access(folder, os.W_OK) else None
+    return folder if are_ours and os.access(folder, os.W_OK) else None
 
 
 def _is_ours(path: Path, only_user: bool = True) -> bool:
@@ -180,27 +182,27 @@ def _stored_library(folder: Path, name: str, content: str) -> ctypes.CDLL | None
             # read before it is loaded: the loader of a torn file ends the process
             if not _is_ours(library) or library.stem != f"{name}-{_digest(library.read_bytes())}":
                 continue
-            found = ctypes.CDLL(str(library))
-            held = (ctypes.c_char * (len(content) + 1)).in_dll(found, "arm_content").value
+            loaded = ctypes.CDLL(str(library))
+            held = (ctypes.c_char * (len(content) + 1)).in_dll(loaded, "arm_content").value
         except (OSError, ValueError):
             continue
         if held == content.encode():
-            return found
+            return loaded
     return None
 
 
 @cache
-def _version(path: str) -> str:
-    done = _run([path, "--version"], seconds=LONGEST)
-    return "" if done is None else done.stdout
+def _compiler_version(path: str) -> str:
+    run = _run_compiler([path, "--version"], seconds=LONGEST)
+    return "" if run is None else run.stdout
 
 
 @cache
-def _processor() -> str:
+def _processor_text() -> str:
     """What -march=native goes by: a home folder may be shared by unlike computers."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return f"{platform.machine()} {platform.processor()} {platform.node()}"
-    told = ("model name", "flags", "Features", "CPU part")
-    return "\n".join(sorted({line for line in lines if line.startswith(told)}))
+    prefixes = ("model name", "flags", "Features", "CPU part")
+    return "\n".join(sorted({line for line in lines if line.startswith(prefixes)}))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _IDENTITY = {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}
 
 
-def numbers(arm: Arm) -> dict[str, Any]:
+def arm_numbers(arm: Arm) -> dict[str, Any]:
     """Joints with their screws, limits and speeds, DH tables where there are any, the chain's matrices.
 
     `links`: the tool's pose is links[0] Z1(ratio1 q1) links[1] ... Zn(ratio_n q_n) links[n], Z = Rz or Tz.
@@ -47,16 +47,16 @@ def numbers(arm: Arm) -> dict[str, Any]:
         "zero_pose": screws["zero_pose"],
         "tool": screws.get("tool", _IDENTITY),
         "links": arm.link.tolist(),
-        "dh_standard": _table(arm, modified=False),
-        "dh_modified": _table(arm, modified=True),
+        "dh_standard": _dh_table(arm, modified=False),
+        "dh_modified": _dh_table(arm, modified=True),
     }
 
 
-def _table(arm: Arm, *, modified: bool) -> dict[str, Any] | None:
+def _dh_table(arm: Arm, *, modified: bool) -> dict[str, Any] | None:
     """A DH table with its base and tool, or None if there is none."""
     try:
-        data = conventions.dh(arm, modified=modified)
+        keys = conventions.dh(arm, modified=modified)
     except UsageError:
         return None
-    rows = [joint["dh"] for joint in data["joints"]]
-    return {"base": data.get("base", _IDENTITY), "rows": rows, "tool": data.get("tool", _IDENTITY)}
+    rows = [joint["dh"] for joint in keys["joints"]]
+    return {"base": keys.get("base", _IDENTITY), "rows": rows, "tool": keys.get("tool", _IDENTITY)}

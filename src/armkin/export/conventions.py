@@ -39,14 +39,14 @@ def screws(arm: Arm, tool: Array | None = None) -> dict[str, Any]:
     {'w': [0.0, -1.0, 0.0], 'q': [0.0, 0.0, 170.0]}
     """
     T, rows = inverse(arm.base), []
-    links = _canonical(arm)
+    links = _unsigned_links(arm)
     for i in range(arm.n):
         T = T @ links[i]
         direction, point = [tidy(x, 15) for x in T[:3, 2].tolist()], [tidy(x, 12) for x in T[:3, 3].tolist()]
         rows.append({"screw": {"w": [0, 0, 0], "v": direction} if arm.prismatic[i] else {"w": direction, "q": point}})
     tool = tool_of(arm) if tool is None else tool
     zero = T @ links[-1] @ inverse(tool)
-    return _file(arm, "screws", rows, arm.base, tool, {"zero_pose": pose_keys(zero.tolist())})
+    return _file_keys(arm, "screws", rows, arm.base, tool, {"zero_pose": pose_keys(zero.tolist())})
 
 
 def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
@@ -58,8 +58,8 @@ def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
     >>> dh(armkin.load("robots/three_dof.yaml"), modified=True)["joints"][1]["dh"]
     {'alpha': 90.0, 'a': 0.0, 'd': 0.0, 'theta': 0.0}
     """
-    links = _canonical(arm)
-    base, theta, d = _start(arm, links[0])
+    links = _unsigned_links(arm)
+    base, theta, d = _split_first_link(arm, links[0])
     normals = [_common_normal(link) for link in links[1:-1]]
     thetas = [theta] + [normal.theta_after for normal in normals]
     ds = [d] + [normal.d_after for normal in normals]
@@ -67,7 +67,7 @@ def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
         thetas[i] += normal.theta
         ds[i] += normal.d
     twists = [(normal.alpha, normal.a) for normal in normals]
-    last, tool = _end(arm, links[-1], modified)
+    last, tool = _split_last_link(arm, links[-1], modified)
     thetas[-1] += last.theta
     ds[-1] += last.d
     before = [(0.0, 0.0), *twists] if modified else [*twists, (last.alpha, last.a)]
@@ -75,9 +75,9 @@ def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
         {"dh": {"alpha": _degrees(alpha), "a": tidy(a, 12), "d": tidy(offset, 12), "theta": _degrees(angle)}}
         for (alpha, a), offset, angle in zip(before, ds, thetas, strict=True)
     ]
-    data = _file(arm, "modified" if modified else "standard", rows, base, tool, {})
-    _check(arm, data, links)
-    return data
+    keys = _file_keys(arm, "modified" if modified else "standard", rows, base, tool, {})
+    _check_poses(arm, keys, links)
+    return keys
 
 
 class _Normal(NamedTuple):
@@ -91,7 +91,7 @@ class _Normal(NamedTuple):
     d_after: float = 0.0
 
 
-def _canonical(arm: Arm) -> Array:
+def _unsigned_links(arm: Arm) -> Array:
     """The chain's links with the joints' signs taken out: each z axis is that of the row or screw, not of the joint."""
     flips = [FLIP if sign < 0 else np.eye(4) for sign in arm.dh_sign]
     links = arm.link.copy()
@@ -109,7 +109,7 @@ def tool_of(arm: Arm) -> Array:
     return transform(arm.file.tool.xyz, arm.file.tool.rpy)
 
 
-def _start(arm: Arm, link: Array) -> tuple[Array, float, float]:
+def _split_first_link(arm: Arm, link: Array) -> tuple[Array, float, float]:
     """The base, and what of the first link is a turn about and a shift along the first axis."""
     inner = inverse(arm.base) @ link
     if _is_screw_along_z(inner):
@@ -117,7 +117,7 @@ def _start(arm: Arm, link: Array) -> tuple[Array, float, float]:
     return link, 0.0, 0.0
 
 
-def _end(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Array]:
+def _split_last_link(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Array]:
     """What of the last link belongs to the last row, and the tool that is left."""
     tool = tool_of(arm)
     inner = link @ inverse(tool)
@@ -151,7 +151,7 @@ def _common_normal(link: Array) -> _Normal:
         a = math.hypot(p[0], p[1])
         a = a if a > LEAST else 0.0
         theta = math.atan2(p[1], p[0]) if a else 0.0
-        if not _forward(theta):
+        if not _is_forward(theta):
             a, theta = -a, theta - math.copysign(math.pi, theta)
         alpha = 0.0 if z[2] > 0 else math.pi
         d, d_after = 0.0, float(p[2] * np.sign(z[2]))
@@ -160,7 +160,7 @@ def _common_normal(link: Array) -> _Normal:
         alpha, a = math.atan2(sine, z[2]), float(n @ p[:2])
         a = a if abs(a) > LEAST else 0.0
         theta = math.atan2(n[1], n[0])
-        if not _forward(theta):
+        if not _is_forward(theta):
             n, a, alpha = -n, -a, -alpha
             theta = math.atan2(n[1], n[0])
         d_after = float((p[:2] - a * n) @ z[:2]) / sine**2
@@ -170,7 +170,7 @@ def _common_normal(link: Array) -> _Normal:
     return _Normal(theta, d, a, alpha, math.atan2(turned[1, 0], turned[0, 0]), d_after)
 
 
-def _forward(theta: float) -> bool:
+def _is_forward(theta: float) -> bool:
     """Whether an angle is in (-90, 90] degrees, but for rounding."""
     return -math.pi / 2 + 1e-9 < theta < math.pi / 2 + 1e-9
 
@@ -180,37 +180,37 @@ def _degrees(angle: float) -> float:
     return tidy(180.0 - (180.0 - value) % 360.0, 12)  # in (-180, 180]
 
 
-def _file(
+def _file_keys(
     arm: Arm, convention: str, rows: list[dict[str, Any]], base: Array, tool: Array, keys: dict[str, Any]
 ) -> dict[str, Any]:
     """A robot file with these rows, and all else as it was."""
-    head, joints, rest = _unchanged_parts(arm)
-    data: dict[str, Any] = {**head, "convention": convention}
+    head, joints, tail = _unchanged_parts(arm)
+    file_keys: dict[str, Any] = {**head, "convention": convention}
     for key, frame in (("base", base), ("tool", tool)):
         if np.abs(frame - np.eye(4)).max() > 1e-15:
-            data[key] = pose_keys(frame.tolist())
+            file_keys[key] = pose_keys(frame.tolist())
     order = ("name", "type")
-    data |= keys | {
+    file_keys |= keys | {
         "joints": [
-            {k: old[k] for k in order if k in old} | row | {k: v for k, v in old.items() if k not in order}
-            for old, row in zip(joints, rows, strict=True)
+            {k: joint[k] for k in order if k in joint} | row | {k: v for k, v in joint.items() if k not in order}
+            for joint, row in zip(joints, rows, strict=True)
         ]
     }
-    data |= rest
-    return _same_pitch(arm, data)
+    file_keys |= tail
+    return _same_pitch(arm, file_keys)
 
 
 def _unchanged_parts(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
     """What a change of convention leaves alone: the file's head, the joints without geometry, and the rest."""
     if arm.file is None:
         return {"name": arm.name}, _joints_without_a_file(arm), {}
-    data = arm.file.model_dump(exclude_unset=True, exclude_none=True)
-    joints = [{k: v for k, v in joint.items() if k not in ("dh", "screw", "ratio")} for joint in data["joints"]]
+    keys = arm.file.model_dump(exclude_unset=True, exclude_none=True)
+    joints = [{k: v for k, v in joint.items() if k not in ("dh", "screw", "ratio")} for joint in keys["joints"]]
     for joint, ratio in zip(joints, arm.ratio.tolist(), strict=True):
         joint |= {"ratio": ratio} if ratio != 1.0 else {}
-    head = {k: v for k, v in data.items() if k in ("name", "description", "source", "compared", "task", "pitch_offset")}
-    rest = {k: v for k, v in data.items() if k not in head and k not in _GEOMETRY}
-    return head, joints, rest
+    head = {k: v for k, v in keys.items() if k in ("name", "description", "source", "compared", "task", "pitch_offset")}
+    tail = {k: v for k, v in keys.items() if k not in head and k not in _GEOMETRY}
+    return head, joints, tail
 
 
 def _joints_without_a_file(arm: Arm) -> list[dict[str, Any]]:
@@ -226,52 +226,52 @@ def _joints_without_a_file(arm: Arm) -> list[dict[str, Any]]:
     return joints
 
 
-def _same_pitch(arm: Arm, data: dict[str, Any]) -> dict[str, Any]:
+def _same_pitch(arm: Arm, robot: dict[str, Any]) -> dict[str, Any]:
     """The pitch of targets counts from where it did: another table's constant angles go to `pitch_offset`."""
     for name in ("xyz_pitch", "xyz_pitch_roll"):
         try:
             before = task_for(arm, name).offsets[0]
         except UsageError:
             continue
-        after = task_for(_built({**data, "pitch_offset": 0.0, "task": name}), name).offsets[0]
+        after = task_for(_build_arm({**robot, "pitch_offset": 0.0, "task": name}), name).offsets[0]
         offset = _degrees(before - after)
-        data = {k: v for k, v in data.items() if k != "pitch_offset"}
+        robot = {k: v for k, v in robot.items() if k != "pitch_offset"}
         if offset:
-            keys = list(data)
-            at = keys.index("convention")
-            data = {k: data[k] for k in keys[:at]} | {"pitch_offset": offset} | {k: data[k] for k in keys[at:]}
-            if data.get("task") not in (None, "xyz_pitch", "xyz_pitch_roll"):
-                del data["pitch_offset"]
+            keys = list(robot)
+            index = keys.index("convention")
+            robot = {k: robot[k] for k in keys[:index]} | {"pitch_offset": offset} | {k: robot[k] for k in keys[index:]}
+            if robot.get("task") not in (None, "xyz_pitch", "xyz_pitch_roll"):
+                del robot["pitch_offset"]
         break
-    return data
+    return robot
 
 
-def differences(arm: Arm, data: dict[str, Any]) -> list[str]:
+def differences(arm: Arm, keys: dict[str, Any]) -> list[str]:
     """What the other table's targets count from elsewhere, in words; [] for most arms."""
     try:
-        before, after = task_for(arm), task_for(_built(data))
+        before, after = task_for(arm), task_for(_build_arm(keys))
     except UsageError:
         return []
     if before.name != after.name:
         return [f"the task was {before.name} and is {after.name}"]
-    found = []
-    for label, old, new in zip(before.labels[before.position :], before.offsets, after.offsets, strict=False):
-        if abs(turn := _degrees(new - old)) > 1e-9:
-            found.append(f"{label} counts from another zero: in targets it is {turn:g} deg more for the same pose")
-    return found
+    lines = []
+    for label, zero, new_zero in zip(before.labels[before.position :], before.offsets, after.offsets, strict=False):
+        if abs(turn := _degrees(new_zero - zero)) > 1e-9:
+            lines.append(f"{label} counts from another zero: in targets it is {turn:g} deg more for the same pose")
+    return lines
 
 
-def _built(data: dict[str, Any]) -> Arm:
-    return build(robot_file.parse_robot_file(format_robot_file(data), str(data["name"])))
+def _build_arm(keys: dict[str, Any]) -> Arm:
+    return build(robot_file.parse_robot_file(format_robot_file(keys), str(keys["name"])))
 
 
-def _check(arm: Arm, data: dict[str, Any], links: Array) -> None:
+def _check_poses(arm: Arm, keys: dict[str, Any], links: Array) -> None:
     """The table gives the arm's poses, or UsageError says which axes spoil it."""
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (20, arm.n)) * np.where(arm.prismatic, 100.0, 1.0)
-    sizes = [abs(v) for joint in data["joints"] for v in (joint["dh"]["a"], joint["dh"]["d"])]
+    sizes = [abs(v) for joint in keys["joints"] for v in (joint["dh"]["a"], joint["dh"]["d"])]
     if max(sizes) < 1e7:
-        off = np.abs(fk(_built(data), q) - fk(arm, q))
-        if off[:, :3, 3].max() < COORDINATES and off[:, :3, :3].max() < 1e-11:
+        deviation = np.abs(fk(_build_arm(keys), q) - fk(arm, q))
+        if deviation[:, :3, 3].max() < COORDINATES and deviation[:, :3, :3].max() < 1e-11:
             return
     sines = np.hypot(links[1:-1, 0, 2], links[1:-1, 1, 2])
     sines = np.where(sines > PARALLEL, sines, np.inf)

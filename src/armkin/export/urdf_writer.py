@@ -29,34 +29,35 @@ SHORTEST = 1e-6  # [mm] a shorter piece is not drawn
 _COLOURS = (("body", "0.85 0.85 0.85 1"), ("joint", "0.25 0.35 0.5 1"))
 
 
-def urdf(arm: Arm) -> str:
+def urdf_text(arm: Arm) -> str:
     """The arm as the text of a URDF file.
 
     >>> import armkin
-    >>> urdf(armkin.load("robots/three_dof.yaml")).splitlines()[2]
+    >>> urdf_text(armkin.load("robots/three_dof.yaml")).splitlines()[2]
     '<robot name="three_dof">'
     """
     turned = actual(arm)
     links = ["base_link"]
     for name in arm.joint_names:
-        links.append(_free(f"{name}_link", tuple(links)))
+        links.append(_free_name(f"{name}_link", tuple(links)))
     radius, form = THICK * arm.reach, shape(turned)
     lines = [
         '<?xml version="1.0"?>',
-        f"<!-- {_comment(arm)} -->",
+        f"<!-- {_comment_text(arm)} -->",
         f"<robot name={quoteattr(arm.name)}>",
         *(f'  <material name="{name}"><color rgba="{rgba}"/></material>' for name, rgba in _COLOURS),
-        *_link("base_link", _body(form.bodies[0], radius)),
+        *_link_lines("base_link", _body_lines(form.bodies[0], radius)),
     ]
     for i, name in enumerate(arm.joint_names):
-        lines += _joint(turned, i, name, links[i], links[i + 1])
-        lines += _link(
-            links[i + 1], [_hub(float(form.joint_offsets[i]), radius), *_body(form.bodies[i + 1], radius * 0.85)]
+        lines += _joint_lines(turned, i, name, links[i], links[i + 1])
+        lines += _link_lines(
+            links[i + 1],
+            [_hub_lines(float(form.joint_offsets[i]), radius), *_body_lines(form.bodies[i + 1], radius * 0.85)],
         )
-    tool = _free("tool", tuple(links))
+    tool = _free_name("tool", tuple(links))
     lines += [
-        f'  <joint name="{_free("tool_joint", arm.joint_names)}" type="fixed">',
-        *_place(turned.link[-1], links[-1], tool),
+        f'  <joint name="{_free_name("tool_joint", arm.joint_names)}" type="fixed">',
+        *_place_lines(turned.link[-1], links[-1], tool),
         "  </joint>",
         f'  <link name="{tool}"/>',
         "</robot>",
@@ -64,64 +65,64 @@ def urdf(arm: Arm) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _comment(arm: Arm) -> str:
+def _comment_text(arm: Arm) -> str:
     source = f"; {arm.source}" if arm.source else ""
     text = f"{arm.name}, written by armkin{source}"
     return text.replace("--", "- -").replace("\n", " ")
 
 
-def _free(name: str, used: tuple[str, ...]) -> str:
+def _free_name(name: str, used: tuple[str, ...]) -> str:
     while name in used:
         name += "_"
     return name
 
 
-def _joint(arm: Arm, i: int, name: str, parent: str, child: str) -> list[str]:
+def _joint_lines(arm: Arm, i: int, name: str, parent: str, child: str) -> list[str]:
     slides, limited = bool(arm.prismatic[i]), math.isfinite(arm.lower[i]) and math.isfinite(arm.upper[i])
     kind = "prismatic" if slides else "revolute" if limited else "continuous"
     unit = METRE if slides else 1.0
     speed = 0.0 if math.isnan(arm.max_speed[i]) else float(arm.max_speed[i]) / unit
-    ends = f'lower="{_real(arm.lower[i] / unit)}" upper="{_real(arm.upper[i] / unit)}" ' if limited else ""
+    ends = f'lower="{_real_text(arm.lower[i] / unit)}" upper="{_real_text(arm.upper[i] / unit)}" ' if limited else ""
     return [
         f'  <joint name="{name}" type="{kind}">',
-        *_place(arm.link[i], parent, child),
+        *_place_lines(arm.link[i], parent, child),
         '    <axis xyz="0 0 1"/>',
-        f'    <limit {ends}effort="0" velocity="{_real(speed)}"/>',
+        f'    <limit {ends}effort="0" velocity="{_real_text(speed)}"/>',
         "  </joint>",
     ]
 
 
-def _place(T: Array, parent: str, child: str) -> list[str]:
-    return [f'    <parent link="{parent}"/>', f'    <child link="{child}"/>', f"    {_origin(T)}"]
+def _place_lines(T: Array, parent: str, child: str) -> list[str]:
+    return [f'    <parent link="{parent}"/>', f'    <child link="{child}"/>', f"    {_origin_element(T)}"]
 
 
-def _origin(T: Array) -> str:
-    xyz = " ".join(_real(x / METRE) for x in T[:3, 3])
-    rpy = " ".join(_real(angle) for angle in rpy_angles(T.tolist()))
+def _origin_element(T: Array) -> str:
+    xyz = " ".join(_real_text(x / METRE) for x in T[:3, 3])
+    rpy = " ".join(_real_text(angle) for angle in rpy_angles(T.tolist()))
     return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
 
 
-def _real(value: float) -> str:
+def _real_text(value: float) -> str:
     return number_text(0.0 if abs(value) < 1e-18 else float(value))
 
 
-def _link(name: str, pieces: list[list[str]]) -> list[str]:
+def _link_lines(name: str, pieces: list[list[str]]) -> list[str]:
     drawn = [line for piece in pieces for line in piece]
     return [f'  <link name="{name}">', *drawn, "  </link>"] if drawn else [f'  <link name="{name}"/>']
 
 
-def _body(corners: Array, radius: float) -> list[list[str]]:
+def _body_lines(corners: Array, radius: float) -> list[list[str]]:
     """A link as `armkin.view.skeleton` shapes it: straight from corner to corner."""
-    return [_piece(start, end, radius) for start, end in pairwise(corners)]
+    return [_piece_lines(start, end, radius) for start, end in pairwise(corners)]
 
 
-def _hub(offset: float, radius: float) -> list[str]:
+def _hub_lines(offset: float, radius: float) -> list[str]:
     """A joint: a short cylinder about its axis, `offset` [mm] along it."""
-    size = f'<cylinder radius="{_size(radius)}" length="{_size(2.2 * radius)}"/>'
-    return _visual("joint", f'<origin xyz="0 0 {_size(offset)}" rpy="0 0 0"/>', size)
+    size = f'<cylinder radius="{_metres_text(radius)}" length="{_metres_text(2.2 * radius)}"/>'
+    return _visual_lines("joint", f'<origin xyz="0 0 {_metres_text(offset)}" rpy="0 0 0"/>', size)
 
 
-def _piece(start: Array, end: Array, radius: float) -> list[str]:
+def _piece_lines(start: Array, end: Array, radius: float) -> list[str]:
     """A cylinder from start to end [mm] in the link's frame, with a ball at its end; [] if there is no way between."""
     along = end - start
     length = float(np.linalg.norm(along))
@@ -130,21 +131,21 @@ def _piece(start: Array, end: Array, radius: float) -> list[str]:
     z = along / length
     # Ry(pitch) after Rz(yaw) turns z into the piece's direction; a cylinder needs no more.
     pitch, yaw = math.atan2(math.hypot(z[0], z[1]), z[2]), math.atan2(z[1], z[0])
-    where = " ".join(_size(x) for x in (start + end) / 2)
-    ball = " ".join(_size(x) for x in end)
-    cylinder = f'<cylinder radius="{_size(radius)}" length="{_size(length)}"/>'
+    centre = " ".join(_metres_text(x) for x in (start + end) / 2)
+    ball = " ".join(_metres_text(x) for x in end)
+    cylinder = f'<cylinder radius="{_metres_text(radius)}" length="{_metres_text(length)}"/>'
     return [
-        *_visual("body", f'<origin xyz="{where}" rpy="0 {pitch:.6f} {yaw:.6f}"/>', cylinder),
-        *_visual("body", f'<origin xyz="{ball}" rpy="0 0 0"/>', f'<sphere radius="{_size(radius)}"/>'),
+        *_visual_lines("body", f'<origin xyz="{centre}" rpy="0 {pitch:.6f} {yaw:.6f}"/>', cylinder),
+        *_visual_lines("body", f'<origin xyz="{ball}" rpy="0 0 0"/>', f'<sphere radius="{_metres_text(radius)}"/>'),
     ]
 
 
-def _visual(material: str, origin: str, form: str) -> list[str]:
+def _visual_lines(material: str, origin: str, form: str) -> list[str]:
     return [
         f'    <visual>{origin}<geometry>{form}</geometry><material name="{material}"/></visual>',
     ]
 
 
-def _size(value: float) -> str:
+def _metres_text(value: float) -> str:
     """Millimetres of a picture, in metres."""
     return number_text(round(float(value) / METRE, 7))

@@ -61,7 +61,7 @@ flip: Callable[[Entry, int], Entry] = _numpy.flip
 CHUNK = 8000  # poses worked on at once: long enough to hide the calls, short enough for a processor's cache
 
 
-def real(values: ArrayLike, name: str) -> Array:
+def real_array(values: ArrayLike, name: str) -> Array:
     """Values from outside as an array of floats; name: their name, for the message.
 
     Raises UsageError for text, dates, complex numbers and lists of unequal lengths. nan and infinity pass.
@@ -72,10 +72,10 @@ def real(values: ArrayLike, name: str) -> Array:
         array = np.asarray(values)
         if array.dtype.kind in "biufO":  # O: numbers that numpy does not know, such as fractions
             return array.astype(np.float64)
-        found = f"an array of {array.dtype}"
+        kind = f"an array of {array.dtype}"
     except (TypeError, ValueError):
-        found = type(values).__name__
-    raise UsageError(f"{name}: expected an array of real numbers, got {found}")
+        kind = type(values).__name__
+    raise UsageError(f"{name}: expected an array of real numbers, got {kind}")
 
 
 def is_single(values: ArrayLike) -> bool:
@@ -89,9 +89,9 @@ def mul(a: Entry, b: Entry) -> Entry:
     >>> mul(0.0, np.array([1.0, 2.0])), mul(-1.0, 3.0)
     (0.0, -3.0)
     """
-    for one, other in ((a, b), (b, a)):
-        if isinstance(one, float) and one in (0.0, 1.0, -1.0):
-            return 0.0 if one == 0.0 else other if one == 1.0 else -other
+    for factor, cofactor in ((a, b), (b, a)):
+        if isinstance(factor, float) and factor in (0.0, 1.0, -1.0):
+            return 0.0 if factor == 0.0 else cofactor if factor == 1.0 else -cofactor
     return a * b
 
 
@@ -157,10 +157,10 @@ def cos_sin(angle: Entry) -> tuple[Entry, Entry]:
     return (1.0 - t2) * scale, (t + t) * scale
 
 
-def wrapped(angle: E) -> E:
+def wrap_angle(angle: E) -> E:
     """An angle [rad] less its whole turns, in [-pi, pi].
 
-    >>> round(float(wrapped(7.0)), 6)
+    >>> round(float(wrap_angle(7.0)), 6)
     0.716815
     """
     less: E = angle - 2 * np.pi * _numpy.rint(angle / (2 * np.pi))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from armkin.formula.recording import BOOLEAN, FLIPS, Node, Recording, axes_of, flipped
+from armkin.formula.recording import BOOLEAN, FLIPS, Node, Recording, axes_of, index_before_flip
 
 # Operations on single numbers; the functions in capitals are macros of the file that the lines go to.
 _C = {
@@ -77,10 +77,10 @@ class Code(NamedTuple):
     outputs: list[list[str]]
 
 
-def number(value: float, single: bool = False) -> str:
+def number_text(value: float, single: bool = False) -> str:
     """A constant as C99: all digits that tell it from its neighbours.
 
-    >>> number(0.1), number(3.0), number(0.1, single=True)
+    >>> number_text(0.1), number_text(3.0), number_text(0.1, single=True)
     ('0.1', '3.0', '0.1f')
     """
     if math.isinf(value) or math.isnan(value):
@@ -102,9 +102,11 @@ class Language(NamedTuple):
     number: Callable[[float], str]
 
 
-C = Language(_C, "const arm_real", "const int", number)
-C_SINGLE = Language(_C, "const arm_real", "const int", partial(number, single=True))
-JAVASCRIPT = Language(_JAVASCRIPT, "const", "const", lambda value: number(value).replace("ARM_INFINITY", "Infinity"))
+C = Language(_C, "const arm_real", "const int", number_text)
+C_SINGLE = Language(_C, "const arm_real", "const int", partial(number_text, single=True))
+JAVASCRIPT = Language(
+    _JAVASCRIPT, "const", "const", lambda value: number_text(value).replace("ARM_INFINITY", "Infinity")
+)
 
 
 class _Writer:
@@ -126,7 +128,7 @@ class _Writer:
         if op in ("multiply", "divide", "add", "subtract"):
             return self._arithmetic(op, *args)
         if op == "negative":
-            return _flipped(args[0], True)
+            return _flip_sign(args[0], True)
         if op == "power":
             assert args[1].constant == 2.0, "only squares are recorded"
             return self._arithmetic("multiply", args[0], args[0])
@@ -144,16 +146,16 @@ class _Writer:
             x, y = (-c if minus else c for c, minus in ((a.constant, a.minus), (b.constant, b.minus)))
             return self.constant(x * y if op == "multiply" else x + y if op == "add" else x - y)
         if op in ("add", "subtract"):
-            return self._sum(a, _flipped(b, op == "subtract"))
+            return self._sum(a, _flip_sign(b, op == "subtract"))
         minus = a.minus != b.minus
         a, b = a._replace(minus=False), b._replace(minus=False)
         if op == "multiply" and a.constant == 1.0:
-            return _flipped(b, minus)
+            return _flip_sign(b, minus)
         if b.constant == 1.0:
-            return _flipped(a, minus)
+            return _flip_sign(a, minus)
         if op == "multiply" and 0.0 in (a.constant, b.constant):
             return self.constant(0.0)
-        return _flipped(self.emit(op, sorted((a, b)) if op == "multiply" else [a, b]), minus)
+        return _flip_sign(self.emit(op, sorted((a, b)) if op == "multiply" else [a, b]), minus)
 
     def _sum(self, a: Value, b: Value) -> Value:
         if a.constant == 0.0:
@@ -162,7 +164,7 @@ class _Writer:
             return a
         if a.minus == b.minus:
             plain = sorted((a._replace(minus=False), b._replace(minus=False)))
-            return _flipped(self.emit("add", plain), a.minus)
+            return _flip_sign(self.emit("add", plain), a.minus)
         plus, less = (b, a) if a.minus else (a, b)
         return self.emit("subtract", [plus._replace(minus=False), less._replace(minus=False)])
 
@@ -178,11 +180,11 @@ class _Writer:
         return self.values_by_key[key]
 
 
-def _flipped(x: Value, minus: bool) -> Value:
+def _flip_sign(x: Value, minus: bool) -> Value:
     return x._replace(minus=x.minus != minus)
 
 
-def write(recording: Recording, inputs: list[str], language: Language = C) -> Code:
+def write_code(recording: Recording, inputs: list[str], language: Language = C) -> Code:
     """The lines that compute a recording; inputs: the expressions of its inputs."""
     writer = _Writer(language)
     values: dict[int, dict[tuple[int, ...], Value]] = {
@@ -191,16 +193,16 @@ def write(recording: Recording, inputs: list[str], language: Language = C) -> Co
 
     def value(x: Any, index: tuple[int, ...]) -> Value:
         axes = axes_of(x)
-        at = tuple(0 if size == 1 else i for size, i in zip(axes, index[len(index) - len(axes) :], strict=True))
+        place = tuple(0 if size == 1 else i for size, i in zip(axes, index[len(index) - len(axes) :], strict=True))
         if isinstance(x, Node):
-            return values[id(x)][at]
-        return writer.constant(float(np.asarray(x)[(*at, 0)] if np.ndim(x) else x))
+            return values[id(x)][place]
+        return writer.constant(float(np.asarray(x)[(*place, 0)] if np.ndim(x) else x))
 
     for node in recording.nodes:
         if node.op in FLIPS:
             before = node.args[0]
             values[id(node)] = {
-                index: value(before, flipped(node.op, index, node.axes)) for index in np.ndindex(*node.axes)
+                index: value(before, index_before_flip(node.op, index, node.axes)) for index in np.ndindex(*node.axes)
             }
             continue
         values[id(node)] = {

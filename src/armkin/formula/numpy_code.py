@@ -37,8 +37,8 @@ class Buffer(NamedTuple):
 def workspace(buffers: list[Buffer], length: int) -> list[NDArray[Any]]:
     """The buffers for batches of that length."""
     made: list[NDArray[Any]] = []
-    for axes, dtype, whole, part in buffers:
-        made.append(np.empty((*axes, length), dtype) if whole < 0 else made[whole][part])
+    for axes, dtype, full_index, part in buffers:
+        made.append(np.empty((*axes, length), dtype) if full_index < 0 else made[full_index][part])
     return made
 
 
@@ -65,13 +65,13 @@ class _Buffers:
             # an array of no axes reaches the loop 0.2 us sooner than a Python number
             self.constants[f"k{len(self.constants)}"] = x[place] if np.ndim(x) else np.array(float(x))
             return f"k{len(self.constants) - 1}"
-        whole = self.names[id(x)]
+        full_name = self.names[id(x)]
         if all(isinstance(k, slice) for k in place):
-            return whole
-        if (whole, str(place)) not in self._parts:
-            self._parts[whole, str(place)] = f"b{len(self.buffers)}"
-            self.buffers.append(Buffer(*self._kinds[id(x)], int(whole[1:]), place))
-        return self._parts[whole, str(place)]
+            return full_name
+        if (full_name, str(place)) not in self._parts:
+            self._parts[full_name, str(place)] = f"b{len(self.buffers)}"
+            self.buffers.append(Buffer(*self._kinds[id(x)], int(full_name[1:]), place))
+        return self._parts[full_name, str(place)]
 
     def take(self, node: Node) -> None:
         """A buffer for a value."""
@@ -97,14 +97,14 @@ class _Buffers:
             self.take(node)
 
 
-def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]]:
+def write_numpy(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]]:
     """One numpy call a line, its result in a buffer that is free again after its last use.
 
     A sum with both signs of a value on branch axes is written half by half, ``a + b`` and ``a - b``. scalar: functions
     that numpy may round another way in its vectorised loops are called number by number.
     Returns the function, which takes the inputs (N,) and the buffers, and what the buffers must be.
     """
-    terms = {id(node): _term(node) for node in recording.nodes}
+    terms = {id(node): _signed_term(node) for node in recording.nodes}
     both_signs, buffers = _both_signs(recording, terms), _Buffers(recording)
     written = [node for node in recording.nodes if id(node) not in both_signs]
     reads = [_operands(node, both_signs) for node in written]
@@ -114,7 +114,7 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
         signed = term if id(term := terms[id(node)]) in both_signs else None
         arguments = [buffers.name(x) for x in node.args] if signed is None else []
         buffers.take_over(node, [x for x in reads[k] if x.op != "input" and last[id(x)] == k])
-        lines += [_call(buffers, node, arguments)] if signed is None else _halves(buffers, node, signed)
+        lines += [_call_line(buffers, node, arguments)] if signed is None else _half_lines(buffers, node, signed)
     parameters = [buffers.names[id(x)] for x in recording.inputs] + [f"b{k}" for k in range(len(buffers.buffers))]
     outputs = list(map(buffers.name, recording.outputs))
     return function_of(parameters, lines, outputs, buffers.constants | _functions(recording, scalar)), buffers.buffers
@@ -122,11 +122,11 @@ def write(recording: Recording, scalar: bool = False) -> tuple[Run, list[Buffer]
 
 def _functions(recording: Recording, scalar: bool) -> dict[str, Any]:
     """What the written lines call, by name; scalar: see `write`."""
-    found: dict[str, Any] = {"where": _where_into, "add": np.add, "subtract": np.subtract, "positive": np.positive}
-    found |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
+    functions: dict[str, Any] = {"where": _where_into, "add": np.add, "subtract": np.subtract, "positive": np.positive}
+    functions |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
     if scalar:
-        found |= {op: partial(_one_by_one, function) for op, function in _ROUNDED.items()}
-    return found | {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in found}
+        functions |= {op: partial(_one_by_one, function) for op, function in _ROUNDED.items()}
+    return functions | {node.op: getattr(np, node.op) for node in recording.nodes if node.op not in functions}
 
 
 def _operands(node: Node, both_signs: set[int]) -> list[Node]:
@@ -140,19 +140,20 @@ def _last_lines(reads: list[list[Node]]) -> dict[int, int]:
     return {id(x): k for k, nodes in enumerate(reads) for x in nodes}
 
 
-def _call(buffers: _Buffers, node: Node, arguments: list[str]) -> str:
+def _call_line(buffers: _Buffers, node: Node, arguments: list[str]) -> str:
     """The line of a function of arguments."""
-    out = "out=" if node.op in ("minimum", "maximum") else ""  # numpy deprecates a positional third argument of these
-    return f"{node.op}({', '.join(arguments)}, {out}{buffers.names[id(node)]})"
+    # numpy deprecates a positional third argument of these
+    prefix = "out=" if node.op in ("minimum", "maximum") else ""
+    return f"{node.op}({', '.join(arguments)}, {prefix}{buffers.names[id(node)]})"
 
 
-def _halves(buffers: _Buffers, node: Node, signed: Node) -> Iterator[str]:
+def _half_lines(buffers: _Buffers, node: Node, signed: Node) -> Iterator[str]:
     """The lines of a sum with both signs of a value, `signed`, one for each half."""
     plain = node.args[0] if signed is node.args[1] else node.args[1]
     factors, value = signed.args
-    for at in np.ndindex(factors.shape[:-1]):
-        half = tuple(i if size > 1 else None for i, size in zip(at, factors.shape, strict=False))
-        factor = factors[at][0] if node.op == "add" else -factors[at][0]
+    for branch in np.ndindex(factors.shape[:-1]):
+        half = tuple(i if size > 1 else None for i, size in zip(branch, factors.shape, strict=False))
+        factor = factors[branch][0] if node.op == "add" else -factors[branch][0]
         if factor == 0:
             yield f"positive({buffers.name(plain, half)}, {buffers.name(node, half)})"
         else:
@@ -161,7 +162,7 @@ def _halves(buffers: _Buffers, node: Node, signed: Node) -> Iterator[str]:
             yield f"{op}({names})"
 
 
-def _term(node: Node) -> Node | None:
+def _signed_term(node: Node) -> Node | None:
     """The argument of a sum that is a value times signs of branches, or times nothing on some."""
     terms = {"add": node.args, "subtract": node.args[1:]}.get(node.op, ())
     return next((x for x in terms[::-1] if branch_signs(x, zeros=True)), None)
@@ -172,21 +173,21 @@ def _both_signs(recording: Recording, terms: dict[int, Node | None]) -> set[int]
     signed = {
         id(x) for node in recording.nodes if (x := terms[id(node)]) is not None and node.args[0] is not node.args[1]
     }
-    asked = {id(x) for node in recording.nodes for x in node.args if x is not terms[id(node)]}
-    return signed - asked - {id(x) for x in recording.outputs}
+    read_plainly = {id(x) for node in recording.nodes for x in node.args if x is not terms[id(node)]}
+    return signed - read_plainly - {id(x) for x in recording.outputs}
 
 
-def _flip(axis: int, a: Any, out: NDArray[Any]) -> None:
+def _flip(axis: int, a: Any, buffer: NDArray[Any]) -> None:
     """`numpy.flip` into a buffer that is not that of a."""
-    np.copyto(out, np.flip(a, axis))
+    np.copyto(buffer, np.flip(a, axis))
 
 
-def _where_into(mask: Any, a: Any, b: Any, out: NDArray[Any]) -> None:
+def _where_into(mask: Any, a: Any, b: Any, buffer: NDArray[Any]) -> None:
     """`numpy.where` into a buffer, which may be that of a or b."""
-    np.copyto(out, np.where(mask, a, b))
+    np.copyto(buffer, np.where(mask, a, b))
 
 
 def _one_by_one(function: Any, *arguments: Any) -> None:
     """A function of numbers into a buffer, the last argument."""
-    *values, out = arguments
-    out[...] = function(*values)
+    *values, buffer = arguments
+    buffer[...] = function(*values)

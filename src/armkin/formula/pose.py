@@ -37,25 +37,25 @@ def slide(P: Pose, d: Entry) -> Pose:
     return [*P[:9], *combine(d, P[6:9], 1.0, P[9:12])]
 
 
-def times(P: Pose, Q: Pose) -> Pose:
+def compose(P: Pose, Q: Pose) -> Pose:
     """``P Q``."""
     x, y, z, p = P[0:3], P[3:6], P[6:9], P[9:12]
-    out: Pose = []
+    product: Pose = []
     for k in (0, 3, 6, 9):
         column = combine(Q[k], x, Q[k + 1], y)
         column = combine(1.0, column, Q[k + 2], z)
         if k == 9:
             column = combine(1.0, column, 1.0, p)
-        out += column
-    return out
+        product += column
+    return product
 
 
 def apply(P: Pose, v: Sequence[Entry]) -> list[Entry]:
     """``P v`` for a point v."""
-    return combine(1.0, turn(P, v), 1.0, P[9:12])
+    return combine(1.0, turn_direction(P, v), 1.0, P[9:12])
 
 
-def turn(P: Pose, v: Sequence[Entry]) -> list[Entry]:
+def turn_direction(P: Pose, v: Sequence[Entry]) -> list[Entry]:
     """``R v`` for a direction v, R the rotation of P."""
     return combine(1.0, combine(v[0], P[0:3], v[1], P[3:6]), v[2], P[6:9])
 
@@ -71,13 +71,13 @@ def inverse(P: Pose) -> Pose:
     return [P[0], P[3], P[6], P[1], P[4], P[7], P[2], P[5], P[8], *(mul(-1.0, e) for e in t)]
 
 
-def write(P: Pose, out: Array) -> None:
+def write_pose(P: Pose, matrices: Array) -> None:
     """Write a pose into ``out (..., 4, 4)``; entries broadcast."""
     entry: Any  # numpy takes any
     for k, entry in enumerate(P):
-        out[..., k % 3, k // 3] = entry
-    out[..., 3, :3] = 0.0
-    out[..., 3, 3] = 1.0
+        matrices[..., k % 3, k // 3] = entry
+    matrices[..., 3, :3] = 0.0
+    matrices[..., 3, 3] = 1.0
 
 
 def read_one(T: Array) -> list[float]:
@@ -86,7 +86,7 @@ def read_one(T: Array) -> list[float]:
     return [rows[row][column] for column in range(4) for row in range(3)]
 
 
-def read(T: Array) -> Pose:
+def read_pose(T: Array) -> Pose:
     """The entries of ``T (N, 4, 4)`` as contiguous arrays of length N."""
     flat = np.ascontiguousarray(T[:, :3, :].reshape(len(T), 12).T)
     return [flat[row * 4 + column] for column in range(4) for row in range(3)]

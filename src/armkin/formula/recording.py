@@ -24,10 +24,10 @@ COMMUTING = {"multiply", "add", "bitwise_or", "bitwise_and"}
 FLIPS = {f"flip_{axis}": axis for axis in range(3)}  # the same values, of the other branch
 
 
-def flipped(op: str, index: tuple[int, ...], axes: tuple[int, ...]) -> tuple[int, ...]:
+def index_before_flip(op: str, index: tuple[int, ...], axes: tuple[int, ...]) -> tuple[int, ...]:
     """Where the value that stands on a branch after a flip stood before it.
 
-    >>> flipped("flip_1", (0, 0, 0), (2, 2, 1))
+    >>> index_before_flip("flip_1", (0, 0, 0), (2, 2, 1))
     (0, 1, 0)
     """
     axis = FLIPS[op]
@@ -76,7 +76,7 @@ class Trace:
         Signs are those of branches, too: ``(s a) (s b)`` is computed once for both values of s.
         """
         if op in ("bitwise_and", "bitwise_or"):
-            return self._of_truths(op, *inputs)
+            return self._combine_truths(op, *inputs)
         if op == "power" and inputs[1] == 2:
             return self.simplify("multiply", (inputs[0], inputs[0]))
         if op not in ODD and op not in ("negative", "absolute", "multiply", "divide", "add", "subtract"):
@@ -85,56 +85,56 @@ class Trace:
 
     def _signs_outwards(self, op: str, inputs: Sequence[Any]) -> Any:
         """Record an operation on what its arguments are without their signs."""
-        (s, a), (t, b) = _split(inputs[0]), _split(inputs[-1])
+        (s, a), (t, b) = _split_sign(inputs[0]), _split_sign(inputs[-1])
         if op == "negative":
-            return self._signed(a, -s)
+            return self._apply_sign(a, -s)
         if op == "absolute":
             return self.record(op, (a,))
         if op in ODD:
-            return self._signed(self.record(op, (a, *inputs[1:])), s)
+            return self._apply_sign(self.record(op, (a, *inputs[1:])), s)
         if op == "divide":
-            return self._signed(self.record(op, (a, b)), _product(s, t))
+            return self._apply_sign(self.record(op, (a, b)), _sign_product(s, t))
         if op == "multiply":
-            return self._times(a, b, _product(s, t))
+            return self._multiply(a, b, _sign_product(s, t))
         return self._sum(s, a, -t if op == "subtract" else t, b)
 
-    def _of_truths(self, op: str, x: Any, y: Any) -> Any:
+    def _combine_truths(self, op: str, x: Any, y: Any) -> Any:
         """``x & y`` or ``x | y``: without an operation where one of the two is known."""
-        for known, other in ((x, y), (y, x)):
-            if isinstance(known, bool | np.bool_):  # of two constants
-                return other if bool(known) == (op == "bitwise_and") else bool(known)
+        for constant, value in ((x, y), (y, x)):
+            if isinstance(constant, bool | np.bool_):  # of two constants
+                return value if bool(constant) == (op == "bitwise_and") else bool(constant)
         return self.record(op, (x, y))
 
-    def _times(self, a: Any, b: Any, sign: Sign) -> Any:
+    def _multiply(self, a: Any, b: Any, sign: Sign) -> Any:
         """``sign a b``."""
         for x, y in ((a, b), (b, a)):
             if not isinstance(x, Node) and _ndim(x) == 0 and abs(x) in (0.0, 1.0):
-                return self._signed(y, _product(sign, x)) if x else 0.0
-        return self._signed(self._product(a, b), sign)
+                return self._apply_sign(y, _sign_product(sign, x)) if x else 0.0
+        return self._apply_sign(self._product(a, b), sign)
 
     def _sum(self, s: Sign, a: Any, t: Sign, b: Any) -> Any:
         """``s a + t b``."""
         if _is_zero(b):
-            return self._signed(a, s)
+            return self._apply_sign(a, s)
         if _is_zero(a):
-            return self._signed(b, t)
+            return self._apply_sign(b, t)
         if _ndim(s) and not _ndim(t):
             s, a, t, b = t, b, s, a
-        relative = _product(s, t)
+        relative = _sign_product(s, t)
         if _ndim(relative):
-            return self._signed(self.record("add", (a, self._signed(b, relative))), s)
+            return self._apply_sign(self.record("add", (a, self._apply_sign(b, relative))), s)
         if relative > 0:
-            return self._signed(self.record("add", (a, b)), s)
+            return self._apply_sign(self.record("add", (a, b)), s)
         if a is b:
             return 0.0
         if _ndim(s) == 0 and s < 0:
             return self.record("subtract", (b, a))
-        return self._signed(self.record("subtract", (a, b)), s)
+        return self._apply_sign(self.record("subtract", (a, b)), s)
 
-    def _signed(self, x: Any, sign: Sign) -> Any:
+    def _apply_sign(self, x: Any, sign: Sign) -> Any:
         """``sign x``."""
-        own, x = _split(x)
-        sign = _product(sign, own)
+        own_sign, x = _split_sign(x)
+        sign = _sign_product(sign, own_sign)
         if not isinstance(x, Node):
             return sign * x
         if _ndim(sign):
@@ -152,19 +152,19 @@ class Trace:
 
     def record(self, op: str, inputs: Sequence[Any]) -> Node:
         """The node of an operation, which is one for equal inputs."""
-        if op in COMMUTING and _place(inputs[0]) > _place(inputs[1]):
+        if op in COMMUTING and _commuting_key(inputs[0]) > _commuting_key(inputs[1]):
             inputs = inputs[::-1]  # equal ones have equal keys: constants first, then what was recorded first
         key = (op, *[id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs])
-        found = self.nodes_by_key.get(key)
-        if found is None:
+        node = self.nodes_by_key.get(key)
+        if node is None:
             shapes = {axes_of(x) for x in inputs} - {()}
             axes = np.broadcast_shapes(*shapes) if len(shapes) > 1 else next(iter(shapes), ())
-            found = self.nodes_by_key[key] = Node(self, op, tuple(inputs), axes, len(self.nodes))
-            self.nodes.append(found)
-        return found
+            node = self.nodes_by_key[key] = Node(self, op, tuple(inputs), axes, len(self.nodes))
+            self.nodes.append(node)
+        return node
 
 
-def _place(x: Any) -> float:
+def _commuting_key(x: Any) -> float:
     return x.number if isinstance(x, Node) else -math.inf
 
 
@@ -181,16 +181,16 @@ def branch_signs(x: Any, zeros: bool = False) -> bool:
     return bool(((size == 1.0) | (zeros & (size == 0.0))).all())
 
 
-def _split(x: Any) -> tuple[Sign, Any]:
+def _split_sign(x: Any) -> tuple[Sign, Any]:
     """A value as a sign and what is left: minus moves out of nodes, signs of branches out of nodes and constants."""
     if isinstance(x, Node):
         return (-1.0, x.args[0]) if x.op == "negative" else x.args if branch_signs(x) else (1.0, x)
     if _ndim(x) and np.all(abs(x) == abs(x).flat[0]) and x.flat[0]:
-        return _product(np.sign(x), 1.0), abs(float(x.flat[0]))
+        return _sign_product(np.sign(x), 1.0), abs(float(x.flat[0]))
     return 1.0, x
 
 
-def _product(s: Sign, t: Sign) -> Sign:
+def _sign_product(s: Sign, t: Sign) -> Sign:
     """The product of two signs, without branch axes on which it is the same."""
     sign = s * t
     for axis in range(_ndim(sign)):

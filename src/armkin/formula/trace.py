@@ -37,30 +37,30 @@ class StraightLineCode:
 
     def at_once(self) -> int:
         """How many poses are worked on at once: fewer than `CHUNK` where buffers of so many would leave the cache."""
-        each = sum(math.prod(b.axes) * np.dtype(b.dtype).itemsize for b in self._written()[1] if b.full_index < 0)
-        return min(arrays.CHUNK, max(CACHE // each, SMALL))
+        size = sum(math.prod(b.axes) * np.dtype(b.dtype).itemsize for b in self._numpy_code()[1] if b.full_index < 0)
+        return min(arrays.CHUNK, max(CACHE // size, SMALL))
 
-    def _written(self) -> tuple[numpy_code.Run, list[numpy_code.Buffer]]:
+    def _numpy_code(self) -> tuple[numpy_code.Run, list[numpy_code.Buffer]]:
         """The code for batches, and what buffers it needs."""
         from armkin.formula import numpy_code
 
         if self._batch is None:
-            self._batch = numpy_code.write(self._recording)
+            self._batch = numpy_code.write_numpy(self._recording)
         return self._batch
 
     def workspace(self, length: int) -> list[NDArray[Any]]:
         """Buffers for batches of that length, to be passed to `run`; every thread has its own, and keeps small ones."""
         from armkin.formula import numpy_code
 
-        _, needed = self._written()
-        kept: dict[int, list[NDArray[Any]]] = self._thread_buffers.__dict__.setdefault("buffers", {})
-        if length in kept:
-            return kept[length]
+        _, needed = self._numpy_code()
+        stored: dict[int, list[NDArray[Any]]] = self._thread_buffers.__dict__.setdefault("buffers", {})
+        if length in stored:
+            return stored[length]
         buffers = numpy_code.workspace(needed, length)
         if length <= SMALL:
-            if len(kept) >= LENGTHS:
-                kept.clear()
-            kept[length] = buffers
+            if len(stored) >= LENGTHS:
+                stored.clear()
+            stored[length] = buffers
         return buffers
 
     def run(self, inputs: Sequence[Any], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
@@ -74,12 +74,12 @@ class StraightLineCode:
         finally:
             np.setbufsize(before)
 
-    def exactly(self, inputs: Sequence[Any]) -> list[Array]:
+    def run_exactly(self, inputs: Sequence[Any]) -> list[Array]:
         """The formula's outputs for inputs (N,), to the last digit those of `numbers`, in arrays of their own."""
         from armkin.formula import numpy_code
 
         if self._exact is None:
-            self._exact = numpy_code.write(self._recording, scalar=True)
+            self._exact = numpy_code.write_numpy(self._recording, scalar=True)
         run, buffers = self._exact
         return [np.array(x) for x in run(*inputs, *numpy_code.workspace(buffers, len(inputs[0])))]
 
@@ -94,13 +94,13 @@ class StraightLineCode:
         if self._run_single is None:
             from armkin.formula import python_code
 
-            self._run_single = python_code.write(self._recording)
+            self._run_single = python_code.write_python(self._recording)
         return self._run_single
 
     def one_by_one(self, inputs: Sequence[Sequence[float]]) -> list[Array]:
         """The formula's outputs for N poses in plain Python, (N, inputs), as arrays (*branch axes, N)."""
         numbers = self.numbers()
-        outputs = zip(*(numbers(*one) for one in inputs), strict=True)
+        outputs = zip(*(numbers(*pose_inputs) for pose_inputs in inputs), strict=True)
         return [
             np.array(values).reshape(len(inputs), -1).T.reshape(*axes, len(inputs))
             for axes, values in zip(self.axes(), outputs, strict=True)
@@ -121,9 +121,9 @@ class LazyCode:
     def get(self, batch: int) -> StraightLineCode | None:
         """The recorded code for a batch of that many poses; None while it is not recorded."""
         self._calls += 1
-        return self.always() if batch >= 64 or self._calls > 4 or self._code is not None else None
+        return self.record_now() if batch >= 64 or self._calls > 4 or self._code is not None else None
 
-    def always(self) -> StraightLineCode:
+    def record_now(self) -> StraightLineCode:
         """The recorded code, recorded now if it is not yet."""
         if self._code is None:
             self._code = StraightLineCode(self._formula, self._inputs)

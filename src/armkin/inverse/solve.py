@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.formula import arrays
-from armkin.formula.array_tuples import replaced, rows_of, stacked
+from armkin.formula.array_tuples import replace_rows, rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
 from armkin.inverse.answers import rounding as target_rounding
@@ -83,7 +83,7 @@ def ik(
     if workers != 1:
         check(workers)
     free = redundancy(arm, task)
-    values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
+    values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
     if (
         rounding is None
         and not (single or position_first)
@@ -172,7 +172,7 @@ def isolated(arm: Arm, targets: ArrayLike, task: str | None = None, **more: Any)
 
 def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
     """Commanded values as actual ones; what has a wrong shape is left for `ik` to refuse."""
-    close = None if near is None else arrays.real(near, "near")
+    close = None if near is None else arrays.real_array(near, "near")
     return close * arm.ratio if close is not None and close.shape[-1:] == (arm.n,) else close
 
 
@@ -191,11 +191,11 @@ def _by_slower_class(
     assert geometry is not None
     part = arm, task, target, near = goals.of(left)
     if not geometry.pairs:
-        return replaced(batch, left, _row_by_row(part, geometry, examine, workers)[0])
+        return replace_rows(batch, left, _row_by_row(part, geometry, examine, workers)[0])
     solved, _, target, _, more = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
     if len(more):
         solved = _by_slower_class(part._replace(target=target), geometry.doubts, solved, more, examine, workers)
-    return replaced(batch, left, solved)
+    return replace_rows(batch, left, solved)
 
 
 def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -> tuple[Batch, int]:
@@ -204,7 +204,7 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     arm, task, target, near = goals
     solve = (geometry.unmoved if examine else None) or geometry.rows
     parts = shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
-    q, doubt, complete, lost, guesses = stacked(parts)
+    q, doubt, complete, lost, guesses = stack_rows(parts)
     B = q.shape[1]
     batch = empty(len(target), B, arm.n)
     batch.q[...], inside = nearest_row(arm, q, near[:, None, :])

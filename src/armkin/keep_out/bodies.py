@@ -145,5 +145,5 @@ def ends_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
         for k in np.flatnonzero(form.owner == i + 1):
             entries += pose.apply(before if form.slide[k] else P, [float(x) for x in form.begin[k]])
             entries += pose.apply(P, [float(x) for x in form.end[k]])
-        P = pose.times(P, pose.constant(arm.link[i + 1]))
+        P = pose.compose(P, pose.constant(arm.link[i + 1]))
     return entries

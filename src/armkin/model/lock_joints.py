@@ -40,7 +40,7 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     """
     for name, value in held.items():
         joint_index(arm, name)
-        number = arrays.real(value, name)
+        number = arrays.real_array(value, name)
         if number.ndim or not np.isfinite(number):
             raise UsageError(f"{name} cannot be held at {value}: give one finite number")
     if len(held) >= arm.n:
@@ -105,7 +105,7 @@ def unlock(arm: Arm, held: Mapping[str, float], q: ArrayLike) -> Array:
         joint_index(arm, name)
         if not isinstance(value, int | float | np.number):
             raise UsageError(f"{name} cannot be held at {value!r}: give a number", joint=name)
-    values = arrays.real(q, "joint values")
+    values = arrays.real_array(q, "joint values")
     if values.ndim == 0 or values.shape[-1] != arm.n - len(held):
         raise UsageError(f"expected the {arm.n - len(held)} joint values that are not held, got shape {values.shape}")
     missing = np.isnan(values).any(axis=-1)

@@ -92,10 +92,10 @@ def export(
 def _write_urdf(arm: Arm, out: str | None) -> None:
     import numpy as np
 
-    from armkin.export.urdf_writer import urdf
+    from armkin.export.urdf_writer import urdf_text
 
     with output.destination(out) as write:
-        write(urdf(arm))
+        write(urdf_text(arm))
     if slow := [name for name, speed in zip(arm.joint_names, arm.max_speed, strict=True) if np.isnan(speed)]:
         output.note(f"velocity is 0 for {', '.join(slow)}: the robot file has no max_speed there")
 
@@ -115,10 +115,10 @@ def _write_table(arm: Arm, convention: str, out: str | None) -> None:
 
 
 def _write_json(arm: Arm, out: str | None) -> None:
-    from armkin.export.arm_json import numbers
+    from armkin.export.arm_json import arm_numbers
 
     with output.destination(out) as write:
-        write(f"{render.to_json({**render.head(arm), **numbers(arm)})}\n")
+        write(f"{render.to_json({**render.head(arm), **arm_numbers(arm)})}\n")
 
 
 def _write_js(arm: Arm, task: str | None, out: str | None) -> None:

@@ -23,7 +23,7 @@ def goal_size(task: Task) -> int:
     return 12 if task.orientation == "full" else len(task.labels)
 
 
-def candidates(
+def record_candidates(
     arm: Arm, task: Task, geometry: Geometry, prefer: bool = True, measured: bool = False
 ) -> recording.Recording:
     """A closed form's candidates: joint values, their squared residual, doubt.
@@ -37,18 +37,18 @@ def candidates(
     def formula(inputs: list[Any]) -> list[Any]:
         held: list[Pair | None] = [None] * n
         if prefer:
-            at = entries
+            index = entries
             for j in range(n):
-                held[j] = Pair(inputs[at], None) if arm.prismatic[j] else Pair(inputs[at], inputs[at + 1])
-                at += 1 if arm.prismatic[j] else 2
-        of = recorded.measured if measured else recorded.candidates
-        found = of(inputs[:entries], held)
-        return found[:-1] if prefer else found
+                held[j] = Pair(inputs[index], None) if arm.prismatic[j] else Pair(inputs[index], inputs[index + 1])
+                index += 1 if arm.prismatic[j] else 2
+        recorded_formula = recorded.measured if measured else recorded.candidates
+        outputs = recorded_formula(inputs[:entries], held)
+        return outputs[:-1] if prefer else outputs
 
     return recording.record(formula, entries + (sum(1 if p else 2 for p in arm.prismatic) if prefer else 0))
 
 
-def target(arm: Arm, task: Task) -> recording.Recording:
+def record_target(arm: Arm, task: Task) -> recording.Recording:
     """The target that joint values answer, as people give it: a pose row by row, or the task's numbers."""
 
     def formula(q: list[Any]) -> list[Any]:
@@ -66,10 +66,10 @@ def target(arm: Arm, task: Task) -> recording.Recording:
 def by_branch(recorded: recording.Recording, code: Code) -> list[list[str]]:
     """The expressions of every output, one for every branch of all branch axes."""
     shape = np.broadcast_shapes((1, 1, 1), *(recording.axes_of(x) for x in recorded.outputs))
-    return [_spread(x, texts, shape) for x, texts in zip(recorded.outputs, code.outputs, strict=True)]
+    return [_spread_over_branches(x, texts, shape) for x, texts in zip(recorded.outputs, code.outputs, strict=True)]
 
 
-def _spread(node: Any, texts: list[str], shape: tuple[int, ...]) -> list[str]:
+def _spread_over_branches(node: Any, texts: list[str], shape: tuple[int, ...]) -> list[str]:
     """An output's expressions for every branch of all branch axes."""
     index = np.arange(len(texts)).reshape(recording.axes_of(node) or (1,))
     return [texts[k] for k in np.broadcast_to(index, shape).ravel()]

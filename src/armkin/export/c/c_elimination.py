@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armkin.export.c.source_parts import part
+from armkin.export.c.source_parts import part_text
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.elimination.choose_variable import Kind
@@ -61,7 +61,7 @@ def plans_of(elimination: Elimination, passes: int) -> list[tuple[Pencil, ...]]:
     """The pencils of poses of each kind: the first two are the kind's own, if they have a form, to keep data few."""
     every = [elimination.of_kind(kind)[:OWN] for kind in Kind]
     usual = elimination.plans[:passes]
-    return [(*own, *usual[OWN:]) if all(map(_is_read, own)) else usual for own in every]
+    return [(*pencils, *usual[OWN:]) if all(map(_is_read, pencils)) else usual for pencils in every]
 
 
 def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list[int]]]:
@@ -71,7 +71,7 @@ def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list
     return list(every.values()), [[place[pencil.role, pencil.psi] for pencil in plans] for plans in kinds]
 
 
-def candidates(
+def candidates_code(
     arm: Arm,
     task: Task,
     elimination: Elimination,
@@ -89,29 +89,30 @@ def candidates(
     loop, passes = elimination.loop, len(kinds[0])
     numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2, "BESIDE": BESIDE_SPECIAL, **_NAMED}
     numbers |= {"MAIN_TILT": TILT[0], "LATER_TILT": TILT[1], "REGULAR": REGULAR, "STEADY": STEADY}
-    lines = [f"#define ARM_{name} {value}" for name, value in _sizes(pencils, passes).items()]
-    lines += [f"#define ARM_{name} {c_and_js_code.number(value)}" for name, value in numbers.items()]
+    lines = [f"#define ARM_{name} {value}" for name, value in _array_sizes(pencils, passes).items()]
+    lines += [f"#define ARM_{name} {c_and_js_code.number_text(value)}" for name, value in numbers.items()]
     moves = np.concatenate(moves_of(passes))
     lines += [
         "",
         "/* The chain, lengths in ARM_LENGTH, its frames moved along the axes to where the links are short. */",
-        _array("from_base", frame(inverse(loop.base))),
-        _array("from_tool", frame(inverse(loop.tool))),
-        _array("loop_links", np.concatenate([frame(link) for link in loop.links])),
-        _flags("loop_slides", loop.prismatic),
-        _array("weights", weights(5 if task.orientation == "axis" else 6)),
-        _array("shakes", SHAKES[:passes]),
-        _array("shaking", moves),
+        _array_code("from_base", frame_rows(inverse(loop.base))),
+        _array_code("from_tool", frame_rows(inverse(loop.tool))),
+        _array_code("loop_links", np.concatenate([frame_rows(link) for link in loop.links])),
+        _flags_code("loop_slides", loop.prismatic),
+        _array_code("weights", weights(5 if task.orientation == "axis" else 6)),
+        _array_code("shakes", SHAKES[:passes]),
+        _array_code("shaking", moves),
         "",
-        *(_pencil(k, pencil) for k, pencil in enumerate(pencils)),
+        *(_pencil_code(k, pencil) for k, pencil in enumerate(pencils)),
         f"static const arm_pencil arm_pencils[] = {{{', '.join(f'ARM_PENCIL_{k}' for k in range(len(pencils)))}}};",
-        _flags("plan", [number for plan in numbers_of for number in plan]),
+        _flags_code("plan", [number for plan in numbers_of for number in plan]),
         "",
     ]
-    first = part("first_pass")
+    first = part_text("first_pass")
     if lanes and not loop.prismatic.any():
         first = f"#ifdef ARM_MANY\n{lanes}#else\n{first}#endif\n"
-    text = part("pencil") + "\n".join(lines) + "\n" + "".join(map(part, _METHOD)) + first + part("candidates")
+    text = part_text("pencil") + "\n".join(lines) + "\n" + "".join(map(part_text, _METHOD)) + first
+    text += part_text("candidates")
     if task.orientation == "axis":
         text = text.replace("arm_candidates", "arm_six_candidates") + _with_virtual_joint()
     if held is not None:
@@ -120,7 +121,7 @@ def candidates(
     return text
 
 
-def _sizes(pencils: list[Pencil], passes: int) -> dict[str, int]:
+def _array_sizes(pencils: list[Pencil], passes: int) -> dict[str, int]:
     """How large arrays of the method are."""
     return {
         "PASSES": passes,
@@ -136,8 +137,8 @@ def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:
     """A pencil's numbers, rows of fifteen sixteen apart; None for those that its slot has not."""
     slot, ends = pencil.role.slot, pencil.ends
     return {
-        "links": np.concatenate([frame(link) for link in pencil.links]),
-        "first": _first(slot, ends.factors) if slot != 1 else None,
+        "links": np.concatenate([frame_rows(link) for link in pencil.links]),
+        "first": _first_factor(slot, ends.factors) if slot != 1 else None,
         "second": _by_fours(ends.factors[1]) if slot == 0 else None,
         "N": _by_fours(ends.N) if slot == 1 else None,
         "recover": _by_fours(ends.recover) if slot == 1 else None,
@@ -151,17 +152,17 @@ def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:
 
 def moves_of(passes: int) -> list[Array]:
     """How each pass moves the pose, as frames."""
-    return [frame(shaken_goal(np.eye(4), shake)) for shake in SHAKES[:passes]]
+    return [frame_rows(shaken_goal(np.eye(4), shake)) for shake in SHAKES[:passes]]
 
 
-def _pencil(number: int, pencil: Pencil) -> str:
+def _pencil_code(number: int, pencil: Pencil) -> str:
     """One pencil's arrays, and the macro that initialises its struct."""
     slot, ends, arrays = pencil.role.slot, pencil.ends, pencil_arrays(pencil)
-    texts = [_array(f"{name}_{number}", values) for name, values in arrays.items() if values is not None]
+    texts = [_array_code(f"{name}_{number}", values) for name, values in arrays.items() if values is not None]
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     role = pencil.role
     fields = [
-        c_and_js_code.number(float(pencil.psi)),
+        c_and_js_code.number_text(float(pencil.psi)),
         *map(
             str,
             (slot, int(role.backward), role.hidden, role.dialytic, int(role.wide), 15 - ends.rank, r, w, pencil.size),
@@ -173,7 +174,7 @@ def _pencil(number: int, pencil: Pencil) -> str:
     return "\n".join([*texts, f"#define ARM_PENCIL_{number} {{{', '.join(fields)}}}", ""])
 
 
-def _first(slot: int, factors: tuple[Array, ...]) -> Array:
+def _first_factor(slot: int, factors: tuple[Array, ...]) -> Array:
     """The first factor of Q, its matrices transposed: (3, 15, 16) in slot La, (15, 9 * 16) in slot Le."""
     matrices = factors[0].reshape(-1, 15, 15)
     if slot == 0:
@@ -188,35 +189,37 @@ def _by_fours(rows: Array) -> Array:
 
 def _with_virtual_joint() -> str:
     """`arm_candidates` of five joints and the tool's axis, by way of the pose that `solvers.tool_axis` makes."""
-    code = c_and_js_code.write(recording.record(tool_axis.pose_of, 6), [f"axis[{k} * ARM_LANES + i]" for k in range(6)])
+    code = c_and_js_code.write_code(
+        recording.record(tool_axis.pose_of, 6), [f"axis[{k} * ARM_LANES + i]" for k in range(6)]
+    )
     lines = [*code.lines, *(f"goal[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
-    return part("virtual_joint").replace("@lines@", "\n        ".join(lines))
+    return part_text("virtual_joint").replace("@lines@", "\n        ".join(lines))
 
 
 def _with_held_joint(arm: Arm, held: Redundancy) -> str:
     """`arm_candidates` of a whole arm whose redundant joint is held where near has it."""
     size = 12 if held.task.orientation == "full" else len(held.task.labels)
     inputs = [f"goal[{k} * ARM_LANES + i]" for k in range(size)]
-    own = f"near[{held.joint} * ARM_LANES + i]"
-    inputs += [f"ARM_COS({own})", f"ARM_SIN({own})"]
+    held_value = f"near[{held.joint} * ARM_LANES + i]"
+    inputs += [f"ARM_COS({held_value})", f"ARM_SIN({held_value})"]
     recorded = recording.record(lambda x: moved_entries(arm, held, x[:size], Pair(*x[size:])), len(inputs))
-    code = c_and_js_code.write(recorded, inputs)
+    code = c_and_js_code.write_code(recorded, inputs)
     lines = [*code.lines, *(f"others[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
-    text = part("held_joint").replace("@lines@", "\n        ".join(lines))
+    text = part_text("held_joint").replace("@lines@", "\n        ".join(lines))
     return text.replace("@held@", str(held.joint)).replace("@others@", str(arm.n - 1)).replace("@goal@", str(size))
 
 
-def frame(motion: ArrayLike) -> np.ndarray:
+def frame_rows(motion: ArrayLike) -> np.ndarray:
     """The upper three rows of a motion (4, 4), flat."""
     return np.asarray(motion, dtype=float)[:3].ravel()
 
 
-def _array(name: str, values: ArrayLike) -> str:
-    flat = [c_and_js_code.number(float(v)) for v in np.asarray(values, dtype=float).ravel()]
+def _array_code(name: str, values: ArrayLike) -> str:
+    flat = [c_and_js_code.number_text(float(v)) for v in np.asarray(values, dtype=float).ravel()]
     rows = [", ".join(flat[k : k + 5]) for k in range(0, len(flat), 5)]
     return f"static const double arm_{name}[{len(flat)}] = {{\n    " + ",\n    ".join(rows) + "};"
 
 
-def _flags(name: str, values: Iterable[int]) -> str:
+def _flags_code(name: str, values: Iterable[int]) -> str:
     numbers = [str(int(v)) for v in values]
     return f"static const unsigned char arm_{name}[{len(numbers)}] = {{{', '.join(numbers)}}};"

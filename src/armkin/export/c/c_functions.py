@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True) -> tuple[str, int]:
+def candidates_code(
+    arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True
+) -> tuple[str, int]:
     """`arm_candidates` of a closed form, and how many branches it has.
 
     prefer: joints that a target leaves free take their value from `near`; without, such a target is only in doubt, 3
@@ -29,10 +31,10 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
     """
     n = arm.n
     declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(arm_formulas.goal_size(task))]
-    declared += _preferred(arm) if prefer else []
+    declared += _preferred_inputs(arm) if prefer else []
     with recorded_for(SINGLE if single else DOUBLE):
-        recorded = arm_formulas.candidates(arm, task, geometry, prefer)
-    code = c_and_js_code.write(recorded, [name for name, _ in declared], _language(single))
+        recorded = arm_formulas.record_candidates(arm, task, geometry, prefer)
+    code = c_and_js_code.write_code(recorded, [name for name, _ in declared], _language(single))
     outputs = arm_formulas.by_branch(recorded, code)
     values, miss = outputs[:n], outputs[n]
     stores = [f"q[{b * n + j} * ARM_LANES + i] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
@@ -43,11 +45,11 @@ def candidates(arm: Arm, task: Task, geometry: Geometry, single: bool = False, p
         "static void arm_candidates(const arm_real *ARM_RESTRICT goal, const arm_real *ARM_RESTRICT near,\n"
         "    arm_real *ARM_RESTRICT q, arm_real *ARM_RESTRICT miss, int *ARM_RESTRICT doubt, int count)"
     )
-    text = _loop(head, declared, [*code.lines, *stores])
+    text = _lane_loop(head, declared, [*code.lines, *stores])
     return (text if "near[" in text else text.replace("int i;", "int i;\n    (void)near;", 1)), len(miss)
 
 
-def _preferred(arm: Arm) -> list[tuple[str, str]]:
+def _preferred_inputs(arm: Arm) -> list[tuple[str, str]]:
     """Names of what a joint that is free is set to, and what they are: a slide's `near`, of a turn cosine and sine."""
     declared = []
     for j in range(arm.n):
@@ -64,42 +66,42 @@ def _any_true(texts: Sequence[str]) -> str:
 
 def forward_kinematics(arm: Arm, single: bool = False) -> str:
     """`arm_pose`, of 16 numbers row by row."""
-    return of_joints(arm, "arm_pose", forward.tip_formula, "T", single)
+    return joint_function_code(arm, "arm_pose", forward.tip_formula, "T", single)
 
 
-def position(arm: Arm) -> str:
+def position_code(arm: Arm) -> str:
     """`arm_point`, of 3 numbers."""
-    return of_joints(arm, "arm_point", forward.point_formula, "p", False)
+    return joint_function_code(arm, "arm_point", forward.point_formula, "p", False)
 
 
-def jacobian(arm: Arm, single: bool = False) -> str:
+def jacobian_code(arm: Arm, single: bool = False) -> str:
     """`arm_slope`, of 6 n numbers row by row."""
-    return of_joints(arm, "arm_slope", forward.jacobian_formula, "J", single)
+    return joint_function_code(arm, "arm_slope", forward.jacobian_formula, "J", single)
 
 
-def target(arm: Arm, task: Task, single: bool = False) -> str:
+def target_code(arm: Arm, task: Task, single: bool = False) -> str:
     """`arm_goal`, the target that joint values answer."""
-    return _recorded(arm_formulas.target(arm, task), "arm_goal", "target", single)
+    return _recorded_code(arm_formulas.record_target(arm, task), "arm_goal", "target", single)
 
 
-def of_joints(arm: Arm, name: str, formula: forward.Formula, out: str, single: bool) -> str:
+def joint_function_code(arm: Arm, name: str, formula: forward.Formula, output: str, single: bool) -> str:
     """A function of joint values."""
-    return _recorded(recording.record(lambda q: formula(arm, q), arm.n), name, out, single)
+    return _recorded_code(recording.record(lambda q: formula(arm, q), arm.n), name, output, single)
 
 
-def _recorded(recorded: recording.Recording, name: str, out: str, single: bool) -> str:
+def _recorded_code(recorded: recording.Recording, name: str, output: str, single: bool) -> str:
     declared = [(f"q{j}", f"q[{j} * ARM_LANES + i]") for j in range(len(recorded.inputs))]
-    code = c_and_js_code.write(recorded, [name for name, _ in declared], _language(single))
-    stores = [f"{out}[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs)]
-    head = f"static void {name}(const arm_real *ARM_RESTRICT q, arm_real *ARM_RESTRICT {out}, int count)"
-    return _loop(head, declared, [*code.lines, *stores])
+    code = c_and_js_code.write_code(recorded, [name for name, _ in declared], _language(single))
+    stores = [f"{output}[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs)]
+    head = f"static void {name}(const arm_real *ARM_RESTRICT q, arm_real *ARM_RESTRICT {output}, int count)"
+    return _lane_loop(head, declared, [*code.lines, *stores])
 
 
 def _language(single: bool) -> c_and_js_code.Language:
     return c_and_js_code.C_SINGLE if single else c_and_js_code.C
 
 
-def _loop(head: str, declared: Sequence[tuple[str, str]], lines: Sequence[str]) -> str:
+def _lane_loop(head: str, declared: Sequence[tuple[str, str]], lines: Sequence[str]) -> str:
     """A function that runs the lines for every lane; inputs that they do not read are not declared."""
     read = set(re.findall(r"\b[gpcsq]\d+\b", "\n".join(lines)))
     inputs = [f"const arm_real {name} = {text};" for name, text in declared if name in read]

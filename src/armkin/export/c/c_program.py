@@ -10,9 +10,9 @@ from armkin import __version__
 from armkin.errors import UsageError
 from armkin.export.c import arm_formulas, c_elimination, c_functions, keep_out_tables
 from armkin.export.c.golden_values import golden_test
-from armkin.export.c.source_parts import part
+from armkin.export.c.source_parts import part_text
 from armkin.formula.arrays import Array
-from armkin.formula.c_and_js_code import number
+from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.numeric.tolerances import CLOSE_BY, DECIMAL, FLOAT32
 from armkin.inverse.solvers import general
@@ -48,18 +48,18 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     """
     turned = actual(arm)  # branches are found, and limits hold, in actual joint values
     task, geometry, spare, numbered = _class_of(turned, task_name)
-    solve, branches = candidates(turned, task, geometry, single, held=spare)
+    solve, branches = candidates_code(turned, task, geometry, single, held=spare)
     names = branch_names(turned, task, geometry, branches)
     prefix = identifier(arm.name)
     units = ["mm" if slides else "rad" for slides in arm.prismatic]
     joints = ", ".join(f"{name} [{unit}]" for name, unit in zip(arm.joint_names, units, strict=True))
     words = {  # what people have named, as they have: a source may be called arm_ik.c
-        "about": _about(arm, task, geometry, single),
+        "about": _about_text(arm, task, geometry, single),
         "stem": Path(file).stem,
         "joints_are": in_comment(joints),
     }
     fields = {
-        "keep_outs": keep_out_tables.declared(arm) if arm.keep_out else "",
+        "keep_outs": keep_out_tables.declarations(arm) if arm.keep_out else "",
         "guard": f"ARMKIN_{prefix.upper()}_H",
         "real": "float" if single else "double",
         "joints": str(arm.n),
@@ -70,34 +70,34 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "names": ",\n    ".join(f'"{name}"' for name in names),
         "position": str(task.position),
         "first": "9" if task.orientation == "full" else "0",
-        "reach": number(arm.reach, single),
-        "orientation": _orientation(arm, task, single),
+        "reach": number_text(arm.reach, single),
+        "orientation": _orientation_lines(arm, task, single),
         "most": "arm_most(target)" if task.orientation == "full" else "ARM_SOLUTION",
-        "other_held_values": part("other_held_values").replace("@reach@", number(arm.reach, single))
+        "other_held_values": part_text("other_held_values").replace("@reach@", number_text(arm.reach, single))
         if geometry.pairs is not None
         else "",
-        "lower": _numbers(turned.lower, single),
-        "upper": _numbers(turned.upper, single),
-        **_ratios(arm, single),
+        "lower": _number_list(turned.lower, single),
+        "upper": _number_list(turned.upper, single),
+        **_ratio_lines(arm, single),
         **{name: f"@{name}@" for name in words},
         "slides": ", ".join(str(int(p)) for p in arm.prismatic),
     }
     parts = [
-        part("source_head"),
-        part("numbers_float" if single else "numbers_double"),
+        part_text("source_head"),
+        part_text("numbers_float" if single else "numbers_double"),
         settings(single),
         c_functions.forward_kinematics(arm, single),
-        c_functions.jacobian(arm, single),
-        c_functions.target(arm, task, single),
+        c_functions.jacobian_code(arm, single),
+        c_functions.target_code(arm, task, single),
         solve,
-        part("whole_turns"),
-        part({"full": "read_pose", "axis": "read_axis"}.get(task.orientation, "read_numbers")),
-        part("ik"),
-        part("source_tail"),
-        *([keep_out_tables.clearances(arm, single), keep_out_tables.free(arm)] if arm.keep_out else []),
+        part_text("whole_turns"),
+        part_text({"full": "read_pose", "axis": "read_axis"}.get(task.orientation, "read_numbers")),
+        part_text("ik"),
+        part_text("source_tail"),
+        *([keep_out_tables.clearances_code(arm, single), keep_out_tables.free_code(arm)] if arm.keep_out else []),
     ]
-    texts = (part("header"), "\n".join(parts), golden_test(arm, task, part("test"), single, numbered))
-    return Program(*(filled(_named(filled(text, fields), prefix), words) for text in texts))
+    texts = (part_text("header"), "\n".join(parts), golden_test(arm, task, part_text("test"), single, numbered))
+    return Program(*(fill_fields(_named(fill_fields(text, fields), prefix), words) for text in texts))
 
 
 def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry, Redundancy | None, bool]:
@@ -113,7 +113,7 @@ def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry, Redundan
     return spare.task, held_by_near(arm, spare), spare, numbered
 
 
-def candidates(
+def candidates_code(
     arm: Arm,
     task: Task,
     geometry: Geometry,
@@ -124,11 +124,11 @@ def candidates(
 ) -> tuple[str, int]:
     """The function `arm_candidates` of an arm's class, and how many branches it has.
 
-    lanes, held: see `elimination.candidates`; a closed form has the held joint in
+    lanes, held: see `c_elimination.candidates_code`; a closed form has the held joint in
     it. Raises UsageError if the class has no form in C, or none in single precision.
     """
     if geometry.pairs is not None:
-        return c_functions.candidates(arm, task, geometry, single, prefer)
+        return c_functions.candidates_code(arm, task, geometry, single, prefer)
     if not has_form(geometry):
         raise UsageError(
             f"{arm.name}: {geometry.name} has no form in C: {why_no_form(arm, geometry)}; task {task.name} is solved "
@@ -136,15 +136,17 @@ def candidates(
         )
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
-    return c_elimination.candidates(arm, task, geometry.elimination, lanes=lanes, held=held), c_elimination.BRANCHES
+    return c_elimination.candidates_code(
+        arm, task, geometry.elimination, lanes=lanes, held=held
+    ), c_elimination.BRANCHES
 
 
 def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
     """The class itself; for an arm off its class that the elimination solves, the elimination: branches by number."""
     if has_form(geometry) or not geometry.complete or task.name != "pose" or arm.n != 6:
         return geometry
-    found = general.recognise(arm, task)
-    return geometry if found is None or not has_form(found) else found
+    elimination = general.recognise(arm, task)
+    return geometry if elimination is None or not has_form(elimination) else elimination
 
 
 def why_no_form(arm: Arm, geometry: Geometry) -> str:
@@ -160,15 +162,15 @@ def why_no_form(arm: Arm, geometry: Geometry) -> str:
 
 def has_form(geometry: Geometry) -> bool:
     """Whether a class of arms can be written in C."""
-    found = geometry.elimination
-    return geometry.pairs is not None or (found is not None and c_elimination.has_form(found))
+    elimination = geometry.elimination
+    return geometry.pairs is not None or (elimination is not None and c_elimination.has_form(elimination))
 
 
 def settings(single: bool = False) -> str:
     """The constants that the fixed parts read."""
     values = {**(_SINGLE if single else _DOUBLE), "CLOSE_BY": CLOSE_BY}  # answers this close may be one
     values |= {"ROUNDED": ROUNDED, "DECIMAL": DECIMAL, "FLOAT": FLOAT32}
-    lines = [f"#define ARM_{name} {number(value, single)}" for name, value in values.items()]
+    lines = [f"#define ARM_{name} {number_text(value, single)}" for name, value in values.items()]
     return "\n".join([*lines, ""])
 
 
@@ -187,7 +189,7 @@ def identifier(name: str) -> str:
     return text if text[0].isalpha() else f"arm_{text}"
 
 
-def filled(text: str, fields: dict[str, str]) -> str:
+def fill_fields(text: str, fields: dict[str, str]) -> str:
     """A text with its @names@ filled in."""
     return re.sub(r"@(\w+)@", lambda match: fields[match[1]], text)
 
@@ -198,11 +200,11 @@ def _named(text: str, prefix: str) -> str:
     return re.sub(r"\bARM_(JOINTS|BRANCHES|TARGET)\b", rf"{prefix.upper()}_\1", text)
 
 
-def _ratios(arm: Arm, single: bool) -> dict[str, str]:
+def _ratio_lines(arm: Arm, single: bool) -> dict[str, str]:
     """Lines that turn `near` into actual joint values and a branch into commanded ones, for calibrated arms."""
     if (arm.ratio == 1.0).all():
         return {"actual_near": "", "commanded": "", "close": ""}
-    table = f"static const arm_real ratio[ARM_JOINTS] = {{{_numbers(arm.ratio, single)}}};"
+    table = f"static const arm_real ratio[ARM_JOINTS] = {{{_number_list(arm.ratio, single)}}};"
     return {
         "close": ", close[ARM_JOINTS]",
         "actual_near": f"""    {{ /* actual turn per commanded turn, from calibration */
@@ -220,7 +222,7 @@ def _ratios(arm: Arm, single: bool) -> dict[str, str]:
     }
 
 
-def _orientation(arm: Arm, task: Task, single: bool) -> str:
+def _orientation_lines(arm: Arm, task: Task, single: bool) -> str:
     """Lines that add to `sum` what joint values q miss beside the position."""
     lines = []
     if task.orientation == "full":  # half the Frobenius norm, which is the angle
@@ -233,20 +235,20 @@ def _orientation(arm: Arm, task: Task, single: bool) -> str:
     if task.orientation == "axis":
         lines = ["for (i = 0; i < 3; i++) {", "    off = T[4 * i + 2] - goal[3 + i];", "    sum += off * off;", "}"]
     for k, (row, offset) in enumerate(zip(task.sums, task.offsets, strict=True), task.position):
-        terms = [f"{number(float(v), single)} * q[{j}]" for j, v in enumerate(row * arm.ratio) if v]
+        terms = [f"{number_text(float(v), single)} * q[{j}]" for j, v in enumerate(row * arm.ratio) if v]
         lines += [
-            f"off = {' + '.join([*terms, number(float(offset), single)])} - goal[{k}];",
+            f"off = {' + '.join([*terms, number_text(float(offset), single)])} - goal[{k}];",
             "off -= ARM_TURN * ARM_RINT(off / ARM_TURN);",
             "sum += off * off;",
         ]
     return "".join(f"    {line}\n" for line in lines)
 
 
-def _numbers(values: Array, single: bool) -> str:
-    return ", ".join(number(float(v), single) for v in values)
+def _number_list(values: Array, single: bool) -> str:
+    return ", ".join(number_text(float(v), single) for v in values)
 
 
-def _about(arm: Arm, task: Task, geometry: Geometry, single: bool) -> str:
+def _about_text(arm: Arm, task: Task, geometry: Geometry, single: bool) -> str:
     lines = [
         f"{arm.name}: kinematics in C99, {'single' if single else 'double'} precision. Generated, do not edit.",
         f"By armkin {__version__} from {arm.path or 'an arm made in Python'}, sha256 {arm.sha256 or 'unknown'}.",
@@ -262,7 +264,7 @@ def in_comment(text: str) -> str:
     >>> in_comment("reach 2*/3")
     'reach 2* /3'
     """
-    return " ".join(re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", lambda found: f"{found[0]} ", text).split())
+    return " ".join(re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", lambda mark: f"{mark[0]} ", text).split())
 
 
 def _target_is(task: Task) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.c_and_js_code import number
+from armkin.formula.c_and_js_code import number_text
 from armkin.forward import fk
 from armkin.inverse.numeric.newton import null_space
 from armkin.inverse.solve import ik
@@ -33,38 +33,38 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
     q = _postures(arm, task, POSTURES)
     T = fk(arm, q)
     target = targets_of(task, T, q * arm.ratio)
-    values, valid, branch = _answers(arm, task, target)
+    values, valid, branch = _solve_branches(arm, task, target)
     rows = [(values[i, b], branch[i, b]) for i, b in np.argwhere(valid)]
     fields = {
         "postures": str(len(q)),
-        "golden_joints": _table(q, single),
-        "golden_poses": _table(T.reshape(len(q), 16), single),
-        "golden_targets": _table(target.reshape(len(q), -1), single),
+        "golden_joints": _table_text(q, single),
+        "golden_poses": _table_text(T.reshape(len(q), 16), single),
+        "golden_targets": _table_text(target.reshape(len(q), -1), single),
         "golden_counts": ", ".join(map(str, valid.sum(axis=1))),
-        "golden_branches": _table(np.array([values for values, _ in rows]), single),
+        "golden_branches": _table_text(np.array([values for values, _ in rows]), single),
         "golden_indices": ", ".join(str(index if named else -1) for _, index in rows),
         "rows": str(len(rows)),
-        "turns": ", ".join(number(float(v), single) for v in np.where(arm.prismatic, 0.0, arm.ratio**2)),
-        "home": ", ".join(number(float(v), single) for v in arm.home),
+        "turns": ", ".join(number_text(float(v), single) for v in np.where(arm.prismatic, 0.0, arm.ratio**2)),
+        "home": ", ".join(number_text(float(v), single) for v in arm.home),
         # millimetres of a pose or a slide, and everything else
-        "lengths": ", ".join("1" if k in _lengths(task) else "0" for k in range(target[0].size)),
-        "length": number((1e-5 if single else 1e-10) * arm.reach, single),
-        "angle": number(2e-3 if single else 1e-7, single),
+        "lengths": ", ".join("1" if k in _length_indices(task) else "0" for k in range(target[0].size)),
+        "length": number_text((1e-5 if single else 1e-10) * arm.reach, single),
+        "angle": number_text(2e-3 if single else 1e-7, single),
     }
     for name, value in fields.items():
         text = text.replace(f"@{name}@", value)
     return text
 
 
-def _answers(arm: Arm, task: Task, target: Array) -> tuple[Array, Bool, NDArray[np.int8]]:
+def _solve_branches(arm: Arm, task: Task, target: Array) -> tuple[Array, Bool, NDArray[np.int8]]:
     """Branches (N, B, n), which are there and their indices (N, B), a redundant joint held at home."""
     spare = redundancy(actual(arm), task.name)
     held = {} if spare is None or spare.still else {arm.joint_names[spare.joint]: float(arm.home[spare.joint])}
-    found = ik(lock(arm, held) if held else arm, target, task.name)
-    return unlock(arm, held, found.q), found.valid, found.branch
+    solutions = ik(lock(arm, held) if held else arm, target, task.name)
+    return unlock(arm, held, solutions.q), solutions.valid, solutions.branch
 
 
-def _lengths(task: Task) -> tuple[int, ...]:
+def _length_indices(task: Task) -> tuple[int, ...]:
     """Which numbers of a target are millimetres."""
     return (3, 7, 11) if task.orientation == "full" else tuple(range(task.position))
 
@@ -78,13 +78,13 @@ def _postures(arm: Arm, task: Task, count: int) -> Array:
     q = rng.uniform(low, high, (50 * count, arm.n))
     if spare := redundancy(actual(arm), task.name):
         q[:, spare.joint] = arm.home[spare.joint]
-    found, valid, _ = _answers(arm, task, targets_of(task, fk(arm, q), q))
-    sigma = _weakest(arm, task, found, valid)
+    branches, valid, _ = _solve_branches(arm, task, targets_of(task, fk(arm, q), q))
+    sigma = _least_singular_values(arm, task, branches, valid)
     order = np.argsort(-np.minimum(sigma, _CLEAR), kind="stable")  # clear ones as they come, then the next best
     return q[order[sigma[order] > 0.0]][:count]
 
 
-def _weakest(arm: Arm, task: Task, q: Array, valid: Bool) -> Array:
+def _least_singular_values(arm: Arm, task: Task, q: Array, valid: Bool) -> Array:
     """Smallest singular value (N,) of any branch's Jacobian, branches (N, B, n); 0 without branches."""
     N, B, n = q.shape
     flat = np.nan_to_num(q).reshape(-1, n)
@@ -93,6 +93,6 @@ def _weakest(arm: Arm, task: Task, q: Array, valid: Bool) -> Array:
     return np.where(valid.any(axis=1), np.where(valid, sigma, np.inf).min(axis=1), 0.0)
 
 
-def _table(values: Array, single: bool) -> str:
-    rows = ["{" + ", ".join(number(float(v), single) for v in row) + "}" for row in values]
+def _table_text(values: Array, single: bool) -> str:
+    rows = ["{" + ", ".join(number_text(float(v), single) for v in row) + "}" for row in values]
     return ",\n    ".join(rows)

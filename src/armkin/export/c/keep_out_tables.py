@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from armkin.export.c import c_functions
-from armkin.export.c.source_parts import part
-from armkin.formula.c_and_js_code import number
+from armkin.export.c.source_parts import part_text
+from armkin.formula.c_and_js_code import number_text
 from armkin.keep_out.bodies import ends_formula
 from armkin.keep_out.body_pairs import guard
 
@@ -31,29 +31,32 @@ class Tables(NamedTuple):
     pairs: list[tuple[str, str]]  # names: a body, and what it is held against
 
 
-def tables(arm: Arm) -> Tables:
+def pair_tables(arm: Arm) -> Tables:
     """The pairs of an arm with keep-outs: an obstacle with each body that moves, then bodies with each other."""
     held = guard(arm)
     form = held.bodies
     solid = sorted({int(form.owner[k]) for k in held.moving})
-    shapes = [(_KINDS[kind], list(map(float, values))) for kind, values in (one.numbers() for _, one in held.obstacles)]
-    which = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1 + len(shapes) * len(solid)
+    shapes = [
+        (_KINDS[kind], list(map(float, values)))
+        for kind, values in (solid_shape.numbers() for _, solid_shape in held.obstacles)
+    ]
+    segment_pairs = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1 + len(shapes) * len(solid)
     return Tables(
         form.radius[form.owner].tolist(),
         len(solid),
         [(int(k), solid.index(int(form.owner[k]))) for k in held.moving],
         shapes,
-        list(zip(held.ours.tolist(), held.theirs.tolist(), which.tolist(), strict=True)),
+        list(zip(held.ours.tolist(), held.theirs.tolist(), segment_pairs.tolist(), strict=True)),
         [held.pair_names(k) for k in range(len(held.pairs))],
     )
 
 
-def clearances(arm: Arm, single: bool = False) -> str:
+def clearances_code(arm: Arm, single: bool = False) -> str:
     """`arm_least`, of the segments' ends that `arm_ends` gives: least clearance and the pair it is of."""
-    held = tables(arm)
+    held = pair_tables(arm)
 
     def initialiser(values: Iterable[float]) -> str:
-        return ", ".join(number(float(v), single) for v in values)
+        return ", ".join(number_text(float(v), single) for v in values)
 
     rows = [initialiser([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in held.shapes]
     crossings = [f"{{{i}, {j}, {k}}}" for i, j, k in held.crossings]
@@ -68,28 +71,28 @@ def clearances(arm: Arm, single: bool = False) -> str:
         "kinds": ", ".join(str(kind) for kind, _ in held.shapes) or "0",
         "obstacles": ",\n    ".join(f"{{{row}}}" for row in rows) or "{0}",
         "crossings": ", ".join(crossings) or "{0}",
-        "clearance": number(arm.clearance, single),
+        "clearance": number_text(arm.clearance, single),
     }
-    text = part("keep_out")
+    text = part_text("keep_out")
     for name, value in fields.items():
         text = text.replace(f"@{name}@", value)
-    return c_functions.of_joints(arm, "arm_ends", ends_formula, "e", single) + text
+    return c_functions.joint_function_code(arm, "arm_ends", ends_formula, "e", single) + text
 
 
-def free(arm: Arm) -> str:
+def free_code(arm: Arm) -> str:
     """`arm_free`, and the names of pairs."""
-    names = tables(arm).pairs or [("", "")]
-    pairs = ",\n    ".join("{" + ", ".join(f'"{_quoted(name)}"' for name in pair) + "}" for pair in names)
-    return part("free_posture").replace("@pairs@", pairs)
+    names = pair_tables(arm).pairs or [("", "")]
+    pairs = ",\n    ".join("{" + ", ".join(f'"{_quoted_name(name)}"' for name in pair) + "}" for pair in names)
+    return part_text("free_posture").replace("@pairs@", pairs)
 
 
-def _quoted(name: str) -> str:
+def _quoted_name(name: str) -> str:
     """A name as text of C holds it."""
     plain = name.encode("ascii", "replace").decode()
     return plain.replace("\\", "\\\\").replace('"', '\\"').replace("??", "?\\?")
 
 
-def declared(arm: Arm) -> str:
+def declarations(arm: Arm) -> str:
     """The lines of the header."""
     count = max(len(guard(arm).pairs), 1)
     return f"""

@@ -5,6 +5,6 @@ from pathlib import Path
 PARTS = Path(__file__).parent / "parts"
 
 
-def part(name: str) -> str:
+def part_text(name: str) -> str:
     """A part's text, with @names@ to be filled in."""
     return (PARTS / f"{name}.c").read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ from armkin import __version__, forward, motors
 from armkin.errors import UsageError
 from armkin.export.c import arm_formulas
 from armkin.export.c.c_program import has_form, plain_form, why_no_form
-from armkin.export.c.keep_out_tables import tables
+from armkin.export.c.keep_out_tables import pair_tables
 from armkin.export.js import js_elimination
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
@@ -50,10 +50,10 @@ def module(arm: Arm, task_name: str | None = None) -> str:
     """
     if spare := redundancy(actual(arm), task_name):
         return _with_one_held(arm, actual(arm), spare)
-    return _of_all(arm, task_name, driven=not motors.undriven(arm))
+    return _module_of_all(arm, task_name, driven=not motors.undriven(arm))
 
 
-def _of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
+def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
     turned = actual(arm)  # branches are found, and limits hold, in actual joint values
     task, named = solver(turned, task_name)
     geometry = plain_form(turned, task, named)
@@ -62,21 +62,21 @@ def _of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
             f"{arm.name}: {geometry.name} has no form in JavaScript: {why_no_form(arm, geometry)}; task {task.name} is "
             "solved in Python alone"
         )
-    solve, branches = candidates(turned, task, geometry)
+    solve, branches = candidates_code(turned, task, geometry)
     parts = [
-        f"// {_about(arm, task, geometry)}",
-        part("head"),
-        *_exported(arm, task),
-        *_data(arm, turned, task, geometry, branches, driven),
+        f"// {_about_text(arm, task, geometry)}",
+        part_text("head"),
+        *_exported_lines(arm, task),
+        *_data_lines(arm, turned, task, geometry, branches, driven),
         *_kinematics(turned, task),
         *_keep_outs(arm, turned),
         _by_joint(turned, calibrated=bool((arm.ratio != 1.0).any())),
-        *map(part, _SOLVER),
-        *(map(part, js_elimination.METHOD) if geometry.pairs is None else ()),
+        *map(part_text, _SOLVER),
+        *(map(part_text, js_elimination.METHOD) if geometry.pairs is None else ()),
         solve,
-        part("poses"),
-        part("module").replace("@TARGET@", _target_is(task)),
-        *([part("pulses")] if driven else []),
+        part_text("poses"),
+        part_text("module").replace("@TARGET@", _target_is(task)),
+        *([part_text("pulses")] if driven else []),
     ]
     return "\n".join(parts)
 
@@ -85,8 +85,8 @@ def _with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
     """The module of an arm with one joint to spare: the redundant joint is held, the module of the others solves."""
     name, task = arm.joint_names[spare.joint], spare.task
     plain = turned is arm and not arm.keep_out  # then it is prepared already
-    others = spare.rest if plain else replace(lock(arm, {name: 0.0}), keep_out=(), whole=None)
-    inner = _of_all(others, task.name, driven=False).replace(part("head"), "")
+    other_joints = spare.rest if plain else replace(lock(arm, {name: 0.0}), keep_out=(), whole=None)
+    inner = _module_of_all(other_joints, task.name, driven=False).replace(part_text("head"), "")
     inner = re.sub("^export ", "", inner, flags=re.MULTILINE)
     way = arm.link[-1] if spare.joint else inverse(arm.link[0])
     driven = not motors.undriven(arm)
@@ -97,40 +97,40 @@ def _with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
         "sums": task.sums[:, 0].tolist(),
     }
     parts = [
-        f"// {_about(arm, task, spare.geometry)} while {name} is held",
-        part("head"),
-        *_exported(arm, task),
+        f"// {_about_text(arm, task, spare.geometry)} while {name} is held",
+        part_text("head"),
+        *_exported_lines(arm, task),
         "/** The joint that the target leaves free: `ik` holds it. */",
-        f"export const redundant = {_text(name)};",
-        *_data(arm, turned, task, spare.geometry, 0, driven),
-        f"const REDUNDANT = {_text(redundant)};",
+        f"export const redundant = {_js_text(name)};",
+        *_data_lines(arm, turned, task, spare.geometry, 0, driven),
+        f"const REDUNDANT = {_js_text(redundant)};",
         f"const OTHERS = (() => {{\n{inner}return {{ ik, branch_names }};\n}})();",
         *_kinematics(turned, task),
         *_keep_outs(arm, turned),
-        part("poses"),
-        part("redundant").replace("@TARGET@", _target_is(task)),
-        *([part("pulses")] if driven else []),
+        part_text("poses"),
+        part_text("redundant").replace("@TARGET@", _target_is(task)),
+        *([part_text("pulses")] if driven else []),
     ]
     return "\n".join(parts)
 
 
-def part(name: str) -> str:
+def part_text(name: str) -> str:
     """A part's text."""
     return (_PARTS / f"{name}.js").read_text(encoding="utf-8")
 
 
-def candidates(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
+def candidates_code(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
     """The function `candidates` of an arm's class, and how many branches it has."""
     if geometry.pairs is None:
-        return js_elimination.candidates(arm, task, geometry.elimination), js_elimination.BRANCHES
+        return js_elimination.elimination_code(arm, task, geometry.elimination), js_elimination.BRANCHES
     n, entries = arm.n, arm_formulas.goal_size(task)
     declared = [(f"g{k}", f"goal[{k}]") for k in range(entries)]
     for j in range(n):
         # what is preferred for a joint is asked where that is free, and computed there
         preferred = [f"near[{j}]"] if arm.prismatic[j] else [f"Math.cos(near[{j}])", f"Math.sin(near[{j}])"]
         declared += [(text, "") for text in preferred]
-    recorded = arm_formulas.candidates(arm, task, geometry, measured=True)
-    code = c_and_js_code.write(recorded, [name for name, _ in declared], c_and_js_code.JAVASCRIPT)
+    recorded = arm_formulas.record_candidates(arm, task, geometry, measured=True)
+    code = c_and_js_code.write_code(recorded, [name for name, _ in declared], c_and_js_code.JAVASCRIPT)
     *values, miss, length, angle, _ = arm_formulas.by_branch(recorded, code)
     stores = [f"q[{b * n + j}] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
     stores += [f"miss[{k}] = {text};" for k, text in enumerate([*miss, *length, *angle])]
@@ -143,18 +143,18 @@ def candidates(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
         " * @param {number} [passes] of an elimination */\n"
         "function candidates(goal, near, q, miss, passes)"
     )
-    return _function(head, lines), len(miss)
+    return _function_text(head, lines), len(miss)
 
 
 def _of_joints(name: str, recorded: recording.Recording) -> str:
     inputs = [f"q{j}" for j in range(len(recorded.inputs))]
-    code = c_and_js_code.write(recorded, inputs, c_and_js_code.JAVASCRIPT)
+    code = c_and_js_code.write_code(recorded, inputs, c_and_js_code.JAVASCRIPT)
     lines = [f"const {q} = q[{j}];" for j, q in enumerate(inputs)]
     lines += [*code.lines, *(f"out[{k}] = {text[0]};" for k, text in enumerate(code.outputs))]
-    return _function(f"/** @param {{Numbers}} q @param {{Float64Array}} out */\nfunction {name}(q, out)", lines)
+    return _function_text(f"/** @param {{Numbers}} q @param {{Float64Array}} out */\nfunction {name}(q, out)", lines)
 
 
-def _function(head: str, lines: list[str]) -> str:
+def _function_text(head: str, lines: list[str]) -> str:
     body = "\n".join(f"  {line}" for line in lines)
     return f"{head} {{\n{body}\n}}\n"
 
@@ -164,25 +164,25 @@ def _kinematics(turned: Arm, task: Task) -> list[str]:
     return [
         _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), turned.n)),
         _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), turned.n)),
-        _of_joints("targetOf", arm_formulas.target(turned, task)),
+        _of_joints("targetOf", arm_formulas.record_target(turned, task)),
     ]
 
 
-def _exported(arm: Arm, task: Task) -> list[str]:
+def _exported_lines(arm: Arm, task: Task) -> list[str]:
     limits = [[None if np.isinf(v) else v for v in row] for row in np.stack([arm.lower, arm.upper], axis=1).tolist()]
     return [
         "/** The joints. */",
-        f"export const names = {_text(arm.joint_names)};",
+        f"export const names = {_js_text(arm.joint_names)};",
         "/** [low, high] of each joint [rad | mm], null: unlimited. @type {((number | null)[] | null)[]} */",
-        f"export const limits = {_text([None if row == [None, None] else row for row in limits])};",
+        f"export const limits = {_js_text([None if row == [None, None] else row for row in limits])};",
         "/** Joint values at home [rad | mm]. */",
-        f"export const home = {_text(arm.home.tolist())};",
+        f"export const home = {_js_text(arm.home.tolist())};",
         "/** What a target holds. */",
-        f"export const labels = {_text(list(task.labels))};",
+        f"export const labels = {_js_text(list(task.labels))};",
     ]
 
 
-def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int, driven: bool) -> list[str]:
+def _data_lines(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int, driven: bool) -> list[str]:
     """What the parts read of the arm."""
     fields: dict[str, Any] = {
         "name": arm.name,
@@ -203,18 +203,18 @@ def _data(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int, 
         "orientation": task.orientation,
         "labels": list(task.labels),
     }
-    lines = [f"  {name}: {_text(value)}," for name, value in fields.items()]
-    data = [_ARM_IS, "const ARM = {", *lines, "};", f"const ROTATION = {_ROUNDED!r};"]
-    data.append(f"const CLOSED_FORM = {_text(geometry.pairs is not None)};")
-    data.append(f"const CALIBRATED = {_text(bool((arm.ratio != 1.0).any()))};")
+    lines = [f"  {name}: {_js_text(value)}," for name, value in fields.items()]
+    code = [_ARM_IS, "const ARM = {", *lines, "};", f"const ROTATION = {_ROUNDED!r};"]
+    code.append(f"const CLOSED_FORM = {_js_text(geometry.pairs is not None)};")
+    code.append(f"const CALIBRATED = {_js_text(bool((arm.ratio != 1.0).any()))};")
     if driven:
         values = {
             "gain": arm.motor_gain.tolist(),
             "bias": arm.motor_bias.tolist(),
             "inverse": motors.joints_per_pulse(arm).tolist(),
         }
-        data += ["const MOTORS = {", *(f"  {name}: {_text(value)}," for name, value in values.items()), "};"]
-    return [*data, ""]
+        code += ["const MOTORS = {", *(f"  {name}: {_js_text(value)}," for name, value in values.items()), "};"]
+    return [*code, ""]
 
 
 def _by_joint(arm: Arm, *, calibrated: bool) -> str:
@@ -222,7 +222,7 @@ def _by_joint(arm: Arm, *, calibrated: bool) -> str:
     n = arm.n
     values = ", ".join(f"allJoints[{n} * b + {j}]" for j in range(n))
     head = "/** Joint values of a candidate. @param {number} b @returns {number[]} */\nfunction candidate(b)"
-    text = _function(head, [f"return [{values}];"])
+    text = _function_text(head, [f"return [{values}];"])
     lines = ["let inside = true;", "let turned = 0;", "let slid = 0;", "let value = 0;"]
     for j in range(n):
         lines += _copy_of_joint(arm, j, calibrated=calibrated)
@@ -237,7 +237,7 @@ def _by_joint(arm: Arm, *, calibrated: bool) -> str:
         " * @param {number[]} q @param {Numbers} near */\n"
         "function legal(q, near)"
     )
-    return text + "\n" + _function(head, lines)
+    return text + "\n" + _function_text(head, lines)
 
 
 def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
@@ -249,7 +249,7 @@ def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
     change = f"Math.abs(value - near[{j}]){f' / ARM.ratio[{j}]' if calibrated else ''}"
     if slides:
         return [f"value = q[{j}];", *check, f"slid += {change};"]
-    copy = f"  q[{j}] = value = nearestCopy(value, near[{j}], {_text(low)}, {_text(high)}, {_text(slides)});"
+    copy = f"  q[{j}] = value = nearestCopy(value, near[{j}], {_js_text(low)}, {_js_text(high)}, {_js_text(slides)});"
     if low > -np.pi + _ALONE and high < np.pi - _ALONE:  # there is one copy, wherever `near` is
         nearest = ["if (!(Math.abs(value) < Math.PI - SLACK)) {", copy, "}", *check]
     else:
@@ -262,7 +262,7 @@ def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
     """What the arm must not touch, and how far it is from that; a robot file may have none."""
     if not arm.keep_out:
         return ["const KEEPS_OUT = false;", "/** @type {(q: Numbers) => any} */", "const hitsOf = () => ({});"]
-    held = tables(turned)
+    held = pair_tables(turned)
     values = {
         **held._asdict(),
         "shapes": [{"kind": kind, "numbers": numbers} for kind, numbers in held.shapes],
@@ -272,14 +272,14 @@ def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
         "const KEEPS_OUT = true;",
         _KEEP_OUT_IS,
         "const KEEP_OUT = {",
-        *(f"  {name}: {_text(value)}," for name, value in values.items()),
+        *(f"  {name}: {_js_text(value)}," for name, value in values.items()),
         "};",
         _of_joints("endsOf", recording.record(lambda q: ends_formula(turned, q), arm.n)),
-        part("keep_out"),
+        part_text("keep_out"),
     ]
 
 
-def _text(value: Any) -> str:
+def _js_text(value: Any) -> str:
     """A value as JavaScript: JSON, and infinity; no text in it ends a script element or a line."""
     escaped = {"<": "\\u003c", "\u2028": "\\u2028", "\u2029": "\\u2029"}
     text = json.dumps(value, ensure_ascii=False)
@@ -288,7 +288,7 @@ def _text(value: Any) -> str:
     return text
 
 
-def _about(arm: Arm, task: Task, geometry: Geometry) -> str:
+def _about_text(arm: Arm, task: Task, geometry: Geometry) -> str:
     lines = [
         f"{arm.name}: kinematics in JavaScript, double precision. Generated, do not edit.",
         f"By armkin {__version__} from {Path(arm.path).name if arm.path else 'an arm made in Python'}, "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.export.c.c_elimination import BRANCHES, frame, moves_of, pencil_arrays, pencils_of, plans_of
+from armkin.export.c.c_elimination import BRANCHES, frame_rows, moves_of, pencil_arrays, pencils_of, plans_of
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.elimination.merge import weights
 from armkin.inverse.elimination.method import Elimination
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-__all__ = ["BRANCHES", "METHOD", "candidates"]
+__all__ = ["BRANCHES", "METHOD", "elimination_code"]
 METHOD = ("eigenvalues", "frames", "roots", "equal_roots", "elimination")
 
 
-def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
+def elimination_code(arm: Arm, task: Task, elimination: Elimination) -> str:
     """The constants of an arm that the elimination solves, and its `candidates`; `METHOD` has the functions."""
     kinds = plans_of(elimination, len(SHAKES))
     pencils, plans = pencils_of(kinds)
@@ -40,17 +40,17 @@ def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
         "equalRoots": repr(EQUAL_ROOTS),
         "twinRoots": repr(TWIN_ROOTS),
         "upright": repr(UPRIGHT),
-        "fromBase": _array(frame(inverse(loop.base))),
-        "fromTool": _array(frame(inverse(loop.tool))),
-        "links": _arrays([frame(link) for link in loop.links]),
-        "slides": _flags(loop.prismatic),
-        "weights": _array(weights(5 if task.orientation == "axis" else 6)),
-        "shakes": _array(SHAKES[: len(kinds[0])]),
-        "shaking": _arrays(moves_of(len(kinds[0]))),
+        "fromBase": _array_code(frame_rows(inverse(loop.base))),
+        "fromTool": _array_code(frame_rows(inverse(loop.tool))),
+        "links": _arrays_code([frame_rows(link) for link in loop.links]),
+        "slides": _flags_code(loop.prismatic),
+        "weights": _array_code(weights(5 if task.orientation == "axis" else 6)),
+        "shakes": _array_code(SHAKES[: len(kinds[0])]),
+        "shaking": _arrays_code(moves_of(len(kinds[0]))),
         "plan": repr(plans),
     }
     lines = ["const LOOP = {", *(f"  {name}: {text}," for name, text in fields.items()), "};"]
-    lines += ["/** @type {Pencil[]} */", "const PENCILS = [", *map(_pencil, pencils), "];"]
+    lines += ["/** @type {Pencil[]} */", "const PENCILS = [", *map(_pencil_code, pencils), "];"]
     head = (
         "/** @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss\n"
         " * @param {number} [passes] */\n"
@@ -59,13 +59,13 @@ def candidates(arm: Arm, task: Task, elimination: Elimination) -> str:
     pose = "goal"
     if task.orientation == "axis":  # by way of a pose with that z axis and a joint more
         made = recording.record(tool_axis.pose_of, 6)
-        code = c_and_js_code.write(made, [f"goal[{k}]" for k in range(6)], c_and_js_code.JAVASCRIPT)
+        code = c_and_js_code.write_code(made, [f"goal[{k}]" for k in range(6)], c_and_js_code.JAVASCRIPT)
         head = "\n".join([head, *(f"  {line}" for line in code.lines)])
         pose = f"[{', '.join(text[0] for text in code.outputs)}]"
     return "\n".join([*lines, head, f"  return candidatesOfPose({pose}, near, q, miss, passes);", "}", ""])
 
 
-def _pencil(pencil: Pencil) -> str:
+def _pencil_code(pencil: Pencil) -> str:
     role = pencil.role
     fields = {
         "psi": repr(float(pencil.psi)),
@@ -80,20 +80,20 @@ def _pencil(pencil: Pencil) -> str:
         "w": str(pencil.W.shape[1]),
         "size": str(pencil.size),
         "order": repr([int(k) for k in role.order]),
-        "slides": _flags(pencil.prismatic),
-        **{name: "null" if values is None else _array(values) for name, values in pencil_arrays(pencil).items()},
+        "slides": _flags_code(pencil.prismatic),
+        **{name: "null" if values is None else _array_code(values) for name, values in pencil_arrays(pencil).items()},
     }
     return "\n".join(["  {", *(f"    {name}: {text}," for name, text in fields.items()), "  },"])
 
 
-def _array(values: ArrayLike) -> str:
+def _array_code(values: ArrayLike) -> str:
     flat = np.asarray(values, dtype=float).ravel().tolist()
     return f"Float64Array.of({', '.join(str(int(v)) if v == int(v) else repr(v) for v in flat)})"
 
 
-def _arrays(rows: list[np.ndarray]) -> str:
-    return f"[{', '.join(map(_array, rows))}]"
+def _arrays_code(rows: list[np.ndarray]) -> str:
+    return f"[{', '.join(map(_array_code, rows))}]"
 
 
-def _flags(values: ArrayLike) -> str:
+def _flags_code(values: ArrayLike) -> str:
     return f"[{', '.join('true' if v else 'false' for v in np.asarray(values).ravel())}]"

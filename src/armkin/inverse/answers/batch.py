@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.array_tuples import stacked
+from armkin.formula.array_tuples import stack_rows
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.whole_turns import nearest_row
@@ -110,7 +110,7 @@ def write(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, label: Int, 
     """Write branches (K, W, n) of some targets, with labels (K, W) as `named`, at their nearest legal copies, nan
     behind; the same batch, or where they need more columns a wider one."""
     if q.shape[1] > batch.q.shape[1]:
-        batch = stacked([batch, empty(0, q.shape[1], arm.n)])
+        batch = stack_rows([batch, empty(0, q.shape[1], arm.n)])
     width, label = q.shape[1], np.where(valid, label, -1)
     ordered = np.sort(label, axis=1)
     if ((label < 0) & valid).any() or ((np.diff(ordered) == 0) & (ordered[:, 1:] >= 0)).any():

@@ -48,7 +48,7 @@ def of_targets(
     Raises UsageError for a rounding that is negative, not finite or of another shape.
     """
     if stated is not None:
-        values = arrays.real(stated, "rounding")
+        values = arrays.real_array(stated, "rounding")
         if values.shape not in ((), lead) or not np.isfinite(values).all() or (values < 0.0).any():
             shapes = "() or " + str(lead) if lead else "()"
             raise UsageError(f"rounding: expected finite numbers from 0, of shape {shapes}; got shape {values.shape}")

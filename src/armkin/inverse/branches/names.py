@@ -134,7 +134,7 @@ def _sample_postures(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, A
         q = branches.q[:, : geometry.branches]
         return postures, q, ~np.isnan(q).any(axis=2) & ~branches.doubt[:, None]
     assert geometry.pairs is not None
-    entries = pose.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
+    entries = pose.read_pose(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
     prefer = [Pair(0.0, None) if p else Pair(1.0, 0.0) for p in arm.prismatic]
     candidates = geometry.pairs(entries, prefer)
     values = np.broadcast_arrays(*cast("list[Array]", candidates.values()))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, Int, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrap_angle
 from armkin.inverse.numeric import newton
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -56,7 +56,7 @@ def _is_path(arm: Arm, task: Task, target: Array) -> Bool:
     moved[:, p] /= arm.reach
     if len(task.sums):
         turned = moved[:, task.position :]
-        turned[...] = wrapped(turned)
+        turned[...] = wrap_angle(turned)
     return np.asarray(np.abs(moved).max(axis=1) < CLOSE)
 
 

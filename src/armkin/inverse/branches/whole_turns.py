@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
 from armkin.formula.array_shapes import Joints
-from armkin.formula.arrays import Array, Bool, Truth, wrapped
+from armkin.formula.arrays import Array, Bool, Truth, wrap_angle
 from armkin.forward import one_pose
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm, actual
@@ -141,7 +141,7 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
         return copies, inside
     for i in range(arm.n):
         slides, limits = bool(arm.prismatic[i]), (float(arm.lower[i]), float(arm.upper[i]))
-        value = q[..., i] if slides else wrapped(q[..., i])
+        value = q[..., i] if slides else wrap_angle(q[..., i])
         copies[..., i], fits = nearest_copy(value, near[..., i], *limits, slides)
         inside &= fits
     return copies, inside
@@ -150,7 +150,7 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
 def nearest_of_joint(arm: Arm, i: int, value: Array, near: Array) -> tuple[Array, Truth]:
     """`nearest_copy` of values of joint i, of an arm that turns as it is told."""
     slides, limits = bool(arm.prismatic[i]), (float(arm.lower[i]), float(arm.upper[i]))
-    return nearest_copy(value if slides else wrapped(value), near, *limits, slides)
+    return nearest_copy(value if slides else wrap_angle(value), near, *limits, slides)
 
 
 def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:

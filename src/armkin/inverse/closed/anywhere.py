@@ -116,7 +116,7 @@ class _Ends:
             sine = arrays.sub(arrays.mul(gy, d[0]), arrays.mul(gx, d[1]))
             sides.append([constant, arrays.mul(-1.0, cosine), arrays.mul(-1.0, sine)])
         first, last, doubt = (self._quartic if self.regular else self._rank_one)(sides, e, prefer)
-        u = pose.turn(Lb, spin(*last, d))
+        u = pose.turn_direction(Lb, spin(*last, d))
         v = spin(first.c, arrays.mul(-1.0, first.s), e)
         if self.points:
             u = arrays.combine(1.0, u, 1.0, tb)
@@ -183,7 +183,7 @@ class _Loop:
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (b0, b1, 2, N)."""
         goal = [*goal[:9], *(arrays.mul(self.unit, v) for v in goal[9:])]
-        back = pose.inverse(pose.times(pose.times(self.from_base, goal), self.from_tool))
+        back = pose.inverse(pose.compose(pose.compose(self.from_base, goal), self.from_tool))
         before, between = (self.before, back) if self.first == 1 else (back, self.between)
         height: Entry
         three_angles: Sequence[Entry | None]
@@ -198,9 +198,11 @@ class _Loop:
             seen_before, seen_after = (point.tolist() for point in self.points)
             d, e = pose.apply(after, seen_before), pose.apply(pose.inverse(before), seen_after)
         ends, doubt = self.ends.solve(between, d, e, height, [prefer[j] for j in self.joints])
-        P = pose.times(pose.rotate(before, *ends[0]), self.ends.La)
-        P = pose.times(pose.rotate(P, *ends[1]), between)
-        P = pose.times(pose.rotate(P, *ends[2]), after)  # joint `first` seen from the frame after the last of the three
+        P = pose.compose(pose.rotate(before, *ends[0]), self.ends.La)
+        P = pose.compose(pose.rotate(P, *ends[1]), between)
+        P = pose.compose(
+            pose.rotate(P, *ends[2]), after
+        )  # joint `first` seen from the frame after the last of the three
         x, z = [P[0], P[3], P[6]], [P[2], P[5], P[8]]
         prefer3 = prefer[self.first : self.first + 3]
         if self.three_link is None:

@@ -102,7 +102,7 @@ class Recorded:
     def in_numbers(self, target: Array) -> list[Array]:
         """`candidates` to the last digit the same, whatever a target is asked together with."""
         if len(target) > FEW:
-            return self.code.exactly(entries(self.task, target))
+            return self.code.run_exactly(entries(self.task, target))
         full = self.task.orientation == "full"
         return self.code.one_by_one([pose.read_one(row) if full else row.tolist() for row in target])
 
@@ -225,7 +225,7 @@ def recorded(arm: Arm, task: Task, geometry: Geometry) -> Recorded:
 
 def entries(task: Task, goal: Array) -> list[Entry]:
     """Targets (N, m) or (N, 4, 4) as arrays of length N."""
-    return pose.read(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
+    return pose.read_pose(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
 
 
 def _misses(
@@ -246,7 +246,7 @@ def _misses(
             p = spin(c, s, p)
             columns = [spin(c, s, v) for v in columns]
         p = pose.apply(link[i], p)
-        columns = [pose.turn(link[i], v) for v in columns]
+        columns = [pose.turn_direction(link[i], v) for v in columns]
     full = task.orientation == "full"
     point = goal[9:12] if full else goal[: task.position]
     goals = [goal[0:3], goal[6:9]] if full else [goal[3:6]]
@@ -263,6 +263,6 @@ def _sum_miss(task: Task, values: list[Entry], goal: list[Entry]) -> Entry:
         angle = goal[task.position + k] - task.offsets[k]
         for w, value in zip(weights, values, strict=True):
             angle = arrays.sub(angle, arrays.mul(float(w), value))
-        angle = arrays.wrapped(angle)
+        angle = arrays.wrap_angle(angle)
         total = arrays.add(total, angle * angle)
     return total

@@ -55,7 +55,7 @@ class Elbow:
         """
         x, y, z = pose.apply(self.from_base, p)
         n, o = self.shoulder[6:9], self.shoulder[9:12]
-        fore = None if tip is None else pose.turn(self.to_fore, tip)
+        fore = None if tip is None else pose.turn_direction(self.to_fore, tip)
         along = arrays.add(self.along if fore is None else arrays.add(self.rise, fore[2]), past[2])
         if self.prismatic1:
             ahead = arrays.sub(arrays.dot(n, [x, y, z]), along + arrays.dot(n, o))
@@ -91,7 +91,7 @@ class Elbow:
     def turned_back(self, pairs: list[Pair], v: list[Entry]) -> list[Entry]:
         """A direction in the base, seen from the frame after link 2 that joint 3 turns with."""
         first, second, third = pairs
-        v = pose.turn(self.from_base, v)
+        v = pose.turn_direction(self.from_base, v)
         v = pose.turn_back(self.shoulder, v if first.s is None else spin(first.c, -first.s, v))
         c, s = together(second, third, self.two_link.sense)
         return pose.turn_back(self.to_fore, spin(c, -s, v))
@@ -179,10 +179,10 @@ def _pitch(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
         if arm.n == 5:
             q5 = (goal[4] - task.offsets[1]) / task.sums[1][4]
             fifth = Pair(*arrays.cos_sin(q5))
-            P = pose.times(pose.rotate(past, *fifth), pose.constant(link[5]))
+            P = pose.compose(pose.rotate(past, *fifth), pose.constant(link[5]))
         else:
             fifth, P = None, past
-        x, y, z = pose.turn(turned, P[9:12])
+        x, y, z = pose.turn_direction(turned, P[9:12])
         offset = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
         pairs, doubt = elbow.solve(goal[:3], offset, prefer)
         # joint 4 takes what is left of the sum
@@ -201,7 +201,7 @@ def _roll(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
 
     def roll(goal: list[Entry], prefer: Prefer) -> Candidates:
         fourth = Pair(*arrays.cos_sin((goal[3] - task.offsets[0]) / weight))
-        tip = pose.times(pose.rotate(after3, *fourth), end)[9:12]
+        tip = pose.compose(pose.rotate(after3, *fourth), end)[9:12]
         pairs, doubt = elbow.solve(goal[:3], [0.0, 0.0, 0.0], prefer, tip)
         return Candidates([*pairs, fourth], doubt)
 

@@ -97,7 +97,7 @@ class NewtonSteps:
             else:
                 p, slopes = spin(c, s, p), [spin(c, s, v) for v in slopes]
                 slope = [arrays.mul(-1.0, p[1]), p[0], 0.0]
-            slopes = [pose.turn(self.link[i], v) for v in [slope, *slopes]]
+            slopes = [pose.turn_direction(self.link[i], v) for v in [slope, *slopes]]
             p = pose.apply(self.link[i], p)
         scale = 1.0 / self.arm.reach
         columns = []

@@ -72,7 +72,7 @@ def _with_lift(
             if i != lift:
                 pair = next(motions)
                 P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
-            P = pose.times(P, fixed[i + 1])
+            P = pose.compose(P, fixed[i + 1])
         pairs.insert(lift, Pair((goal[2] - P[11]) * float(np.sign(w[lift, 2])), None))
         return Candidates(pairs, doubt)
 
@@ -155,8 +155,8 @@ def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
 
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
-        R = pose.times([c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], pose.constant(R0))  # about z
-        x, y, _ = pose.turn(R, back[9:12])
+        R = pose.compose([c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], pose.constant(R0))  # about z
+        x, y, _ = pose.turn_direction(R, back[9:12])
         pairs, doubt = two([goal[0] + x, goal[1] + y], prefer[:2])
         return [*pairs, _last_of_sum(goal, task, weights, [*pairs, None], 2)], doubt
 
@@ -186,11 +186,11 @@ def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
 
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
         second = _last_of_sum(goal, task, weights, [None, None, None], 1)
-        P = pose.times(link[0], link[1])
+        P = pose.compose(link[0], link[1])
         a = link[0][6:8]
-        P = pose.times(pose.rotate(P, *second), link[2])
+        P = pose.compose(pose.rotate(P, *second), link[2])
         b = P[6:8]
-        end = pose.times(P, link[3])
+        end = pose.compose(P, link[3])
         x, y = goal[0] - end[9], goal[1] - end[10]
         det = arrays.sub(arrays.mul(a[0], b[1]), arrays.mul(a[1], b[0])) + 0.0 * x
         parallel = arrays.absolute(det) < tol.NO_AREA

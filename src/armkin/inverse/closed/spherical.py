@@ -91,7 +91,7 @@ class SphericalWrist:
         centre = pose.apply(goal, self.centre)
         pairs, doubt = self.place(centre, prefer=prefer[:3])
         # N = Rz(q4) A Rz(q5) B Rz(q6), its first and last columns
-        columns = [pose.turn(goal, self.end[k : k + 3]) for k in (0, 6)]
+        columns = [pose.turn_direction(goal, self.end[k : k + 3]) for k in (0, 6)]
         if self.elbow is not None:
             miss = self.elbow.miss(pairs, centre)
             x, z = (pose.turn_back(self.links[3], self.elbow.turned_back(pairs, v)) for v in columns)
@@ -109,7 +109,7 @@ class SphericalWrist:
         P = self.links[0]
         for i, pair in enumerate(pairs):
             P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)
-            P = pose.times(P, self.links[i + 1])
+            P = pose.compose(P, self.links[i + 1])
         reached = arrays.combine(1.0, P[9:12], self.height4, P[6:9])
         x, z = (pose.turn_back(P, v) for v in columns)
         return distance2(reached, centre), x, z

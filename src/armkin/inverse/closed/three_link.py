@@ -36,7 +36,7 @@ class ThreeLink:
         fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
         # its angle is what is left of the sum: one arctangent for both elbows
         q2, q3 = (arrays.arctan2(pair.s, pair.c) for pair in (second, third))
-        left = arrays.wrapped(arrays.sub(arrays.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
+        left = arrays.wrap_angle(arrays.sub(arrays.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
         return [second, third, fourth], [q2, q3, arrays.mul(self.sense4, left)], doubt
 
     def miss(self, pairs: list[Pair], p: list[Entry]) -> tuple[Entry, Entry]:

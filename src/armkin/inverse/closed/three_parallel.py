@@ -91,7 +91,7 @@ class ThreeParallel:
 
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (shoulder, elbow, wrist, N)."""
-        D = pose.times(pose.times(self.from_base, goal), self.from_tool)  # joint 6's frame seen from joint 1
+        D = pose.compose(pose.compose(self.from_base, goal), self.from_tool)  # joint 6's frame seen from joint 1
         n, o = self.shoulder[6:9], self.shoulder[9:12]
         g = arrays.combine(1.0, D[9:12], self.height6, D[6:9])
         a = arrays.add(arrays.mul(n[0], g[0]), arrays.mul(n[1], g[1]))
@@ -123,16 +123,16 @@ class ThreeParallel:
         # Rz(-q6) v = w
         sixth, doubt6 = rotation_between(w[0], w[1], v[0], v[1], 1.0, prefer[5], disc)
         # joint 4's frame seen from joint 2
-        X = pose.times(pose.rotate(D, sixth.c, -sixth.s), self.back5)
-        X = pose.times(pose.rotate(X, c5, -s5), self.back4)
+        X = pose.compose(pose.rotate(D, sixth.c, -sixth.s), self.back5)
+        X = pose.compose(pose.rotate(X, c5, -s5), self.back4)
         p = pose.apply(self.to_joint2, _unrotate(c1, s1, X[9:12]))
-        x = pose.turn(self.to_joint2, _unrotate(c1, s1, X[0:3]))
+        x = pose.turn_direction(self.to_joint2, _unrotate(c1, s1, X[0:3]))
         pairs, angles, doubt23 = self.three_link.solve(p, x, prefer[1:4])
         doubt = doubt1 | doubt5 | doubt6 | doubt23
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
         # common direction; about that joint 4 takes whatever angle is left
         across, height = self.three_link.miss(pairs, p)
-        along = pose.turn(self.to_joint2, _unrotate(c1, s1, X[6:9]))
+        along = pose.turn_direction(self.to_joint2, _unrotate(c1, s1, X[6:9]))
         scale = 1.0 / self.reach**2
         aside = height * scale + distance2(along, [0.0, 0.0, self.three_link.sense4])
         miss = across * scale + aside

@@ -69,7 +69,7 @@ class Wrist:
         across: the square of z's part across joint 4, if the wrist can reach every z.
         """
         turn5 = pose.rotate(self.A, *fifth)
-        u = pose.turn(turn5, self.B[6:9])
+        u = pose.turn_direction(turn5, self.B[6:9])
         fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[0], across)
         c4, s4 = fourth
         # what is left is Rz(q6): its first column, which lies in the plane across joint 6

@@ -40,7 +40,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import rows_of, stacked
+from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import three_prismatic
 from armkin.inverse.elimination.choose_variable import Elimination, Kind, kinds, poses, prepare
@@ -103,7 +103,7 @@ def solve(elimination: Elimination, T: Array, moved: bool = True) -> Branches:
         guesses: (N, G, 6) postures close to answers of these, NaN past the last: to be corrected.
     """
     blocks = range(0, max(len(T), 1), BLOCK)
-    return stacked([_solve_block(elimination, T[begin : begin + BLOCK], moved) for begin in blocks])
+    return stack_rows([_solve_block(elimination, T[begin : begin + BLOCK], moved) for begin in blocks])
 
 
 def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:
@@ -151,7 +151,7 @@ def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers
             if open_poses.size == 0:
                 break
         settled[open_poses] = False
-    return stacked(parts), stacked(guesses), touching, settled, shaken
+    return stack_rows(parts), stack_rows(guesses), touching, settled, shaken
 
 
 def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
@@ -170,4 +170,4 @@ def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
         good = polished.residual < tol.GRAZING * far
         touching[begin + pose[good & (polished.residual > tol.ELIMINATED * far)]] = True
         parts.append(answers_of(closed, begin + pose, polished, good))
-    return stacked(parts), touching, full
+    return stack_rows(parts), touching, full

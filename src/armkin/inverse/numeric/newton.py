@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, Int, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrap_angle
 from armkin.forward import fk, tip_and_jacobian
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import residual, task_jacobian
@@ -133,7 +133,7 @@ def _least_step(J: Array, r: Array, least: Array) -> Array:
 def difference(arm: Arm, a: Array, b: Array) -> Array:
     """Joint values a less b modulo whole turns, prismatic ones in units of the reach: (..., n)."""
     d = a - b
-    return np.where(arm.prismatic, d / arm.reach, wrapped(d))
+    return np.where(arm.prismatic, d / arm.reach, wrap_angle(d))
 
 
 def wrapped_distance(arm: Arm, a: Array, b: Array) -> Array:
@@ -146,7 +146,7 @@ def distances(arm: Arm, a: Array, b: Array) -> Array:
     largest = np.zeros((len(a), a.shape[1], b.shape[1]))
     for i, slides in enumerate(arm.prismatic):  # one joint at a time: all at once leave the processor's cache
         d = np.ascontiguousarray(a[:, :, None, i]) - np.ascontiguousarray(b[:, None, :, i])
-        np.maximum(largest, np.abs(d / arm.reach if slides else wrapped(d)), out=largest)
+        np.maximum(largest, np.abs(d / arm.reach if slides else wrap_angle(d)), out=largest)
     return largest
 
 

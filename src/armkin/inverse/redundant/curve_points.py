@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import stacked
+from armkin.formula.array_tuples import stack_rows
 from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -42,7 +42,7 @@ def onto(find: Follower, row: Int, q: Array, last: Array, enough: float = tol.PA
     The tangents point to where last does. enough: size of a step that is the last one.
     """
     parts = slices(max(len(q), 1), AT_ONCE)
-    return stacked([_onto(find, row[part], q[part], last[part], enough) for part in parts])
+    return stack_rows([_onto(find, row[part], q[part], last[part], enough) for part in parts])
 
 
 def _onto(find: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:

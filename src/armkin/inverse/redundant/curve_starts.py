@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.curve_points import Points, Ways, onto
@@ -165,10 +165,10 @@ def _missed_at(find: Follower, joint: int, value: float, points: Points, row: In
 
 def _crossings(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Array, Int]:
     """Postures (M, n) in which curves have the joint at a value, and of which targets they are (M,)."""
-    away, change = wrapped(points.q[:, joint] - value), wrapped(points.q[after, joint] - points.q[:, joint])
+    away, change = wrap_angle(points.q[:, joint] - value), wrap_angle(points.q[after, joint] - points.q[:, joint])
     begins = np.flatnonzero((away * (away + change) <= 0) & (change != 0))
     ways = Ways.between(find, rows_of(points, begins), rows_of(points, after[begins]))
     share = -away[begins] / change[begins]
     for _ in range(SECANTS):
-        share = np.clip(share - wrapped(ways.at(find, share)[:, joint] - value) / change[begins], 0.0, 1.0)
+        share = np.clip(share - wrap_angle(ways.at(find, share)[:, joint] - value) / change[begins], 0.0, 1.0)
     return ways.at(find, share), row[begins]

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.batch import Batch, Goals, as_solutions
 from armkin.inverse.answers.solutions import Solutions, Status
@@ -57,7 +57,7 @@ def families(
     if free.still:
         return _with_tool_turn(ik, arm, free, targets, near, rounding)
     task = free.task
-    values, single = arrays.real(targets, "targets"), arrays.is_single(targets)
+    values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
     goal, lead, defect = read_targets(task, values)
     close = read_near(arm, near, lead)
     nears = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
@@ -92,7 +92,7 @@ def _with_tool_turn(
 ) -> Solutions:
     """The branches of the others, which the redundant joint's motion leaves as they are: each is a family."""
     r = free.joint
-    lead = shaped(free.task, arrays.real(targets, "targets"))[1]
+    lead = shaped(free.task, arrays.real_array(targets, "targets"))[1]
     close = read_near(arm, near, lead)
     s = ik(free.rest, targets, free.task.name, near=np.delete(close, r, axis=-1), rounding=rounding)
     close = np.broadcast_to(close, (*lead, arm.n)).copy()
@@ -249,7 +249,7 @@ def _with_near(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> A
     It may be a posture with a joint that is free, or one that its target's rounding moves far.
     """
     middle, half = 0.5 * (pieces.a + pieces.b), 0.5 * (pieces.b - pieces.a)
-    inside = np.abs(wrapped(near[:, joint] - middle)) <= half + tol.SAME
+    inside = np.abs(wrap_angle(near[:, joint] - middle)) <= half + tol.SAME
     cost = np.where(pieces.legal & inside, motion(arm, q, near), np.inf)
     placed = q.copy()
     for row in np.unique(pieces.row).tolist():

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import rows_of, stacked
+from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.boundaries import boundaries, places
@@ -46,7 +46,7 @@ class Followed(NamedTuple):
         if len(rows := np.flatnonzero(~complete)):
             pieces, short[rows] = _sampled(find.of(rows), 1)
             parts.append(pieces._replace(row=rows[pieces.row]))
-        return cls(find, stacked(parts), short, complete)
+        return cls(find, stack_rows(parts), short, complete)
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
         """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: where
@@ -74,7 +74,7 @@ def _between_places(find: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
     intervals, families = (rows_of(runs, explained[runs.row]) for runs in (shown.legal, shown.there))
     pieces = _of_runs(shown.t, intervals, True, changes[0], legal)
     without = _of_runs(shown.t, rows_of(families, ~families.within), False, changes[1], present)
-    return stacked([pieces, without]), shown.short, explained
+    return stack_rows([pieces, without]), shown.short, explained
 
 
 def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
@@ -91,7 +91,7 @@ def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
             for rows in (again[k : k + at_once] for k in range(0, len(again), at_once)):
                 part, part_short = _sampled(find.of(rows), more)
                 unchanged, closer = rows_of(pieces, ~np.isin(pieces.row, rows)), part._replace(row=rows[part.row])
-                pieces = stacked([unchanged, closer])
+                pieces = stack_rows([unchanged, closer])
                 short[rows] = part_short
     return pieces, short
 
@@ -117,7 +117,7 @@ def _pieces(find: Follower, shown: Seen) -> Pieces:
         middle = 0.5 * (a + b)
         q, legal = find.one(row, branch, middle)
         parts.append(rows_of(Pieces(row, branch, legal, a, b, a, b, a, middle, b, q), legal))
-    return stacked(parts)
+    return stack_rows(parts)
 
 
 def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -> Pieces:
@@ -152,6 +152,6 @@ def _without_gaps(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) ->
                 low, high = (np.clip(piece.low, a, b), np.clip(piece.high, a, b)) if holds else (a, b)
                 start, _ = find.one(piece.row, piece.branch, centre)
                 parts.append(piece._replace(a=a, b=b, first=a, last=b, low=low, at=centre, high=high, start=start))
-            pieces = stacked(parts)
+            pieces = stack_rows(parts)
             break
     return pieces

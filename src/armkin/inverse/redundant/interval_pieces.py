@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
 from armkin.model.arm import Arm
 
 
@@ -101,7 +101,7 @@ def within_limits(arm: Arm, j: int, value: Array, room: Array) -> None:
     if not np.isfinite(lower) or not np.isfinite(upper) or (not arm.prismatic[j] and upper - lower >= 2 * np.pi):
         return
     away = value - 0.5 * (lower + upper)
-    away = np.abs(away if arm.prismatic[j] else wrapped(away))
+    away = np.abs(away if arm.prismatic[j] else wrap_angle(away))
     np.minimum(room, 0.5 * (upper - lower) - away, out=room)
 
 

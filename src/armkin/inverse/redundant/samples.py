@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import stacked
-from armkin.formula.arrays import Array, Bool, Int, wrapped
+from armkin.formula.array_tuples import stack_rows
+from armkin.formula.arrays import Array, Bool, Int, wrap_angle
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.boundaries import on_both_sides
 from armkin.inverse.redundant.interval_pieces import best_samples, holding_none, runs, turning
@@ -107,9 +107,9 @@ def seen(find: Follower, t: Array, places: Array | None = None) -> Seen:
     at_once = max(AT_A_TIME // len(t), 1)
     parts = (np.arange(k, min(k + at_once, N)) for k in range(0, max(N, 1), at_once))
     if places is None:
-        return stacked([_seen(find.sampled(rows, t), rows, False) for rows in parts])
+        return stack_rows([_seen(find.sampled(rows, t), rows, False) for rows in parts])
     more = on_both_sides(places)
-    return stacked([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in parts])
+    return stack_rows([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in parts])
 
 
 def place_between(t: Array, changes: Changes, places: Array) -> Array:
@@ -156,7 +156,7 @@ def beside(q: Array, branch: Int) -> tuple[Array, Int, Array]:
     """Of branches (M,) among postures (M, B, n) the nearest other one: how far its joints are (M, n), which one (M,),
     squared (M,)."""
     index = np.arange(len(q))
-    away = wrapped(q - q[index, branch][:, None])
+    away = wrap_angle(q - q[index, branch][:, None])
     apart = (away**2).sum(axis=2)
     apart[index, branch] = np.inf
     apart = np.where(np.isnan(apart), np.inf, apart)
@@ -184,7 +184,7 @@ def _all_short(sampled: Sampled, row: Int, first: Int, length: Int) -> Bool:
     for k in np.flatnonzero(short).tolist():
         K, valid = sampled.valid.shape[1], sampled.valid[k]
         q = sampled.postures(np.full(K, k), np.arange(K))
-        step = np.abs(wrapped(np.roll(q, -1, axis=0) - q))
+        step = np.abs(wrap_angle(np.roll(q, -1, axis=0) - q))
         way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
         short[k] = 2.0 * way.max(initial=0.0) < tol.REACH
     return short

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import rows_of, stacked
-from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrapped
+from armkin.formula.array_tuples import rows_of, stack_rows
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.curve_points import Points, Ways, onto
@@ -44,7 +44,7 @@ class _Curves:
     def _add(self, nodes: Nodes) -> Int:
         """More nodes: their numbers."""
         first = len(self.nodes.row)
-        self.nodes = stacked([self.nodes, nodes])
+        self.nodes = stack_rows([self.nodes, nodes])
         self.partner = np.append(self.partner, np.full(2 * len(nodes.row), -1))
         self.traced = np.append(self.traced, np.zeros(2 * len(nodes.row), bool))
         return np.arange(first, first + len(nodes.row))
@@ -126,7 +126,7 @@ class _Curves:
         chosen &= np.isin(every, np.unique(to, return_index=True)[1])
         rays, whose = np.flatnonzero(chosen), np.concatenate([rays for rays, _ in passed])
         passing = np.flatnonzero(chosen[whose])
-        points, whose = rows_of(stacked([points for _, points in passed]), passing), whose[passing]
+        points, whose = rows_of(stack_rows([points for _, points in passed]), passing), whose[passing]
         added = self._add(Nodes(row[whose], np.full(len(passing), -1), points))
         a = np.append(ray[rays], 2 * added)[np.argsort(np.append(rays, whose), kind="stable")]
         b = np.append(2 * added + 1, to[rays])[np.argsort(np.append(whose, rays), kind="stable")]
@@ -168,7 +168,7 @@ class _Curves:
             good = (then.step < tol.SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(find, row[going])
             h[going] = np.where(good, np.minimum(1.5 * h[going], LONGEST), 0.5 * h[going])
             middle = low[going] + 0.5 * wide[going]
-            depth, before = (wrapped(points.q[:, j] - middle) for points in (then, begin))
+            depth, before = (wrap_angle(points.q[:, j] - middle) for points in (then, begin))
             left = good & (np.abs(depth) >= 0.5 * wide[going]) & (np.abs(depth - before) > tol.TINY)
             leaving, far = going[left], depth[left] > 0
             goal = np.where(far, 0.5, -0.5) * wide[leaving]
@@ -221,7 +221,7 @@ def curves_of(find: Follower) -> Chains:
     again, place = np.unique(row, return_inverse=True)
     more = _joined(find.of(again), place, q)
     unchanged = chains.curves(np.flatnonzero(~np.isin(chains.row, again)))
-    joined = stacked([unchanged, more._replace(row=again[more.row])])
+    joined = stack_rows([unchanged, more._replace(row=again[more.row])])
     return joined.curves(np.argsort(joined.row, kind="stable"))
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Bool, Int, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrap_angle
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -135,7 +135,7 @@ class Traced(NamedTuple):
         free = (arm.upper - arm.lower == np.inf) | (~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi))
         low, high = np.where(free, 0.0, arm.lower), np.where(free, 0.0, arm.upper)
         away = guess - 0.5 * (low + high)
-        away = np.where(arm.prismatic, away, wrapped(away))
+        away = np.where(arm.prismatic, away, wrap_angle(away))
         room = np.where(free, np.inf, 0.5 * (high - low) - np.abs(away))
         joint, index = room.argmin(axis=1), np.arange(len(point))
         held = np.zeros_like(guess)
@@ -218,7 +218,7 @@ class _Nodes(NamedTuple):
         length = np.append(length, run[empty])
         best = best_samples(costs, of + C * legal, first, length + 1)
         t = self.q[index, curves.find.free.joint]
-        way = np.cumsum(np.tile(wrapped(np.roll(t, -1, axis=1) - t), 2), axis=1)
+        way = np.cumsum(np.tile(wrap_angle(np.roll(t, -1, axis=1) - t), 2), axis=1)
         way = np.concatenate([np.zeros((C, 1)), way], axis=1)
         start = t[of, first]
         end = start + way[of, first + length] - way[of, first]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula import arrays
-from armkin.formula.array_tuples import rows_of, stacked
+from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty, pack
@@ -77,7 +77,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
         if examine and doubted:
             goals = Goals(arm, task, target, near)
             if any(chunk.plain.any() for chunk in doubted) and not geometry.ends:
-                edge = tell(goals, runner, batch, stacked(doubted))
+                edge = tell(goals, runner, batch, stack_rows(doubted))
             for start in range(0, len(edge), AT_ONCE):
                 batch = decided(goals, runner, batch, edge[start : start + AT_ONCE])
         edge = edge[:0]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import rows_of, stacked
+from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, write
@@ -72,7 +72,7 @@ def decided(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Batch:
         parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(left), seeds)]
     elif runner.geometry.ends:
         return batch
-    seeds = stacked([seeds for _, seeds in parts])
+    seeds = stack_rows([seeds for _, seeds in parts])
     return examined(goals, batch, rows[np.concatenate([part for part, _ in parts])], seeds, runner.others, unsettled)
 
 

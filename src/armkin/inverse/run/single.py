@@ -74,7 +74,7 @@ class OneTarget:
             return None
         near = self._home
         if given_near is not None:
-            near = arrays.real(given_near, "near")
+            near = arrays.real_array(given_near, "near")
             if near.shape != (self._n,) or not np.isfinite(near).all():
                 return None
         goal, defect = target.ravel().tolist(), 0.0

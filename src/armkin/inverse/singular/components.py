@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import replaced, rows_of, widened
+from armkin.formula.array_tuples import replace_rows, rows_of, widen_columns
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.answers.solutions import Status
@@ -67,7 +67,7 @@ def examine(
     again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
     whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
     second = _settle(goals.of(rows), Seeds.of(np.concatenate([found.q[rows], others], axis=1), whose), tol.HOPELESS)
-    return replaced(found, rows, second)._replace(again=again)
+    return replace_rows(found, rows, second)._replace(again=again)
 
 
 class _Candidates(NamedTuple):
@@ -360,7 +360,7 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     if (lost.nullity[:, 1:] > 1).any():
         q, label, size, rests = meetings.ways_out(goals, q, label, size, lost)
         if q.shape[1] > sure.shape[1]:
-            sure, simple = (widened(array, q.shape[1]) for array in (sure, simple))
+            sure, simple = (widen_columns(array, q.shape[1]) for array in (sure, simple))
             lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     at = _Candidates(q, label, size, sure, simple)
     return _Groups(goals, at, lost, rests).settled(np.asarray(missed), np.asarray(out))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool, Int, wrapped
+from armkin.formula.arrays import Array, Bool, Int, wrap_angle
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.closed import four_bars
 from armkin.inverse.numeric import newton
@@ -123,7 +123,7 @@ def _held_difference(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Arra
     if line.any():
         # what the two that turn differ by, besides a way along the line; before and behind the first of them
         first = (np.cumsum(np.abs(d), axis=-1) == 1.0) & (d != 0.0)
-        left = np.abs(wrapped(np.where(first, d * way, -d * way).sum(axis=-1)))
+        left = np.abs(wrap_angle(np.where(first, d * way, -d * way).sum(axis=-1)))
         held = np.where(line, np.maximum(held, left), held)
     return np.asarray(held)
 

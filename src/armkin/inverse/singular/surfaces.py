@@ -11,7 +11,7 @@ import itertools
 
 import numpy as np
 
-from armkin.formula.array_tuples import widened
+from armkin.formula.array_tuples import widen_columns
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.numeric import newton
@@ -53,7 +53,7 @@ def _with_curves(goals: Goals, decision: Examined, k: np.intp) -> Examined:
         return decision
     about = _about_one_line(J, pair)
     rows, names = np.concatenate([q[~about], rows]), np.append(label[~about], names)
-    q, valid, label = (widened(array, len(rows)) for array in (decision.q, decision.valid, decision.label))
+    q, valid, label = (widen_columns(array, len(rows)) for array in (decision.q, decision.valid, decision.label))
     listed = decision._replace(q=q, valid=valid, label=label, free=decision.free.copy())
     used = np.arange(listed.q.shape[1]) < len(rows)
     listed.q[k], listed.valid[k], listed.label[k] = np.nan, used, OWN

@@ -21,7 +21,7 @@ from functools import cache
 
 import numpy as np
 
-from armkin.formula.array_tuples import stacked, widened
+from armkin.formula.array_tuples import stack_rows, widen_columns
 from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.forward import fk
 from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
@@ -68,7 +68,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
 
     def rows(target: Array) -> Rows:
         parts = slices(max(len(target), 1), CHUNK)
-        solved = stacked([_solve(source, gap, elimination, target[part]) for part in parts])
+        solved = stack_rows([_solve(source, gap, elimination, target[part]) for part in parts])
         complete = _has_four_roots(arm, solved.q) if counted else solved.complete
         return solved._replace(doubt=solved.doubt & ~complete, complete=complete)  # four roots apart are simple ones
 
@@ -159,7 +159,7 @@ def _solve(source: Recorded, gap: float, elimination: Callable[[], Geometry | No
         settled, open_ = pairs.settled(source, gaps, target)
         if len(rows := np.flatnonzero(open_)):
             more, settled.doubt[rows] = _by_neighbours(source, gap, gaps[rows], None, target[rows])
-            settled = settled._replace(q=widened(settled.q, more.shape[1]))
+            settled = settled._replace(q=widen_columns(settled.q, more.shape[1]))
             settled.q[rows] = more
         return settled
     branches = _by_neighbours(source, gap, gaps, elimination, target)
@@ -186,7 +186,7 @@ def _by_neighbours(
         rings = (around(arm, task, goals, size * gaps[rows]) for size in RINGS)
         seeds_around = [source.rows(moved)[0] for ring in rings for moved in ring]
     more = _corrected_seeds(arm, task, np.concatenate([seeds[rows], *seeds_around], axis=1), goals, seeds.shape[1])
-    filled = widened(q, more.shape[1])
+    filled = widen_columns(q, more.shape[1])
     filled[rows] = more
     return filled, doubt
 

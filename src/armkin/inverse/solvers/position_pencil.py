@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.formula.array_tuples import stacked
+from armkin.formula.array_tuples import stack_rows
 from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.closed.geometry import Geometry, Rows
@@ -125,7 +125,7 @@ def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | Non
         return None
 
     def rows(target: Array) -> Rows:
-        roots = stacked([_solved(pencil, target[part]) for part in slices(max(len(target), 1), CHUNK)])
+        roots = stack_rows([_solved(pencil, target[part]) for part in slices(max(len(target), 1), CHUNK)])
         order = _order(newton.distances(arm, seeds.rows(target)[0], roots.q))
         return roots._replace(q=np.take_along_axis(roots.q, order[:, :, None], axis=1))
 

@@ -136,17 +136,17 @@ def moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], pair: Pair) -> 
     if free.joint:
         L = arm.link[-1]
         back = pose.rotate(pose.constant(inverse(L)), c, arrays.sub(0.0, s))
-        return pose.times(pose.times(goal, back), pose.constant(L))
+        return pose.compose(pose.compose(goal, back), pose.constant(L))
     L = arm.link[0]
-    G = pose.times(pose.rotate(pose.constant(L), c, arrays.sub(0.0, s)), pose.constant(inverse(L)))
+    G = pose.compose(pose.rotate(pose.constant(L), c, arrays.sub(0.0, s)), pose.constant(inverse(L)))
     if free.task.orientation == "full":
-        return pose.times(G, goal)
+        return pose.compose(G, goal)
     p = free.task.position
     entries = pose.apply(G, [*goal[:p], 0.0][:3])[:p]
     angle = arrays.arctan2(s, c)
     for k, rate in enumerate(free.task.sums[:, 0].tolist(), p):
         entries.append(arrays.sub(goal[k], arrays.mul(rate, angle)))
-    return [*entries, *(pose.turn(G, goal[3:6]) if free.task.orientation == "axis" else [])]
+    return [*entries, *(pose.turn_direction(G, goal[3:6]) if free.task.orientation == "axis" else [])]
 
 
 @lru_cache(maxsize=128)

@@ -42,7 +42,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
 
     def rows(goal: Array) -> Rows:
         T = np.empty((len(goal), 4, 4))
-        pose.write(pose_of(list(goal.T)), T)
+        pose.write_pose(pose_of(list(goal.T)), T)
         branches = solve_rows(T)
         guesses = None if branches.guesses is None else branches.guesses[:, :, :5]
         q = branches.q[:, :, :5]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armkin.formula.arrays import Array, wrapped
+from armkin.formula.arrays import Array, wrap_angle
 from armkin.inverse.tasks.task import NO_DIRECTION, Task
 
 SMALL_TURN = 1e-8  # by how much the trace of a small rotation is below 3
@@ -34,7 +34,7 @@ def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -
     if len(task.sums):
         sums = target[:, task.position : task.position + len(task.sums)]
         angle = sums - q @ task.sums.T - task.offsets
-        parts.append(wrapped(angle))
+        parts.append(wrap_angle(angle))
     if task.orientation == "axis":
         z = T[:, :3, 2]
         w = np.cross(z, target[:, 3:])

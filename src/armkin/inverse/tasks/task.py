@@ -65,7 +65,7 @@ class Task:
 
 def read_near(arm: Arm, near: ArrayLike | None, lead: tuple[int, ...]) -> Array:
     """Joint values to stay close to, (n,) or (*lead, n) [rad | mm]; by default home. Raises UsageError for others."""
-    close = arm.home if near is None else arrays.real(near, "near")
+    close = arm.home if near is None else arrays.real_array(near, "near")
     if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
         raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
     if not np.isfinite(close).all():
@@ -95,7 +95,7 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
 
 def shaped(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     """Targets as a flat batch (N, m), or (N, 4, 4) for poses, which are not read yet; and the batch's shape."""
-    values = arrays.real(targets, "targets")
+    values = arrays.real_array(targets, "targets")
     shape = (4, 4) if task.orientation == "full" else (len(task.labels),)
     if values.shape[-len(shape) :] != shape or values.ndim < len(shape):
         expected = "(..., 4, 4)" if task.orientation == "full" else f"(..., {shape[0]}): {' '.join(task.labels)}"
@@ -122,7 +122,7 @@ def _refuse_wild(values: Array) -> None:
 def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
     """Poses (N, 4, 4) with the rotations next to those given, how far these were off (N,), and the entries."""
     _refuse_wild(T)
-    entries = pose.read(T)
+    entries = pose.read_pose(T)
     check = rotation_check()
     if len(T) == 1:
         defect = check.one_by_one([pose.read_one(T[0])])[0]
@@ -134,7 +134,7 @@ def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
     if len(rows):
         T = T.copy()
         T[rows, :3, :3] = nearest_rotation(T[rows, :3, :3])
-        entries = pose.read(T)
+        entries = pose.read_pose(T)
     return T, defect, entries
 
 
