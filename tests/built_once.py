@@ -27,10 +27,10 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
         if len(_arms) > 100:
             _arms.clear()
         _arms[key] = _build(file)
-    one = _arms[key]
+    arm = _arms[key]
     names = (file.name, *(joint.name for joint in file.joints))
-    assert (one.name, *one.joint_names) == names, "a test before this one changed the arm of all: it may `replace` it"
-    return one
+    assert (arm.name, *arm.joint_names) == names, "a test before this one changed the arm of all: it may `replace` it"
+    return arm
 
 
 def install() -> None:

@@ -62,7 +62,7 @@ def run_patiently(*words: object, run: Callable[..., Result] = run) -> Result:
     """
     for _ in range(5):
         completed = run(*words)
-        if completed.code == 0 or not any(said in completed.err for said in BUSY):
+        if completed.code == 0 or not any(words_said in completed.err for words_said in BUSY):
             break
         if "position is known" in completed.err:
             words = tuple(word for word in words if word != "--assume-home")

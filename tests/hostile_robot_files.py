@@ -307,9 +307,9 @@ def _edits() -> dict[str, tuple[str, str, str]]:
     }
 
 
-def _edited(text: str, old: str, new: str) -> str:
-    assert old in text, old
-    return text.replace(old, new) if old == "a: " else text.replace(old, new, 1)
+def _edited(text: str, before: str, after: str) -> str:
+    assert before in text, before
+    return text.replace(before, after) if before == "a: " else text.replace(before, after, 1)
 
 
 def _joints(count: int) -> str:

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from typing import Any
 
 
-def interrupted(work: Callable[..., Any], at: int) -> Callable[..., Any]:
-    """The same work, which Ctrl-C ends when it is begun for the `at`-th time."""
+def interrupted(work: Callable[..., Any], number: int) -> Callable[..., Any]:
+    """The same work, which Ctrl-C ends when it is begun for the `number`-th time."""
     begun = 0
 
-    def stops(*given: object) -> object:
+    def stops(*arguments: object) -> object:
         nonlocal begun
         begun += 1
-        if begun == at:
+        if begun == number:
             raise KeyboardInterrupt
-        return work(*given)
+        return work(*arguments)
 
     return stops

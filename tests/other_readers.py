@@ -19,8 +19,8 @@ def gcode(text: str) -> np.ndarray:
     """All points that the tool passes behind the first one: (N, 3) [mm], arcs as chords."""
     unit, absolute, plane, motion, system = 1.0, True, (0, 1, 2), None, 1
     zero = {k: np.zeros(3) for k in range(1, 7)}
-    local, shift, at = np.zeros(3), np.zeros(3), np.zeros(3)
-    out: list[np.ndarray] = []
+    local, shift, place = np.zeros(3), np.zeros(3), np.zeros(3)
+    points: list[np.ndarray] = []
     for raw in text.splitlines():
         line = re.sub(r"\([^)]*\)", "", raw.split(";")[0]).upper()
         line = re.sub(r"\*\d+\s*$", "", re.sub(r"\s", "", line))
@@ -34,29 +34,29 @@ def gcode(text: str) -> np.ndarray:
             plane = axes if k in codes else plane
         system = next((int(c) - 53 for c in codes if 54 <= c <= 59), system)
         motion = next((c for c in codes if c in (0, 1, 2, 3)), motion)
-        given = [(k, value[a] * unit) for k, a in enumerate("XYZ") if a in value]
+        axis_values = [(k, value[a] * unit) for k, a in enumerate("XYZ") if a in value]
         if 10 in codes:
-            for k, x in given:
+            for k, x in axis_values:
                 number = int(value.get("P", 0)) or system
-                zero[number][k] = x if value["L"] == 2 else at[k] - local[k] - shift[k] - x
+                zero[number][k] = x if value["L"] == 2 else place[k] - local[k] - shift[k] - x
         elif 52 in codes or 92 in codes:
-            for k, x in given:
+            for k, x in axis_values:
                 if 52 in codes:
                     local[k] = x
                 else:
-                    shift[k] = at[k] - zero[system][k] - local[k] - x
-        elif given or (motion in (2, 3) and set(value) & set("IJKR")):
-            goal, base = at.copy(), np.zeros(3) if 53 in codes else zero[system] + local + shift
-            for k, x in given:
-                goal[k] = base[k] + x if absolute or 53 in codes else at[k] + x
+                    shift[k] = place[k] - zero[system][k] - local[k] - x
+        elif axis_values or (motion in (2, 3) and set(value) & set("IJKR")):
+            goal, base = place.copy(), np.zeros(3) if 53 in codes else zero[system] + local + shift
+            for k, x in axis_values:
+                goal[k] = base[k] + x if absolute or 53 in codes else place[k] + x
             if motion in (2, 3):
-                out += _turned(at, goal, plane, motion == 3, value, unit, bool(out))
+                points += _turned(place, goal, plane, motion == 3, value, unit, bool(points))
             else:
-                out.append(goal)
-            at = goal
+                points.append(goal)
+            place = goal
         if {m for a, m in words if a == "M"} & {2.0, 30.0}:
             break
-    return np.array(out)
+    return np.array(points)
 
 
 def _turned(
@@ -149,39 +149,41 @@ def _path(d: str) -> list[np.ndarray]:
     tokens = re.findall(r"[A-Za-z]|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", d)
     strokes: list[list[complex]] = []
     f = np.linspace(0.0, 1.0, _ARC)[1:]
-    i, now, begin, command, last, before = 0, 0j, 0j, "", 0j, ""
+    i, point, begin, command, last, before = 0, 0j, 0j, "", 0j, ""
     while i < len(tokens):
         if tokens[i].isalpha():
             command, i = tokens[i], i + 1
-        kind, base = command.upper(), now if command.islower() else 0j
+        kind, base = command.upper(), point if command.islower() else 0j
         size = {"Z": 0, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "A": 7}.get(kind, 2)
         v, i = [float(x) for x in tokens[i : i + size]], i + size
         z = [base + complex(v[k], v[k + 1]) for k in range(0, size - 1, 2)] if size % 2 == 0 else []
         if kind == "M":
-            now = begin = z[0]
-            strokes.append([now])
+            point = begin = z[0]
+            strokes.append([point])
             command = "l" if command == "m" else "L"
         elif kind == "Z":
             strokes[-1].append(begin)
-            now = begin
+            point = begin
         elif kind in "LHV":
-            now = z[0] if kind == "L" else (
-                complex(base.real + v[0], now.imag) if kind == "H" else complex(now.real, base.imag + v[0])
+            point = z[0] if kind == "L" else (
+                complex(base.real + v[0], point.imag) if kind == "H" else complex(point.real, base.imag + v[0])
             )  # fmt: skip
-            _stroke(strokes, begin, before).append(now)
+            _stroke(strokes, begin, before).append(point)
         elif kind in "CSQT":
             cubic = kind in "CS"
-            first = z[0] if kind in "CQ" else 2 * now - last if before in ("CS" if cubic else "QT") and before else now
+            first = (
+                z[0] if kind in "CQ" else 2 * point - last if before in ("CS" if cubic else "QT") and before else point
+            )
             last = (z[1] if kind == "C" else z[0]) if cubic else first
-            b: list[Any] = [now, first, last, z[-1]] if cubic else [now, first, z[-1]]
+            b: list[Any] = [point, first, last, z[-1]] if cubic else [point, first, z[-1]]
             for k in range(len(b) - 1, 0, -1):  # de Casteljau
                 b = [b[j] + f * (b[j + 1] - b[j]) for j in range(k)]
             _stroke(strokes, begin, before).extend(b[0])
-            now = z[-1]
+            point = z[-1]
         elif kind == "A":
             end = base + complex(v[5], v[6])
-            _stroke(strokes, begin, before).extend(_ellipse(now, end, v, f))
-            now = end
+            _stroke(strokes, begin, before).extend(_ellipse(point, end, v, f))
+            point = end
         before = kind
     return [np.array(s) for s in strokes if np.ptp(np.array(s).real) + np.ptp(np.array(s).imag) > 0]  # dots are none
 

@@ -46,11 +46,11 @@ class PtyBoard(Pty):
         """Until the board is in a state."""
         self.until(lambda: self.state == state, state.name)
 
-    def until(self, there: Callable[[], bool], what: str) -> None:
+    def until(self, is_reached: Callable[[], bool], state_name: str) -> None:
         """Until something has happened."""
         end = time.monotonic() + 60
-        while not there():
-            assert time.monotonic() < end, f"not {what} within a minute: {self.state.name} at {self.net}"
+        while not is_reached():
+            assert time.monotonic() < end, f"not {state_name} within a minute: {self.state.name} at {self.net}"
             time.sleep(0.005)
 
     def _open(self) -> None:
@@ -65,19 +65,19 @@ class PtyBoard(Pty):
         line.register(self._master, select.POLLIN)
         while not self._end.is_set():
             events = dict(line.poll(2)).get(self._master, 0)
-            there = not events & select.POLLHUP
+            is_open = not events & select.POLLHUP
             data = os.read(self._master, 4096) if events & select.POLLIN else b""
             with self.lock:
-                self.board.advance(self.time.passed(heard=bool(data), there=there))
+                self.board.advance(self.time.passed(heard=bool(data), is_open=is_open))
                 if data:
                     self.board.receive(self._line(data))
-                out = self._line(self.board.take())
-            if not there:
+                sent = self._line(self.board.take())
+            if not is_open:
                 time.sleep(0.002)  # a hang-up does not wait
                 continue  # nobody listens: what the board says is gone
-            while out and not self._end.is_set():
+            while sent and not self._end.is_set():
                 try:
-                    out = out[os.write(self._master, out) :]
+                    sent = sent[os.write(self._master, sent) :]
                 except BlockingIOError:
                     break  # nobody reads: what the board says is gone
 
@@ -86,10 +86,10 @@ class PtyBoard(Pty):
             return b""
         if not self.noise:
             return data
-        out = bytearray()
+        damaged = bytearray()
         for byte in data:
             if self._random.random() < self.noise:
                 byte ^= 1 << self._random.randrange(8)
             if self._random.random() >= self.noise:
-                out.append(byte)
-        return bytes(out)
+                damaged.append(byte)
+        return bytes(damaged)

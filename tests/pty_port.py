@@ -41,18 +41,18 @@ class Patient:
         self._last = self._heard = time.monotonic()
         self._gaps = (patience, patience)  # [s] between words, lately
 
-    def passed(self, *, heard: bool, there: bool = True) -> float:
-        """Seconds since this was asked last, for a board; heard: the host was; there: it has the port open.
+    def passed(self, *, heard: bool, is_open: bool = True) -> float:
+        """Seconds since this was asked last, for a board; heard: the host was; is_open: it has the port open.
 
         At most 20 ms: a machine that was busy is not made up for, while the host has had no chance to answer.
         """
-        now = time.monotonic()
-        seconds, self._last = min(now - self._last, 0.02), now
-        if heard or not there:
-            if now - self._heard > 0.002:  # else it belongs to what came before
-                self._gaps = (now - self._heard, self._gaps[0])
-            self._silent, self._heard = 0.0, now
-        elif self._silent >= self._waits() and now - self._heard < 20:  # whoever says nothing for 20 s means it
+        present = time.monotonic()
+        seconds, self._last = min(present - self._last, 0.02), present
+        if heard or not is_open:
+            if present - self._heard > 0.002:  # else it belongs to what came before
+                self._gaps = (present - self._heard, self._gaps[0])
+            self._silent, self._heard = 0.0, present
+        elif self._silent >= self._waits() and present - self._heard < 20:  # whoever says nothing for 20 s means it
             return 0.0
         self._silent += seconds
         return seconds
@@ -104,9 +104,9 @@ class Served:
                 if heard:
                     board.write(heard)
                 late = max(0.0, time.monotonic() - began - board.now())
-                said = board.read(min(late, 0.02))  # what it is late by it makes up for, and listens all the same
-            if said:
-                send(said)
+                answer = board.read(min(late, 0.02))  # what it is late by it makes up for, and listens all the same
+            if answer:
+                send(answer)
             elif not heard and late < 0.02:
                 select.select([line], [], [], 0.004)
 

@@ -43,77 +43,77 @@ def _n(x: float, digits: int = 3) -> str:
 
 
 def _slicer(rng: np.random.Generator) -> str:
-    out = [";FLAVOR:Marlin", "M140 S60", "M104 S205 ; hotend", "G21", "G90", "M82", "G28 ;home", "G92 E0"]
+    lines = [";FLAVOR:Marlin", "M140 S60", "M104 S205 ; hotend", "G21", "G90", "M82", "G28 ;home", "G92 E0"]
     e = 0.0
     for layer in range(int(rng.integers(1, 4))):
         z = 0.2 + 0.2 * layer
-        out += [f";LAYER:{layer}", "M106 S85" if layer else "M107", f"G0 F6000 X20 Y20 Z{_n(z)}", ";TYPE:WALL-OUTER"]
+        lines += [f";LAYER:{layer}", "M106 S85" if layer else "M107", f"G0 F6000 X20 Y20 Z{_n(z)}", ";TYPE:WALL-OUTER"]
         sides, r = int(rng.integers(3, 60)), rng.uniform(5, 15)
         for k, a in enumerate(np.linspace(0, 2 * np.pi, sides + 1)):
             e += 0.05
-            out.append(f"{'G0 F9000' if k == 0 else 'G1 F1200' if k == 1 else 'G1'} "
+            lines.append(f"{'G0 F9000' if k == 0 else 'G1 F1200' if k == 1 else 'G1'} "
                        f"X{_n(20 + r * np.cos(a))} Y{_n(20 + r * np.sin(a))} E{e:.5f}")  # fmt: skip
-        out += ["G1 F2400 E-1", ";TYPE:FILL", "G91", f"G1 Z{_n(rng.uniform(0.1, 1))} F600", "G90"]
+        lines += ["G1 F2400 E-1", ";TYPE:FILL", "G91", f"G1 Z{_n(rng.uniform(0.1, 1))} F600", "G90"]
         for k in range(int(rng.integers(2, 8))):
             y = 12 + k * 1.2
-            out += [f"G1 X{10 if k % 2 else 30} Y{_n(y)} E{e:.5f}", f"G1 X{10 if k % 2 else 30} Y{_n(y + 1.2)}"]
-    return "\n".join([*out, "M104 S0", "G92 E0", "M84 X Y E"]) + "\n"
+            lines += [f"G1 X{10 if k % 2 else 30} Y{_n(y)} E{e:.5f}", f"G1 X{10 if k % 2 else 30} Y{_n(y + 1.2)}"]
+    return "\n".join([*lines, "M104 S0", "G92 E0", "M84 X Y E"]) + "\n"
 
 
 def _cam(rng: np.random.Generator) -> str:
     inch = rng.random() < 0.5
     k = 1 / 25.4 if inch else 1.0
-    out = ["%", "O1001 (POCKET)", "G17 G40 G49 G80 G90 " + ("G20" if inch else "G21"), "T1 M6", "S12000 M3", "G54"]
-    out.append(f"G0 X{_n(10 * k, 4)} Y{_n(10 * k, 4)}")
-    out += [f"Z{_n(5 * k, 4)}", f"G1 Z{_n(-1 * k, 4)} F{_n(300 * k, 1)}"]
+    lines = ["%", "O1001 (POCKET)", "G17 G40 G49 G80 G90 " + ("G20" if inch else "G21"), "T1 M6", "S12000 M3", "G54"]
+    lines.append(f"G0 X{_n(10 * k, 4)} Y{_n(10 * k, 4)}")
+    lines += [f"Z{_n(5 * k, 4)}", f"G1 Z{_n(-1 * k, 4)} F{_n(300 * k, 1)}"]
     for _ in range(int(rng.integers(2, 9))):
         how, r = int(rng.integers(5)), rng.uniform(2, 9) * k
         word = "G2" if rng.random() < 0.5 else "G3"
         if how == 0:
-            out.append(f"{word} I{_n(r, 4)} J{_n(0.5 * r, 4)}")  # a whole circle
+            lines.append(f"{word} I{_n(r, 4)} J{_n(0.5 * r, 4)}")  # a whole circle
         elif how == 1:
-            out.append(f"G91 {word} X{_n(2 * r, 4)} Y0 I{_n(r, 4)} J0 Z{_n(rng.uniform(-1, 1) * k, 4)}")
-            out.append("G90")
+            lines.append(f"G91 {word} X{_n(2 * r, 4)} Y0 I{_n(r, 4)} J0 Z{_n(rng.uniform(-1, 1) * k, 4)}")
+            lines.append("G90")
         elif how == 2:
-            axes, one, two = (("G18", "X", "Z"), ("G19", "Y", "Z"))[int(rng.integers(2))]
+            axes, first_axis, two = (("G18", "X", "Z"), ("G19", "Y", "Z"))[int(rng.integers(2))]
             i, j = ("I", "K") if axes == "G18" else ("J", "K")
-            out += [f"{axes} G91 {word} {one}{_n(r, 4)} {two}{_n(r, 4)} {i}{_n(r, 4)} {j}0", "G17 G90"]
+            lines += [f"{axes} G91 {word} {first_axis}{_n(r, 4)} {two}{_n(r, 4)} {i}{_n(r, 4)} {j}0", "G17 G90"]
         elif how == 3:
-            out.append(f"G1 X{_n(rng.uniform(0, 40) * k, 4)} Y{_n(rng.uniform(0, 40) * k, 4)}")
+            lines.append(f"G1 X{_n(rng.uniform(0, 40) * k, 4)} Y{_n(rng.uniform(0, 40) * k, 4)}")
         else:
-            out.append(f"G91 {word} P{int(rng.integers(1, 4))} X{_n(r, 4)} Y{_n(r, 4)} I{_n(r, 4)} J0 G90"
+            lines.append(f"G91 {word} P{int(rng.integers(1, 4))} X{_n(r, 4)} Y{_n(r, 4)} I{_n(r, 4)} J0 G90"
                        .replace(" G90", "\nG90"))  # fmt: skip
-    out += ["M5 M9", "M30", "%"]
-    return "\n".join(f"N{10 * i} {line}" if line not in ("%",) else line for i, line in enumerate(out)) + "\n"
+    lines += ["M5 M9", "M30", "%"]
+    return "\n".join(f"N{10 * i} {line}" if line not in ("%",) else line for i, line in enumerate(lines)) + "\n"
 
 
 def _plotter(rng: np.random.Generator) -> str:
-    out = ["g21 g90", "F1500", "g0 z5"]
+    lines = ["g21 g90", "F1500", "g0 z5"]
     for _ in range(int(rng.integers(1, 6))):
         x, y = rng.uniform(0, 60, 2)
-        out += [f"g0x{_n(x)}y{_n(y)}", "m3 s90", "g1z0"]
+        lines += [f"g0x{_n(x)}y{_n(y)}", "m3 s90", "g1z0"]
         for _ in range(int(rng.integers(1, 10))):
             dx, dy = rng.uniform(-9, 9, 2)
             x, y = round(x + dx, 3), round(y + dy, 3)
             r = round(float(np.hypot(dx, dy)) * rng.uniform(0.52, 2) * (1 if rng.random() < 0.7 else -1), 3)
             line = f"g1x{_n(x)}y{_n(y)}" if rng.random() < 0.5 else f"g{rng.integers(2, 4)} x{_n(x)} y{_n(y)} r{_n(r)}"
-            out.append(line)
-        out += ["m5", "g0z5 (pen up)"]
-    return "\n".join(out) + "\n"
+            lines.append(line)
+        lines += ["m5", "g0z5 (pen up)"]
+    return "\n".join(lines) + "\n"
 
 
 def _sender(rng: np.random.Generator) -> str:
-    out = ["G21 G90 G54", "G0 X0 Y0 Z0", "F800"]
+    parts = ["G21 G90 G54", "G0 X0 Y0 Z0", "F800"]
     for _ in range(int(rng.integers(5, 25))):
         how = int(rng.integers(8))
         x, y, z = (float(round(v, 3)) for v in rng.uniform(-20, 20, 3))
-        out.append((
+        parts.append((
             f"G1 X{x} Y{y}", f"G91\nG1 X{x} Z{z}\nG90", f"G92 X{x} Y{y}", f"G52 X{x} Z{z}",
             f"G10 L2 P{rng.integers(0, 7)} X{x} Y{y} Z{z}", f"G10 L20 P{rng.integers(0, 7)} X{x} Z{z}",
             f"G{rng.integers(54, 60)} G0 X{x}", f"G53 G1 X{x} Y{y}",
         )[how])  # fmt: skip
-    out += ["G1 X1 Y2 Z3", "X4"]
-    lines = "\n".join(out).splitlines()
+    parts += ["G1 X1 Y2 Z3", "X4"]
+    lines = "\n".join(parts).splitlines()
     if rng.random() < 0.5:  # numbered, with checksums
         for i, line in enumerate(lines):
             text, check = f"N{i + 1} {line}", 0
@@ -163,7 +163,7 @@ def _shape(rng: np.random.Generator) -> str:
 
 def _data(rng: np.random.Generator) -> str:
     """Path data; numbers run together as drawing programs write them."""
-    out = "M{:g} {:g}".format(*rng.uniform(10, 40, 2).round(2))
+    path = "M{:g} {:g}".format(*rng.uniform(10, 40, 2).round(2))
     for _ in range(int(rng.integers(1, 9))):
         letter = str(rng.choice(list("LlHhVvCcSsQqTtAaZzm")))
         n = {"H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "Z": 0}.get(letter.upper(), 2)
@@ -172,7 +172,7 @@ def _data(rng: np.random.Generator) -> str:
         if letter in "Aa":
             rx, ry = rng.uniform(2, 20, 2).round(2)
             text = f"{rx:g} {ry:g} {rng.integers(-90, 90)} {rng.integers(2)} {rng.integers(2)} {text}"
-        out += letter + (text.replace(" -", "-") if rng.random() < 0.5 and letter not in "Aa" else text)
+        path += letter + (text.replace(" -", "-") if rng.random() < 0.5 and letter not in "Aa" else text)
         if letter == "m":
-            out += " l3 1"
-    return out
+            path += " l3 1"
+    return path

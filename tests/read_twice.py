@@ -22,8 +22,8 @@ def along(points: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, float]:
 def apart(a: np.ndarray, b: np.ndarray) -> float:
     """Greatest distance of two ways, each point from the other way's segments about the same share of its length."""
     f = np.linspace(0.0, 1.0, 4001)
-    (p, long), (q, other) = along(a, f), along(b, f)
-    return max(_off(p, q), _off(q, p), abs(long - other) / 50 - 0.01)
+    (p, long), (q, other_length) = along(a, f), along(b, f)
+    return max(_off(p, q), _off(q, p), abs(long - other_length) / 50 - 0.01)
 
 
 def _off(p: np.ndarray, q: np.ndarray) -> float:
@@ -39,20 +39,20 @@ def _off(p: np.ndarray, q: np.ndarray) -> float:
 
 def program_read(text: str) -> np.ndarray:
     """What armkin reads of a program: (N, 3) [mm], arcs as chords."""
-    out: list[np.ndarray] = []
+    points: list[np.ndarray] = []
     for move in gcode.parse_gcode(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions()).moves:
         if move.point is not None:
-            out.append(np.array(move.point))
-        out += [np.array(p) for p in move.polyline or []]
+            points.append(np.array(move.point))
+        points += [np.array(p) for p in move.polyline or []]
         if move.arc is not None:
-            out += list(_through(out[-1], np.array(move.arc.via), np.array(move.arc.to)))
+            points += list(_through(points[-1], np.array(move.arc.via), np.array(move.arc.to)))
         if move.circle is not None:
             c, n = np.array(move.circle.centre), np.array(move.circle.normal)
-            r, turn = out[-1] - c, 2 * np.pi * move.circle.turns
+            r, turn = points[-1] - c, 2 * np.pi * move.circle.turns
             f = np.linspace(0.0, 1.0, int(2000 * max(abs(turn), 1.0)))[1:, None]
             flat = np.cos(turn * f) * r + np.sin(turn * f) * np.cross(n, r)
-            out += list(c + flat + f * move.circle.rise * n)
-    return np.array(out)
+            points += list(c + flat + f * move.circle.rise * n)
+    return np.array(points)
 
 
 def _through(a: np.ndarray, via: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -87,10 +87,10 @@ def drawing_off(seed: int) -> float:
     return apart(mine, np.concatenate(other_readers.svg(text)))
 
 
-def spoilt(seed: int, which: int) -> tuple[str, str, str]:
+def spoilt(seed: int, number: int) -> tuple[str, str, str]:
     """A drawing with a broken element, or a broken line: its text, the place that is named, what is said."""
     lines, rng = random_drawings.drawing(seed).splitlines(), np.random.default_rng(seed)
-    line, words = random_drawings.BROKEN_ELEMENTS[which % len(random_drawings.BROKEN_ELEMENTS)]
+    line, words = random_drawings.BROKEN_ELEMENTS[number % len(random_drawings.BROKEN_ELEMENTS)]
     k = int(rng.integers(3, len(lines)))  # behind the head, before the end
     lines.insert(k, line)
     return "\n".join(lines), f"t.svg:{k + 1}: ", words

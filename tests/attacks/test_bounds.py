@@ -87,16 +87,16 @@ def test_plans_that_were_sent_are_not_kept() -> None:
     sent: list[weakref.ref[Any]] = []
 
     def plans() -> Iterator[Any]:
-        at = planner.counts(arm.home)
+        counts = planner.counts(arm.home)
         for goal in np.deg2rad([[0, 85, -85], [5, 80, -80], [0, 85, -85]]):
-            made = planner.plan(at, goal[None])
-            at = made.end.tolist()
+            made = planner.plan(counts, goal[None])
+            counts = made.end.tolist()
             sent.append(weakref.ref(made))
             yield made
 
     for made in planner.sum_up(plans()):
         del made
     gc.collect()
-    assert [one() for one in sent] == [None, None, None]
+    assert [reference() for reference in sent] == [None, None, None]
     assert planner.total_sent.waypoints == 3
     assert planner.total_sent.summary()["pulses"] == planner.counts(np.deg2rad([0, 85, -85]))

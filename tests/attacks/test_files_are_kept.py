@@ -51,21 +51,21 @@ def test_a_robot_file_stays(words: tuple[str, ...], out: str, folder: Path) -> N
 
 def test_an_input_stays(folder: Path) -> None:
     (folder / "same.csv").hardlink_to(folder / "rows.csv")
-    for out in ("rows.csv", "same.csv"):
-        completed = run("fk", folder / "r/three_dof.yaml", "--batch", folder / "rows.csv", "--out", folder / out)
+    for target in ("rows.csv", "same.csv"):
+        completed = run("fk", folder / "r/three_dof.yaml", "--batch", folder / "rows.csv", "--out", folder / target)
         assert (completed.code, completed.out) == (2, "")
         assert "is what this command reads; give the output another name" in completed.err
     assert (folder / "rows.csv").read_text() == ROW
 
 
 def test_a_read_only_file_stays(folder: Path) -> None:
-    kept = folder / "kept.csv"
-    kept.write_text("mine\n")
-    kept.chmod(0o444)
-    completed = run("fk", THREE_DOF, "--batch", folder / "rows.csv", "--out", kept)
+    read_only = folder / "kept.csv"
+    read_only.write_text("mine\n")
+    read_only.chmod(0o444)
+    completed = run("fk", THREE_DOF, "--batch", folder / "rows.csv", "--out", read_only)
     assert (completed.code, completed.out) == (1, "")
     assert "it is read-only; give another name" in completed.err
-    assert kept.read_text() == "mine\n"
+    assert read_only.read_text() == "mine\n"
 
 
 def test_a_log_that_stdout_is_added_to_grows(folder: Path) -> None:

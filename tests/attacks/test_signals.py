@@ -47,8 +47,8 @@ def test_signals_while_rows_are_read_are_not_lost() -> None:
     columns = Columns(("q1", "q2", "q3"), "pose")
     columns.first_row_read = True
     text = b"1,2,3\n" * 16_000
-    seen: list[int] = []
-    before = signal.signal(signal.SIGTERM, lambda number, frame: seen.append(number))
+    received: list[int] = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: received.append(number))
     try:
         for delay in np.random.default_rng(7).uniform(0, 0.004, 100):
             sender = threading.Timer(delay, os.kill, (os.getpid(), signal.SIGTERM))
@@ -57,7 +57,7 @@ def test_signals_while_rows_are_read_are_not_lost() -> None:
                 assert columns.all_plain(text) is not None
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert len(seen) == 100
+    assert len(received) == 100
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a POSIX shell")
@@ -106,7 +106,7 @@ def test_ctrl_c_while_modules_are_imported_is_silent() -> None:
     """Later and later, from the first own line on: nothing is printed, whatever is being imported."""
     began = time.monotonic()
     subprocess.run([*ARMKIN, "fk", "three_dof", "home"], check=True, capture_output=True)
-    whole = time.monotonic() - began
+    duration = time.monotonic() - began
     # the garbage collector's setting is the first thing that it does with signals taken
     program = "import armkin.cli, gc, types; tell = lambda *numbers: print(flush=True)\n"
     program += "armkin.cli.gc = types.SimpleNamespace(set_threshold=tell); armkin.cli.main()"
@@ -115,7 +115,7 @@ def test_ctrl_c_while_modules_are_imported_is_silent() -> None:
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         assert process.stdout is not None
         process.stdout.readline()
-        time.sleep(0.005 + whole * i / 12)
+        time.sleep(0.005 + duration * i / 12)
         process.send_signal(signal.SIGINT)
         _, error = process.communicate(timeout=60)
         assert error == b""

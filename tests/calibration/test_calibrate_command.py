@@ -15,18 +15,23 @@ def test_the_command_writes_a_file_that_the_others_take(tmp_path: Path) -> None:
     arm = armkin.load("three_dof")
     rng = np.random.default_rng(13)
     c = commands(arm, 40, rng)
-    csv, out = tmp_path / "rows.csv", tmp_path / "mine.yaml"
+    csv, corrected = tmp_path / "rows.csv", tmp_path / "mine.yaml"
     rows = np.concatenate([np.degrees(c), measured(built(arm, 13), c, rng)], axis=1)
     np.savetxt(csv, rows, delimiter=",", header="q1,q2,q3,x,y,z", comments="")
-    completed = run("calibrate", "three_dof", csv, "--out", out, "--json")
+    completed = run("calibrate", "three_dof", csv, "--out", corrected, "--json")
     assert completed.code == 0, completed.err
     answer = completed.json
     assert answer["after"]["rms_mm"] < 0.05 * answer["before"]["rms_mm"]
-    assert answer["out"] == str(out)
+    assert answer["out"] == str(corrected)
     assert {row["row"] for row in answer["flagged"]} <= set(range(2, 42))
     assert len(answer["flagged"]) == 2
-    assert "three_dof, calibrated from 40 measured poses" in out.read_text()
-    for words in (["fk", out, 10, 20, 30], ["ik", out, 300, 100, 250], ["pulses", out, 10, 20, 30], ["info", out]):
+    assert "three_dof, calibrated from 40 measured poses" in corrected.read_text()
+    for words in (
+        ["fk", corrected, 10, 20, 30],
+        ["ik", corrected, 300, 100, 250],
+        ["pulses", corrected, 10, 20, 30],
+        ["info", corrected],
+    ):
         assert run(*words).code == 0
     shown = run("calibrate", "three_dof", csv)
     assert "on rows not used" in shown.out

@@ -51,22 +51,22 @@ def test_the_corrected_arm_is_the_model(name: str) -> None:
     rng = np.random.default_rng(2)
     p = rng.normal(size=len(corrections.parameters)) * corrections.prior * 0.3
     c = commands(arm, 20, rng)
-    new, _ = corrections.corrected_arm(p)
-    assert np.abs(armkin.fk(new, c) - corrections.poses(p, c)[0]).max() < 1e-9
+    corrected, _ = corrections.corrected_arm(p)
+    assert np.abs(armkin.fk(corrected, c) - corrections.poses(p, c)[0]).max() < 1e-9
     none = corrections.corrected_arm(np.zeros(len(p)))[0]
     assert np.abs(armkin.fk(none, c) - armkin.fk(arm, c)).max() < 1e-9
 
 
 def test_a_row_s_weight_is_the_slope_of_its_cost() -> None:
     """Geman and McClure: iteratively reweighted least squares goes down that cost, to which a far row adds nothing."""
-    at, step = np.array([0.0, 0.5, 2.0, 5.0, 30.0]), 1e-6
-    low, high = (np.sqrt(np.maximum(at + side, 0.0)) for side in (-step, step))
+    squares, step = np.array([0.0, 0.5, 2.0, 5.0, 30.0]), 1e-6
+    low, high = (np.sqrt(np.maximum(squares + side, 0.0)) for side in (-step, step))
 
     def cost(r: float) -> float:
         return robust_fit._cost(np.array([[r, 0.0, 0.0]]), None, (1.0, 1.0), np.zeros(1))
 
     slopes = [(cost(b) - cost(a)) / (b * b - a * a) for a, b in zip(low, high, strict=True)]
-    r = np.sqrt(at)[:, None] * [1.0, 0.0, 0.0]
+    r = np.sqrt(squares)[:, None] * [1.0, 0.0, 0.0]
     assert dropped_rows.weights(r, 1.0) == pytest.approx(slopes, rel=1e-6)
     assert dropped_rows.weights(3.0 * r, 3.0) == pytest.approx(dropped_rows.weights(r, 1.0))
 
@@ -77,12 +77,12 @@ def test_a_built_arm_is_found(name: str, noise: float, figure: float) -> None:
     errors, ratios = [], []
     for seed in range(2):
         rng = np.random.default_rng(100 + seed)
-        true = built(arm, seed)
+        real_arm = built(arm, seed)
         c = commands(arm, 60, rng)
-        calibration = armkin.calibrate(arm, c, measured(true, c, rng, noise=noise))
+        calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, noise=noise))
         unseen = commands(arm, 1000, rng)
-        errors.append(rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], true.tips(unseen)))
-        ratios.append(errors[-1] / rms(armkin.fk(arm, unseen)[:, :3, 3], true.tips(unseen)))
+        errors.append(rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
+        ratios.append(errors[-1] / rms(armkin.fk(arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
         assert len(calibration.flagged) == 3  # 5 % of 60
         assert calibration.noise == pytest.approx(noise, rel=0.3)
     assert np.median(errors) <= 1.5 * figure
@@ -105,10 +105,10 @@ def test_four_rows_do_no_harm() -> None:
     worse = 0
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        true = built(arm, seed, base=False)
+        real_arm = built(arm, seed, base=False)
         c, unseen = commands(arm, 4, rng), commands(arm, 300, rng)
-        calibration = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
-        tips = measured(true, unseen, rng, wrong=0.0)
+        calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, wrong=0.0))
+        tips = measured(real_arm, unseen, rng, wrong=0.0)
         after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibration.arm, arm))
         worse += after > 1.05 * before
     assert worse <= 1  # of 12; tests/bench/bench_calibration.py counts 200
@@ -123,10 +123,10 @@ def test_few_rows_show_that_the_base_stands_elsewhere(
     shares, seeds = [], sample(12, 6)
     for seed in range(seeds):
         rng = np.random.default_rng(500 + seed)
-        true = built(arm, seed)
+        real_arm = built(arm, seed)
         c, unseen = commands(arm, rows, rng), commands(arm, 300, rng)
-        calibration = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
-        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], true.tips(unseen)) for a in (calibration.arm, arm))
+        calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, wrong=0.0))
+        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], real_arm.tips(unseen)) for a in (calibration.arm, arm))
         shares.append(after / before)
     assert np.sum(np.array(shares) < 0.75) >= moved * seeds // 12
     assert max(shares) < 1.05
@@ -137,10 +137,10 @@ def test_four_rough_rows_that_fit_by_chance_are_seen_through(seed: int) -> None:
     """Seeds of tests/bench/bench_calibration.py (1 mm of noise) where cross-validation alone chose a harmful fit."""
     arm = armkin.load("three_dof")
     rng = np.random.default_rng(1000 + seed)
-    true = built(arm, seed, base=False)
+    real_arm = built(arm, seed, base=False)
     c, unseen = commands(arm, 4, rng), commands(arm, 300, rng)
-    calibration = armkin.calibrate(arm, c, measured(true, c, rng, noise=1.0, wrong=0.0))
-    tips = measured(true, unseen, rng, noise=1.0, wrong=0.0)
+    calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, noise=1.0, wrong=0.0))
+    tips = measured(real_arm, unseen, rng, noise=1.0, wrong=0.0)
     after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibration.arm, arm))
     assert after <= 1.05 * before
 
@@ -148,37 +148,37 @@ def test_four_rough_rows_that_fit_by_chance_are_seen_through(seed: int) -> None:
 def test_one_row_in_five_may_be_wrong() -> None:
     arm = armkin.load("ar4")
     rng = np.random.default_rng(9)
-    true = built(arm, 9)
+    real_arm = built(arm, 9)
     c = commands(arm, 60, rng)
-    calibration = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.2))
+    calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, wrong=0.2))
     unseen = commands(arm, 500, rng)
     assert len(calibration.flagged) == 12
-    assert rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], true.tips(unseen)) < 0.25
+    assert rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)) < 0.25
 
 
 def test_poses_show_how_the_tool_is_turned() -> None:
     arm = armkin.load("ur5e")
     rng = np.random.default_rng(4)
-    true = built(arm, 4)
+    real_arm = built(arm, 4)
     c = commands(arm, 40, rng)
-    T = true.poses(c)
+    T = real_arm.poses(c)
     T[:, :3, 3] += rng.normal(size=(40, 3)) * 0.1
     calibration = armkin.calibrate(arm, c, T)
     unseen = commands(arm, 300, rng)
-    got, want = armkin.fk(calibration.arm, unseen), true.poses(unseen)
-    assert rms(got[:, :3, 3], want[:, :3, 3]) < 0.15
-    assert np.abs(np.swapaxes(got[:, :3, :3], 1, 2) @ want[:, :3, :3] - np.eye(3)).max() < 3e-4
+    calibrated, want = armkin.fk(calibration.arm, unseen), real_arm.poses(unseen)
+    assert rms(calibrated[:, :3, 3], want[:, :3, 3]) < 0.15
+    assert np.abs(np.swapaxes(calibrated[:, :3, :3], 1, 2) @ want[:, :3, :3] - np.eye(3)).max() < 3e-4
 
 
 def test_fixed_kinds_stay_and_zeros_alone_are_one_command() -> None:
     arm = armkin.load("three_dof")
     rng = np.random.default_rng(5)
     c = commands(arm, 30, rng)
-    off = np.array([0.01, -0.02, 0.015])
-    tips = armkin.fk(arm, c + off)[:, :3, 3]
+    offsets = np.array([0.01, -0.02, 0.015])
+    tips = armkin.fk(arm, c + offsets)[:, :3, 3]
     calibration = armkin.calibrate(arm, c, tips, fix=[kind for kind in KINDS if kind != "zeros"])
     assert calibration.kinds == ["zeros"]
-    assert [value for _, value, _, _ in calibration.corrections] == pytest.approx(off, abs=1e-6)
+    assert [value for _, value, _, _ in calibration.corrections] == pytest.approx(offsets, abs=1e-6)
     assert np.array_equal(calibration.arm.base, arm.base)
     assert np.array_equal(calibration.arm.ratio, arm.ratio)
     with pytest.raises(UsageError, match="no kind zero of corrections; there are base, tool, zeros"):
@@ -192,11 +192,11 @@ def test_what_rows_cannot_show_is_named_and_stays() -> None:
     rng = np.random.default_rng(6)
     c = commands(arm, 40, rng)
     calibration = armkin.calibrate(arm, c, measured(built(arm, 6), c, rng))
-    told = "; ".join(calibration.unseen)
-    assert "J6 zero" in told  # the tip is on the last axis
-    assert "base z" in told
-    assert "J1 d" in told
-    assert "(only their sum)" in told
+    unseen = "; ".join(calibration.unseen)
+    assert "J6 zero" in unseen  # the tip is on the last axis
+    assert "base z" in unseen
+    assert "J1 d" in unseen
+    assert "(only their sum)" in unseen
     last = next(value for name, value, _, _ in calibration.corrections if name == "J6 zero")
     assert abs(last) < 1e-3
 
@@ -243,11 +243,11 @@ def test_suggested_poses_tell_more_than_random_ones() -> None:
     errors: dict[str, list[float]] = {"suggested": [], "random": []}
     for seed in range(2):
         rng = np.random.default_rng(seed)
-        true = built(arm, seed)
+        real_arm = built(arm, seed)
         unseen = commands(arm, 500, rng)
         for how, c in (("suggested", poses), ("random", commands(arm, 15, rng))):
-            calibration = armkin.calibrate(arm, c, measured(true, c, rng, wrong=0.0))
-            errors[how].append(rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], true.tips(unseen)))
+            calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, wrong=0.0))
+            errors[how].append(rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
     assert np.mean(errors["suggested"]) < np.mean(errors["random"])
     with pytest.raises(UsageError, match="ask for 1 to 1000"):
         next_poses(arm, 0)

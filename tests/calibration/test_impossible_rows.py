@@ -66,12 +66,12 @@ def test_rows_that_cannot_be_right_are_named(how: str, says: str, tmp_path: Path
     c, x = bad_rows(how)
     with pytest.raises(UsageError, match=says):
         armkin.calibrate(armkin.load("ar4"), c, x)
-    csv, out = tmp_path / "rows.csv", tmp_path / "new.yaml"
+    csv, corrected = tmp_path / "rows.csv", tmp_path / "new.yaml"
     np.savetxt(csv, np.concatenate([np.degrees(c), x], axis=1), delimiter=",")
-    completed = run("calibrate", "ar4", csv, "--out", out)
+    completed = run("calibrate", "ar4", csv, "--out", corrected)
     assert completed.code == 2
     assert completed.out == ""
-    assert not out.exists()
+    assert not corrected.exists()
 
 
 def test_a_measuring_frame_may_stand_anywhere() -> None:

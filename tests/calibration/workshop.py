@@ -47,16 +47,16 @@ def built(arm: armkin.Arm, seed: int, *, base: bool = True) -> Built:
         for key, error in (("a", 0.5), ("d", 0.5), ("alpha", 0.2), ("theta", 1.0)):
             row[key] += error * rng.normal()
         joints.append({key: value for key, value in joint.items() if key not in ("limits", "home")} | {"dh": row})
-    where = data.get("base", {"xyz": [0, 0, 0], "rpy": [0, 0, 0]})
+    base_pose = data.get("base", {"xyz": [0, 0, 0], "rpy": [0, 0, 0]})
     shift = (20 / np.sqrt(3) if base else 0.0) * rng.normal(size=3)
     turn = (3 / np.sqrt(3) if base else 0.0) * rng.normal(size=3)
     changed = {
-        "xyz": [float(x) for x in np.add(where["xyz"], shift)],
-        "rpy": [float(x) for x in np.add(where["rpy"], turn)],
+        "xyz": [float(x) for x in np.add(base_pose["xyz"], shift)],
+        "rpy": [float(x) for x in np.add(base_pose["rpy"], turn)],
     }
     keep = {key: value for key, value in data.items() if key in ("name", "convention", "tool")}
-    true = build(robot_file.parse_robot_file(format_robot_file({**keep, "base": changed, "joints": joints})))
-    return Built(true, 1.0 + 0.002 * rng.normal(size=arm.n))
+    real_arm = build(robot_file.parse_robot_file(format_robot_file({**keep, "base": changed, "joints": joints})))
+    return Built(real_arm, 1.0 + 0.002 * rng.normal(size=arm.n))
 
 
 def commands(arm: armkin.Arm, count: int, rng: np.random.Generator) -> Array:
@@ -66,9 +66,9 @@ def commands(arm: armkin.Arm, count: int, rng: np.random.Generator) -> Array:
     return rng.uniform(low, high, (count, arm.n))
 
 
-def measured(true: Built, c: Array, rng: np.random.Generator, *, noise: float = 0.1, wrong: float = 0.05) -> Array:
+def measured(real_arm: Built, c: Array, rng: np.random.Generator, *, noise: float = 0.1, wrong: float = 0.05) -> Array:
     """Tips as measured: with noise [mm] a coordinate, and a share of rows wrong by 5 mm."""
-    x = true.tips(c) + rng.normal(size=(len(c), 3)) * noise
+    x = real_arm.tips(c) + rng.normal(size=(len(c), 3)) * noise
     bad = rng.choice(len(c), round(wrong * len(c)), replace=False)
     direction = rng.normal(size=(len(bad), 3))
     x[bad] += 5 * direction / np.linalg.norm(direction, axis=1, keepdims=True)

@@ -69,17 +69,17 @@ def test_machine_code_prints_the_bytes_that_python_prints(table: Table, monkeypa
     doubles = rng.integers(0, 2**64, 40_000, dtype=np.uint64).view(np.float64)
     near = [10.0 ** rng.uniform(-6, 18, 20_000), 2.0 ** np.arange(-1074, 1024), rng.uniform(-400, 400, 20_000).round(3)]
     for values in (doubles, *near):
-        one: Table = {"row": np.arange(len(values)) - 7, "value": values, "far": -values}
-        assert csv_and_json_lines.csv(one, compiled_text.table_lines) == by_python(one, monkeypatch)[0]
+        float_table: Table = {"row": np.arange(len(values)) - 7, "value": values, "far": -values}
+        assert csv_and_json_lines.csv(float_table, compiled_text.table_lines) == by_python(float_table, monkeypatch)[0]
     fast = (
         csv_and_json_lines.csv(table, compiled_text.table_lines),
         csv_and_json_lines.json_lines(table, compiled_text.table_lines),
     )
     assert fast == by_python(table, monkeypatch)
-    assert csv_and_json_lines.csv(part(one, slice(0, 0)), compiled_text.table_lines) == b""
-    whole = np.array([0, 9, 10, 99, 100, 2**32 - 1, 2**32, 10**8, 10**16, 2**63 - 1, -(2**63), -10])
-    assert csv_and_json_lines.csv({"a": whole}, compiled_text.table_lines).decode().split() == list(
-        map(str, whole.tolist())
+    assert csv_and_json_lines.csv(part(float_table, slice(0, 0)), compiled_text.table_lines) == b""
+    integers = np.array([0, 9, 10, 99, 100, 2**32 - 1, 2**32, 10**8, 10**16, 2**63 - 1, -(2**63), -10])
+    assert csv_and_json_lines.csv({"a": integers}, compiled_text.table_lines).decode().split() == list(
+        map(str, integers.tolist())
     )
 
 
@@ -89,9 +89,9 @@ def test_a_number_is_read_as_python_reads_it(row: list[float], form: str) -> Non
     text = (",".join(words).encode() + b"\n") * 3000
     columns = Columns("abcd", "a test")
     columns.first_row_read = True
-    found = columns.all_plain(text)
-    assert found is not None
-    assert found.tolist() == [[float(word) for word in words]] * 3000
+    values = columns.all_plain(text)
+    assert values is not None
+    assert values.tolist() == [[float(word) for word in words]] * 3000
 
 
 @pytest.fixture
@@ -112,15 +112,15 @@ def ik(source: Path, out: Path, *more: object) -> Result:
 def test_columns_are_what_objects_say(rows: Path, more: list[str]) -> None:
     lines = run("ik", THREE_DOF, "--batch", rows, "--json", *more).lines
     found = run("ik", THREE_DOF, "--batch", rows, *more).out.splitlines()
-    wanted = []
+    expected = []
     for number, answer in enumerate(lines, 2):
         for branch in answer["branches"]:
-            rest = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
+            measures = [branch[key] for key in ("within_limits", "residual_mm", "residual_deg", "motion")]
             name = branch["name"].replace(",", "")
-            wanted.append(csv_line([number, answer["status"], name, *branch["joints"], *rest]))
+            expected.append(csv_line([number, answer["status"], name, *branch["joints"], *measures]))
         if not answer["branches"]:
-            wanted.append(csv_line([number, answer["status"], None, None, None, None, False, None, None, None]))
-    assert found[1:] == wanted
+            expected.append(csv_line([number, answer["status"], None, None, None, None, False, None, None, None]))
+    assert found[1:] == expected
 
 
 def test_every_format_holds_the_same_and_is_read_again(rows: Path, tmp_path: Path) -> None:
@@ -151,9 +151,9 @@ def test_json_is_no_archive(rows: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("end", ["csv", "npz", "parquet"])
 def test_processes_change_no_byte(rows: Path, tmp_path: Path, end: str) -> None:
-    one, two = tmp_path / f"one.{end}", tmp_path / f"two.{end}"
-    assert ik(rows, one) == ik(rows, two, "--workers", 2)
-    assert one.read_bytes() == two.read_bytes()
+    alone, two = tmp_path / f"one.{end}", tmp_path / f"two.{end}"
+    assert ik(rows, alone) == ik(rows, two, "--workers", 2)
+    assert alone.read_bytes() == two.read_bytes()
 
 
 def test_processes_without_rows_leave_nothing(tmp_path: Path) -> None:
@@ -184,21 +184,21 @@ def stop_after(pieces: int, monkeypatch: pytest.MonkeyPatch, error: BaseExceptio
 def test_a_run_goes_on_where_it_was_ended(
     rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str, more: list[str]
 ) -> None:
-    whole, out = tmp_path / f"whole.{end}", tmp_path / f"out.{end}"
-    done = ik(rows, whole, *more)
+    undisturbed, target = tmp_path / f"whole.{end}", tmp_path / f"out.{end}"
+    completed = ik(rows, undisturbed, *more)
     with monkeypatch.context() as patch:
         stop_after(4, patch, KeyboardInterrupt())
-        assert ik(rows, out, *more).code == 130
+        assert ik(rows, target, *more).code == 130
     folder = tmp_path / f"out.{end}.parts"
     assert sorted(path.name for path in folder.iterdir() if path.name[0] == "0") == [f"{i:08d}" for i in range(4)]
     (folder / "00000004.writing").write_bytes(b"half")
-    refused = ik(rows, out, *more)
+    refused = ik(rows, target, *more)
     assert refused.code == 1
     assert f"out.{end}.parts holds what an earlier run has finished" in refused.err
     answered = stop_after(99, monkeypatch, KeyboardInterrupt())
-    assert ik(rows, out, *more, "--resume") == done
+    assert ik(rows, target, *more, "--resume") == completed
     assert answered == [4, 5, 6, 7, 8, 9]
-    assert out.read_bytes() == whole.read_bytes()
+    assert target.read_bytes() == undisturbed.read_bytes()
     assert not folder.exists()
 
 
@@ -243,18 +243,18 @@ def test_two_runs_do_not_share_a_folder(rows: Path, tmp_path: Path, monkeypatch:
         stop_after(4, patch, KeyboardInterrupt())
         ik(rows, out)
     job = json.loads((tmp_path / "out.csv.parts" / "job.json").read_text())
-    other = finished_chunks.Parts(str(out), job)
-    other.begin()
+    second_run = finished_chunks.Parts(str(out), job)
+    second_run.begin()
     assert "another run works on it" in ik(rows, out, "--resume").err
-    other.leave()
+    second_run.leave()
     assert ik(rows, out, "--resume").code == 3
 
 
 def test_a_full_disk_stops_and_the_run_goes_on_later(
     rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole, out = tmp_path / "whole.csv", tmp_path / "out.csv"
-    ik(rows, whole)
+    undisturbed, out = tmp_path / "whole.csv", tmp_path / "out.csv"
+    ik(rows, undisturbed)
     flush = os.fsync
     calls: list[int] = []
 
@@ -271,7 +271,7 @@ def test_a_full_disk_stops_and_the_run_goes_on_later(
     assert "the disk is full; what is finished stays in" in stopped.err
     assert "--resume" in stopped.err
     assert ik(rows, out, "--resume").code == 3
-    assert out.read_bytes() == whole.read_bytes()
+    assert out.read_bytes() == undisturbed.read_bytes()
 
 
 def test_resume_belongs_to_a_file(rows: Path) -> None:
@@ -287,7 +287,7 @@ def test_bad_archives_are_told(tmp_path: Path) -> None:
     (tmp_path / "e.npz").write_bytes(b"no archive")
     (tmp_path / "f.parquet").write_bytes(b"no table")
     (tmp_path / "g.jsonl").write_text('{"x": 1, "y": "two", "z": 3}\n')
-    for name, said in (
+    for name, message in (
         ("a.npz", "not of one length"),
         ("b.npz", "has no column z"),
         ("c.npz", "row 2: z: inf is too large"),
@@ -299,7 +299,7 @@ def test_bad_archives_are_told(tmp_path: Path) -> None:
     ):
         completed = run("ik", THREE_DOF, "--batch", tmp_path / name)
         assert completed.code in (1, 2), name
-        assert said in completed.err, completed.err
+        assert message in completed.err, completed.err
 
 
 def test_the_error_of_unfinished_parts_has_its_fields(tmp_path: Path) -> None:
@@ -313,17 +313,17 @@ def test_machine_code_takes_the_same_branch() -> None:
     rng = np.random.default_rng(4)
     for N, B, n in ((3_000, 8, 6), (500, 1, 3), (400, 5, 7), (20, 0, 6), (0, 8, 6)):
         near, scale = rng.uniform(-1.0, 1.0, n), np.where(rng.random(n) < 0.3, 1.0, np.pi / 180)
-        q, wanted = rng.uniform(-3.0, 3.0, (N, B, n)), rng.random((N, B)) < 0.6
+        q, is_valid = rng.uniform(-3.0, 3.0, (N, B, n)), rng.random((N, B)) < 0.6
         if B > 2:  # as far as another one, but for rounding
             q[::3, 1] = 2.0 * near - q[::3, 0] + 1e-12
-        q[~wanted] = np.nan
-        there, fast = (
-            ik_columns.nearest(q, wanted, near, scale),
-            compiled_nearest.nearest_branches(q, wanted, near, scale),
+        q[~is_valid] = np.nan
+        python, fast = (
+            ik_columns.nearest(q, is_valid, near, scale),
+            compiled_nearest.nearest_branches(q, is_valid, near, scale),
         )
         assert fast is not None
-        assert (fast[0] == there[0]).all()
-        assert (fast[1] == there[1])[there[0] >= 0].all()
+        assert (fast[0] == python[0]).all()
+        assert (fast[1] == python[1])[python[0] >= 0].all()
     assert (
         compiled_nearest.nearest_branches(np.zeros((1, 1, 8)), np.ones((1, 1), bool), np.zeros(8), np.ones(8)) is None
     )

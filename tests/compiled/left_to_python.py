@@ -13,14 +13,14 @@ from armkin.inverse import solve
 
 def left_to_python(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many targets Python is asked, call by call, from now on."""
-    asked: list[int] = []
+    counts: list[int] = []
     answered = solve.answered
 
     def counted(
-        arm: armkin.Arm, task: Any, geometry: Any, targets: np.ndarray, *rest: Any, **named: Any
+        arm: armkin.Arm, task: Any, geometry: Any, targets: np.ndarray, *others_given: Any, **named: Any
     ) -> armkin.Solutions:
-        asked.append(len(targets))
-        return answered(arm, task, geometry, targets, *rest, **named)
+        counts.append(len(targets))
+        return answered(arm, task, geometry, targets, *others_given, **named)
 
     monkeypatch.setattr(solve, "answered", counted)
-    return asked
+    return counts

@@ -60,10 +60,10 @@ def test_the_elimination_says_what_python_says(robot: str) -> None:
     if arm.n == 6:  # tool down: pencils of their own
         down = target.copy()
         down[:, :3, :3] = np.diag([1.0, -1.0, -1.0])
-        python, found = armkin.ik(arm, down), fast.ik(down)
-        found_by_elimination(python, found)
-        assert found.complete.all()
-        assert found.valid.any(axis=1).sum() > 10
+        python, compiled = armkin.ik(arm, down), fast.ik(down)
+        found_by_elimination(python, compiled)
+        assert compiled.complete.all()
+        assert compiled.valid.any(axis=1).sum() > 10
     far = target[0].copy()
     far[:3, ...] *= 9 if far.ndim == 1 else [1, 1, 1, 9]
     found_by_elimination(armkin.ik(arm, far), fast.ik(far))
@@ -100,8 +100,8 @@ def test_joints_half_a_turn_from_near_say_what_python_says(robot: str) -> None:
     """Limits of a turn either way, of half a turn, and others; one `near` of zeros, another one, and one a target."""
     arm = armkin.load(ROBOTS / f"{robot}.yaml")
     fast, target = armkin.compile(arm), questions(arm, "corners", 200)
-    each = np.pi / 4 * np.random.default_rng(5).integers(-4, 5, (200, arm.n))
-    for near in (np.zeros(arm.n), np.full(arm.n, -np.pi / 2), each):
+    near_of_each = np.pi / 4 * np.random.default_rng(5).integers(-4, 5, (200, arm.n))
+    for near in (np.zeros(arm.n), np.full(arm.n, -np.pi / 2), near_of_each):
         solutions = armkin.ik(arm, target, near=near)
         same(solutions, fast.ik(target, near=near))
         assert (np.abs(np.abs(solutions.q - solutions.near[:, None]) - np.pi) < 1e-9).any()
@@ -114,8 +114,8 @@ def test_one_target_and_its_shapes(robot: str) -> None:
     arm = armkin.load(ROBOTS / f"{robot}.yaml")
     fast = armkin.compile(arm)
     target = questions(arm, "random", 4)
-    for given in (target[0], target[0].tolist(), target.reshape(2, 2, *target.shape[1:]), target[:0]):
-        same(armkin.ik(arm, given), fast.ik(given))
+    for shaped in (target[0], target[0].tolist(), target.reshape(2, 2, *target.shape[1:]), target[:0]):
+        same(armkin.ik(arm, shaped), fast.ik(shaped))
     same(armkin.ik(arm, target[1], near=arm.home + 3), fast.ik(target[1], near=arm.home + 3))
 
 
@@ -126,10 +126,10 @@ def test_near_decides_the_copies(robot: str) -> None:
     target = questions(arm, "random", 300)
     near = np.random.default_rng(5).uniform(-6, 6, (300, arm.n))
     same(armkin.ik(arm, target, near=near[0]), fast.ik(target, near=near[0]))
-    each = fast.ik(target, near=near)
+    solutions = fast.ik(target, near=near)
     for k in range(40):
         same(armkin.ik(arm, target[k], near=near[k]), fast.ik(target[k], near=near[k]))
-        np.testing.assert_array_equal(each.q[k], fast.ik(target[k : k + 1], near=near[k : k + 1]).q[0])
+        np.testing.assert_array_equal(solutions.q[k], fast.ik(target[k : k + 1], near=near[k : k + 1]).q[0])
 
 
 def test_poses_are_those_of_python() -> None:
@@ -164,10 +164,10 @@ def test_workers_change_nothing() -> None:
     arm = armkin.load(ROBOTS / "ur5e.yaml")
     fast = armkin.compile(arm)
     target = questions(arm, "random", 20_000)
-    one, two = fast.ik(target), fast.ik(target, workers=2)
-    np.testing.assert_array_equal(one.q, two.q)
-    same(one, two)
-    q = np.nan_to_num(one.q[:, 0])
+    alone, two = fast.ik(target), fast.ik(target, workers=2)
+    np.testing.assert_array_equal(alone.q, two.q)
+    same(alone, two)
+    q = np.nan_to_num(alone.q[:, 0])
     np.testing.assert_array_equal(fast.fk(q), fast.fk(q, workers=3))
     with pytest.raises(armkin.UsageError, match="workers"):
         fast.ik(target, workers=0)
@@ -178,11 +178,11 @@ def test_results_longer_than_caches_are_those_of_their_parts() -> None:
     arm = armkin.load(ROBOTS / "puma560.yaml")
     fast = armkin.compile(arm)
     T = armkin.fk(arm, np.random.default_rng(9).uniform(-3, 3, (42_000, 6)))
-    whole, parts = fast.ik(T), [fast.ik(T[start : start + 21_000]) for start in (0, 21_000)]
+    at_once, parts = fast.ik(T), [fast.ik(T[start : start + 21_000]) for start in (0, 21_000)]
     for field in ("q", "valid", "within_limits", "branch", "status"):
         B = min(getattr(part, field).shape[-1] for part in parts) if field != "status" else None
         together = np.concatenate([getattr(part, field)[..., :B] for part in parts])
-        np.testing.assert_array_equal(getattr(whole, field)[..., :B], together)
+        np.testing.assert_array_equal(getattr(at_once, field)[..., :B], together)
 
 
 @pytest.fixture
@@ -197,27 +197,27 @@ SOURCE = 'const char arm_content[] = "abc"; int answer(void); int answer(void) {
 
 def test_what_was_built_is_kept_and_used_again(cache: Path) -> None:
     assert toolchain.load_library(SOURCE, "abc").answer() == 42
-    [kept] = cache.glob("*.so")
+    [library] = cache.glob("*.so")
     assert stat.S_IMODE(cache.stat().st_mode) == 0o700
-    assert stat.S_IMODE(kept.stat().st_mode) == 0o700
-    before = kept.stat().st_mtime_ns
+    assert stat.S_IMODE(library.stat().st_mode) == 0o700
+    before = library.stat().st_mtime_ns
     assert toolchain.load_library(SOURCE, "abc").answer() == 42
-    assert kept.stat().st_mtime_ns == before
+    assert library.stat().st_mtime_ns == before
 
 
 @pytest.mark.parametrize("harm", ["open folder", "open file", "link", "torn", "another"])
 def test_what_others_could_have_written_is_not_loaded(cache: Path, harm: str, tmp_path: Path) -> None:
     toolchain.load_library(SOURCE, "abc")
-    [kept] = cache.glob("*.so")
+    [library] = cache.glob("*.so")
     evil = tmp_path / "evil.so"
     text = SOURCE.replace("42", "666").replace("abc", "abd" if harm == "another" else "abc")
     subprocess.run(["cc", "-shared", "-fPIC", "-x", "c", "-", "-o", evil], input=text.encode(), check=True)
-    kept.unlink()
+    library.unlink()
     if harm == "link":
-        kept.symlink_to(evil)
+        library.symlink_to(evil)
     else:
-        kept.write_bytes(evil.read_bytes() if harm != "torn" else b"\x7fELF")
-        kept.chmod(0o722 if harm == "open file" else 0o700)
+        library.write_bytes(evil.read_bytes() if harm != "torn" else b"\x7fELF")
+        library.chmod(0o722 if harm == "open file" else 0o700)
     if harm == "open folder":
         cache.chmod(0o777)
     assert toolchain.load_library(SOURCE, "abc").answer() == 42
@@ -290,11 +290,11 @@ def test_a_posture_that_solves_its_target_is_listed_to_the_bit(robot: str) -> No
     rounded = exact.copy()
     rounded[..., :3, -1] = np.round(exact[..., :3, -1], 7)
     for target in (exact, rounded):
-        many = fast.ik(target, near=q)
-        np.testing.assert_array_equal(many.q[np.arange(24), many.best], q)
+        batch = fast.ik(target, near=q)
+        np.testing.assert_array_equal(batch.q[np.arange(24), batch.best], q)
         for k in range(0, 24, 3):
-            one, slow = fast.ik(target[k], near=q[k]), armkin.ik(arm, target[k], near=q[k])
-            np.testing.assert_array_equal(one.q[one.best], q[k])
+            alone, slow = fast.ik(target[k], near=q[k]), armkin.ik(arm, target[k], near=q[k])
+            np.testing.assert_array_equal(alone.q[alone.best], q[k])
             np.testing.assert_array_equal(slow.q[slow.best], q[k])
             all_near_one = fast.ik(target, near=q[k])
             np.testing.assert_array_equal(all_near_one.q[k, all_near_one.best[k]], q[k])
@@ -307,10 +307,10 @@ def test_results_keep_their_own_targets(robot: str) -> None:
     fast = armkin.compile(arm)
     target, near = questions(arm, "random", 3), np.random.default_rng(2).uniform(-1, 1, (3, arm.n))
     for goal, close in ((target, near), (target[0], near[0]), (target, near[0])):
-        asked, beside = goal.copy(), close.copy()
-        solutions = fast.ik(asked, near=beside)
+        own_target, beside = goal.copy(), close.copy()
+        solutions = fast.ik(own_target, near=beside)
         best = solutions.best
-        asked[...], beside[...] = 0.0, 2.0
+        own_target[...], beside[...] = 0.0, 2.0
         np.testing.assert_array_equal(solutions.target, goal)
         np.testing.assert_array_equal(solutions.near, np.broadcast_to(close, solutions.near.shape))
         np.testing.assert_array_equal(solutions.best, best)
@@ -340,12 +340,12 @@ def test_roots_that_solutions_share_are_taken_apart_in_c(
     T[:, :3, 3] = arm.reach * rng.uniform(-0.4, 0.4, (40, 3)) + [0, 0, 0.2 * arm.reach]
     if robot not in ELIMINATED:
         request.getfixturevalue("quickly")
-    own = armkin.ik(arm, T)
-    asked = left_to_python(monkeypatch)
+    python = armkin.ik(arm, T)
+    left = left_to_python(monkeypatch)
     solutions = armkin.compile(arm).ik(T)
-    assert sum(asked) <= 1
-    assert own.valid.sum() > 100
-    found_by_elimination(solutions, own)
+    assert sum(left) <= 1
+    assert python.valid.sum() > 100
+    found_by_elimination(solutions, python)
 
 
 @pytest.mark.usefixtures("quickly")
@@ -353,14 +353,14 @@ def test_an_arm_off_its_class_is_solved_in_c_and_named_after_it(monkeypatch: pyt
     """A calibrated UR5e: all of its targets were solved in Python, 0.2 ms each."""
     arm = build(parse_robot_file((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 0,", "alpha: 0.01,", 1)))
     target = questions(arm, "random", 60)
-    own, one = armkin.ik(arm, target), armkin.ik(arm, target[0])
-    asked = left_to_python(monkeypatch)
+    python, single = armkin.ik(arm, target), armkin.ik(arm, target[0])
+    left = left_to_python(monkeypatch)
     solutions = armkin.compile(arm).ik(target)
-    assert sum(asked) <= 1
+    assert sum(left) <= 1
     assert solutions.method == "general elimination"
     assert "flip" in solutions.names[0]
-    found_by_elimination(solutions, own)
-    found_by_elimination(armkin.compile(arm).ik(target[0]), one)
+    found_by_elimination(solutions, python)
+    found_by_elimination(armkin.compile(arm).ik(target[0]), single)
 
 
 @pytest.mark.usefixtures("quickly")
@@ -377,7 +377,7 @@ def test_targets_on_an_edge_are_eliminated_in_c(monkeypatch: pytest.MonkeyPatch)
         low[below], high[~below] = q[below], q[~below]
     q[:, 4] += np.linspace(1e-5, 1e-4, 40)
     target = armkin.fk(arm, q)
-    own, fast = armkin.ik(arm, target), armkin.compile(arm)
+    python, fast = armkin.ik(arm, target), armkin.compile(arm)
     solve, eliminated = method.solve, []
 
     def counted(elimination: method.Elimination, T: np.ndarray, *more: Any) -> method.Branches:
@@ -385,8 +385,8 @@ def test_targets_on_an_edge_are_eliminated_in_c(monkeypatch: pytest.MonkeyPatch)
         return solve(elimination, T, *more)
 
     monkeypatch.setattr(method, "solve", counted)
-    asked = left_to_python(monkeypatch)
+    left = left_to_python(monkeypatch)
     solutions = fast.ik(target)
-    assert sum(asked) > 5
+    assert sum(left) > 5
     assert sum(eliminated) <= 2
-    found_by_elimination(solutions, own)
+    found_by_elimination(solutions, python)

@@ -45,13 +45,13 @@ def test_merging_branches_are_told_without_python(arm: armkin.Arm, monkeypatch: 
     for field in ("status", "valid", "within_limits", "branch", "free", "complete"):
         assert np.array_equal(getattr(solutions, field), getattr(expected, field)), field
     # before a sum of joints is taken off a target is rounded otherwise
-    off = np.full(COUNT, 1e-12)
+    tolerance = np.full(COUNT, 1e-12)
     if len(task_for(arm).sums):
-        off += np.minimum(ROOT, ROOT**2 / BESIDE)
-    for q in (solutions.q, np.stack([fast.ik(one).q for one in target])):
+        tolerance += np.minimum(ROOT, ROOT**2 / BESIDE)
+    for q in (solutions.q, np.stack([fast.ik(goal).q for goal in target])):
         assert np.array_equal(np.isnan(q), np.isnan(expected.q))
-        assert (np.nan_to_num(np.abs(q - expected.q)).max(axis=(1, 2)) < off).all()
-    np.testing.assert_array_equal([fast.ik(one).status for one in target], expected.status)
+        assert (np.nan_to_num(np.abs(q - expected.q)).max(axis=(1, 2)) < tolerance).all()
+    np.testing.assert_array_equal([fast.ik(goal).status for goal in target], expected.status)
 
 
 def test_a_posture_on_a_fold_that_near_has_stays() -> None:
@@ -71,11 +71,11 @@ def test_short_self_motions_are_told_without_python(arm: armkin.Arm, monkeypatch
     expected = armkin.ik(arm, target)
     left = left_to_python(monkeypatch)
     solutions = fast.ik(target)
-    told = COUNT - sum(left)
-    assert told > (expected.status != armkin.Status.SINGULAR).sum() + COUNT / 4
+    told_count = COUNT - sum(left)
+    assert told_count > (expected.status != armkin.Status.SINGULAR).sum() + COUNT / 4
     for field in ("status", "valid", "within_limits", "branch", "free", "complete"):
         assert np.array_equal(getattr(solutions, field), getattr(expected, field)), field
     np.testing.assert_allclose(solutions.q, expected.q, rtol=0, atol=1e-12)
-    for one, status, free in zip(map(fast.ik, target), expected.status, expected.free, strict=True):
-        assert one.status == status
-        assert np.array_equal(one.free, free)
+    for answer, status, free in zip(map(fast.ik, target), expected.status, expected.free, strict=True):
+        assert answer.status == status
+        assert np.array_equal(answer.free, free)

@@ -78,13 +78,13 @@ def test_real_roots_are_as_many_in_lanes() -> None:
     library = built()
     lanes = library.lanes()
     for n in (16, 20, 24):
-        given = matrices(n, 4096 if n == 16 else 512)
-        for some in given.reshape(-1, lanes, n, n):
+        companions = matrices(n, 4096 if n == 16 else 512)
+        for group in companions.reshape(-1, lanes, n, n):
             re, im = np.empty((2, lanes, n))
-            assert not library.in_lanes(np.ascontiguousarray(some).ctypes, n, re.ctypes, im.ctypes)
+            assert not library.in_lanes(np.ascontiguousarray(group).ctypes, n, re.ctypes, im.ctypes)
             for k in range(lanes):
                 padded, x, y = np.zeros((24, 24)), np.zeros(24), np.zeros(24)
-                padded[:n, :n] = some[k]
+                padded[:n, :n] = group[k]
                 library.one_by_one(padded.ctypes, n, x.ctypes, y.ctypes)
                 assert (im[k] == 0).sum() == (y[:n] == 0).sum()
                 size = np.abs(x[:n] + 1j * y[:n]).max()

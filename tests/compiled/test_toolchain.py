@@ -30,31 +30,31 @@ def answer(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
 
 
-def put(kept: Path, held: bytes, mode: int = 0o700) -> None:
+def put(library: Path, held: bytes, mode: int = 0o700) -> None:
     """Another file of that name: one that this process has loaded must not lose its pages, which its end still runs."""
-    new = kept.with_suffix(".new")
-    new.write_bytes(held)
-    new.chmod(mode)
-    new.rename(kept)
+    draft = library.with_suffix(".new")
+    draft.write_bytes(held)
+    draft.chmod(mode)
+    draft.rename(library)
 
 
 @pytest.mark.parametrize("size", [5000, 12288])
 def test_a_torn_library_is_built_again(cache: Path, size: int) -> None:
     """The system's loader ends the process at the first page that is missing."""
     toolchain.load_library(SOURCE, "abc")
-    [kept] = cache.glob("*.so")
-    assert kept.stat().st_size > size
-    put(kept, kept.read_bytes()[:size])
-    done = answer()
-    assert (done.returncode, done.stdout) == (0, "42\n")
+    [library] = cache.glob("*.so")
+    assert library.stat().st_size > size
+    put(library, library.read_bytes()[:size])
+    completed = answer()
+    assert (completed.returncode, completed.stdout) == (0, "42\n")
 
 
 def test_a_library_with_a_byte_changed_is_built_again(cache: Path) -> None:
     toolchain.load_library(SOURCE, "abc")
-    [kept] = cache.glob("*.so")
-    held = kept.read_bytes()
+    [library] = cache.glob("*.so")
+    held = library.read_bytes()
     place = held.index((42).to_bytes(4, "little"))
-    put(kept, held[:place] + b"\x2b" + held[place + 1 :])
+    put(library, held[:place] + b"\x2b" + held[place + 1 :])
     assert answer().stdout == "42\n"
     assert [path.read_bytes() for path in cache.glob("*.so")] == [held]
 
@@ -65,10 +65,10 @@ def test_a_library_that_others_may_have_written_is_built_again(cache: Path, mode
     toolchain.load_library(SOURCE.replace("42", "43"), "abc")
     [false] = cache.glob("*.so")
     toolchain.load_library(SOURCE, "abc")
-    [true] = set(cache.glob("*.so")) - {false}
-    named = true.with_name(f"{true.stem.partition('-')[0]}-{false.stem.partition('-')[2]}.so")
+    [genuine] = set(cache.glob("*.so")) - {false}
+    named = genuine.with_name(f"{genuine.stem.partition('-')[0]}-{false.stem.partition('-')[2]}.so")
     put(named, false.read_bytes())
-    true.unlink()
+    genuine.unlink()
     false.unlink()
     assert answer().stdout == "43\n"  # as it would be believed
     named.chmod(mode)
@@ -77,10 +77,10 @@ def test_a_library_that_others_may_have_written_is_built_again(cache: Path, mode
 
 def test_a_library_of_another_user_is_not_loaded(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     toolchain.load_library(SOURCE, "abc")
-    [kept] = cache.glob("*.so")
-    name = kept.stem.partition("-")[0]
+    [library] = cache.glob("*.so")
+    name = library.stem.partition("-")[0]
     assert toolchain._stored_library(cache, name, "abc") is not None
-    monkeypatch.setattr(os, "geteuid", lambda: kept.stat().st_uid + 1)
+    monkeypatch.setattr(os, "geteuid", lambda: library.stat().st_uid + 1)
     assert toolchain._stored_library(cache, name, "abc") is None
     assert toolchain._cache_folder() is None
 
@@ -88,10 +88,10 @@ def test_a_library_of_another_user_is_not_loaded(cache: Path, monkeypatch: pytes
 def test_a_library_by_a_link_is_not_loaded(cache: Path, tmp_path: Path) -> None:
     """What it leads to may be another's folder."""
     toolchain.load_library(SOURCE, "abc")
-    [kept] = cache.glob("*.so")
-    kept.rename(tmp_path / kept.name)
-    kept.symlink_to(tmp_path / kept.name)
-    assert toolchain._stored_library(cache, kept.stem.partition("-")[0], "abc") is None
+    [library] = cache.glob("*.so")
+    library.rename(tmp_path / library.name)
+    library.symlink_to(tmp_path / library.name)
+    assert toolchain._stored_library(cache, library.stem.partition("-")[0], "abc") is None
 
 
 @pytest.mark.parametrize("above", [0, 1, 2])
@@ -108,11 +108,11 @@ def test_the_cache_is_used_under_a_umask_of_groups(cache: Path) -> None:
         toolchain.load_library(SOURCE, "abc")
     finally:
         os.umask(before)
-    [kept] = cache.glob("*.so")
-    assert {stat.S_IMODE(path.stat().st_mode) for path in (*kept.parents[:3], kept)} == {0o700}
-    built = kept.stat().st_mtime_ns
+    [library] = cache.glob("*.so")
+    assert {stat.S_IMODE(path.stat().st_mode) for path in (*library.parents[:3], library)} == {0o700}
+    built = library.stat().st_mtime_ns
     toolchain.load_library(SOURCE, "abc")
-    assert kept.stat().st_mtime_ns == built
+    assert library.stat().st_mtime_ns == built
 
 
 def test_the_compiler_may_have_options(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -121,7 +121,7 @@ def test_the_compiler_may_have_options(cache: Path, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize(
-    ("script", "said"),
+    ("script", "message"),
     [
         ("#!/bin/sh\nexit 0\n", "failed: it wrote no library"),
         ("#!/bin/sh\necho 'arm.c: error: no room' >&2\nexit 1\n", "failed: arm.c: error: no room"),
@@ -129,13 +129,13 @@ def test_the_compiler_may_have_options(cache: Path, monkeypatch: pytest.MonkeyPa
     ],
 )
 def test_a_compiler_that_builds_nothing_is_named(
-    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, said: str
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, message: str
 ) -> None:
     path = tmp_path / "my cc"
     path.write_text(script)
     path.chmod(0o700)
     monkeypatch.setenv("CC", str(path))
-    with pytest.raises(armkin.ArmkinError, match=said):
+    with pytest.raises(armkin.ArmkinError, match=message):
         toolchain.load_library(SOURCE, "abc")
     assert not list(cache.glob("*"))
 
@@ -163,12 +163,12 @@ def test_a_compiler_that_takes_too_long_to_optimise_does_not(
     path.chmod(0o755)
     monkeypatch.setenv("CC", str(path))
     monkeypatch.setattr(toolchain, "LONGEST", 1.0)
-    said: list[str] = []
-    monkeypatch.setattr(toolchain, "announce", lambda: said.append("built"))
+    announced: list[str] = []
+    monkeypatch.setattr(toolchain, "announce", lambda: announced.append("built"))
     source = 'const char arm_content[] = "slow"; int half(int x) { return x / 2; }\n'
     assert toolchain.load_library(source, "slow").half(84) == 42
     assert toolchain.load_library(source, "slow").half(84) == 42, "kept, and not waited for again"
-    assert said == ["built"]
+    assert announced == ["built"]
     monkeypatch.setattr(time, "time", lambda now=time.time: now() + 86_400)
     assert toolchain.load_library(source, "slow").half(84) == 42
-    assert said == ["built"] * 2, "tried again the next day"
+    assert announced == ["built"] * 2, "tried again the next day"

@@ -79,9 +79,9 @@ def rows(path: Path, count: int) -> None:
         np.savetxt(file, values, fmt="%.3f", delimiter=",")
 
 
-def batch(given: Path, out: Path, *more: str) -> subprocess.Popen[str]:
+def batch(source: Path, out: Path, *more: str) -> subprocess.Popen[str]:
     """The command."""
-    words = [sys.executable, "-m", "armkin", "ik", "ur5e", "--batch", str(given), "--out", str(out), *more]
+    words = [sys.executable, "-m", "armkin", "ik", "ur5e", "--batch", str(source), "--out", str(out), *more]
     return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
@@ -90,34 +90,34 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def disturbed(given: Path, out: Path, expected: str, who: str, cluster: Cluster, rng: Random, count: int) -> Told:
+def disturbed(source: Path, out: Path, expected: str, victim: str, cluster: Cluster, rng: Random, count: int) -> Told:
     """A batch of `count` parts during which a worker, the scheduler or the client is killed; then it goes on.
 
     A killed scheduler has another in its place.
     """
-    process = batch(given, out, "--cluster", cluster.address)
+    process = batch(source, out, "--cluster", cluster.address)
     parts = Path(f"{out}.parts")
-    wanted = rng.randrange(count)
-    until(lambda: len(finished(parts)) >= wanted or process.poll() is not None)
+    least_parts = rng.randrange(count)
+    until(lambda: len(finished(parts)) >= least_parts or process.poll() is not None)
     time.sleep(rng.uniform(0.0, 0.3))
     killed = process.poll() is None
-    if who == "worker":
+    if victim == "worker":
         until(lambda: bool(cluster.workers()) or process.poll() is not None)
         for pid in cluster.workers()[:1]:
             kill(pid)
     else:
-        kill(process.pid if who == "client" else cluster.scheduler.pid)
+        kill(process.pid if victim == "client" else cluster.scheduler.pid)
     _, err = process.communicate(timeout=PATIENCE)
     before = finished(parts)
-    if who == "scheduler":
+    if victim == "scheduler":
         cluster.start_again()
     if process.returncode in (0, 3):
         return Told(process.returncode, err, killed, len(before), 0, digest(out) == expected)
-    again = batch(given, out, "--cluster", cluster.address, "--resume")
+    again = batch(source, out, "--cluster", cluster.address, "--resume")
     redone: set[str] = set()
     while again.poll() is None:  # a part that is written anew is another file
-        now = finished(parts)
-        redone |= {name for name, file in before.items() if name in now and now[name] != file}
+        parts_now = finished(parts)
+        redone |= {name for name, file in before.items() if name in parts_now and parts_now[name] != file}
         time.sleep(0.02)
     again.communicate(timeout=PATIENCE)
     good = again.returncode in (0, 3) and digest(out) == expected and not parts.exists()
@@ -126,13 +126,13 @@ def disturbed(given: Path, out: Path, expected: str, who: str, cluster: Cluster,
 
 def finished(parts: Path) -> dict[str, int]:
     """The parts that are there, and which file each is."""
-    found = {}
+    inode_of = {}
     for path in parts.glob("[0-9]*[0-9]"):
         try:
-            found[path.name] = path.stat().st_ino
+            inode_of[path.name] = path.stat().st_ino
         except OSError:
             continue  # gone meanwhile
-    return found
+    return inode_of
 
 
 def until(ready: Any) -> None:
@@ -154,10 +154,10 @@ def kill(pid: int) -> None:
 def children(pid: int) -> list[int]:
     """All processes below one."""
     try:
-        own = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+        direct = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     except OSError:
         return []
-    return [one for child in own for one in (child, *children(child))]
+    return [descendant for child in direct for descendant in (child, *children(child))]
 
 
 def command_line(pid: int) -> bytes:
@@ -169,5 +169,5 @@ def command_line(pid: int) -> bytes:
 
 
 def _dask(*words: str) -> subprocess.Popen[bytes]:
-    whole: Sequence[str] = [sys.executable, "-m", "dask", *words]
-    return subprocess.Popen(whole, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    command: Sequence[str] = [sys.executable, "-m", "dask", *words]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -43,9 +43,9 @@ def address(whole: kills.Cluster) -> str:
     return whole.address
 
 
-@pytest.mark.parametrize("where", ["cluster", "pool"])
-def test_a_killed_worker_loses_its_chunk_alone(address: str, where: str, tmp_path: Path) -> None:
-    engine = Engine(cluster=address) if where == "cluster" else Engine(workers=2)
+@pytest.mark.parametrize("engine_kind", ["cluster", "pool"])
+def test_a_killed_worker_loses_its_chunk_alone(address: str, engine_kind: str, tmp_path: Path) -> None:
+    engine = Engine(cluster=address) if engine_kind == "cluster" else Engine(workers=2)
     mark = tmp_path / "killed"
     assert list(in_order(engine, square, str(mark), range(8))) == [i * i for i in range(8)]
     assert mark.exists()
@@ -77,11 +77,11 @@ def test_a_killed_command_leaves_no_process(tmp_path: Path) -> None:
 def test_a_batch_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(csv_to_numbers, "ROWS", 30)
     values = np.random.default_rng(2).uniform(-420, 420, (290, 3)).round(3)
-    rows, one, two = tmp_path / "in.csv", tmp_path / "one.csv", tmp_path / "two.csv"
+    rows, alone, two = tmp_path / "in.csv", tmp_path / "one.csv", tmp_path / "two.csv"
     rows.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in values.tolist()) + "\n")
     words = ("ik", THREE_DOF, "--batch", rows, "--out")
-    assert run(*words, one) == run(*words, two, "--cluster", address)
-    assert one.read_bytes() == two.read_bytes()
+    assert run(*words, alone) == run(*words, two, "--cluster", address)
+    assert alone.read_bytes() == two.read_bytes()
 
 
 def test_work_is_shared_by_one_kind_of_engine(tmp_path: Path) -> None:
@@ -94,48 +94,48 @@ def test_work_is_shared_by_one_kind_of_engine(tmp_path: Path) -> None:
 
 
 def test_reach_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path) -> None:
-    one, two = tmp_path / "one.npz", tmp_path / "two.npz"
+    alone, two = tmp_path / "one.npz", tmp_path / "two.npz"
     words = ("reach", "three_dof", "--grid", 60, "--out")
-    assert run(*words, one).code == run(*words, two, "--cluster", address).code == 0
-    assert one.read_bytes() == two.read_bytes()
+    assert run(*words, alone).code == run(*words, two, "--cluster", address).code == 0
+    assert alone.read_bytes() == two.read_bytes()
 
 
 @pytest.mark.parametrize("more", [(), ("--compiled",)])
 def test_a_workspace_is_the_same_bytes_wherever_it_is_sampled(
     address: str, tmp_path: Path, more: tuple[str, ...], sample: Callable[[int, int], int]
 ) -> None:
-    one, two = tmp_path / "one.npz", tmp_path / "two.npz"
+    alone_file, two = tmp_path / "one.npz", tmp_path / "two.npz"
     words = ("workspace", "three_dof", "--samples", sample(150_000, 70_000), *more, "--json")
-    alone = run(*words, "--out", one).json
+    alone = run(*words, "--out", alone_file).json
     spread = run(*words, "--out", two, "--cluster", address).json
     pool = run(*words, "--workers", 2).json if not more else alone
-    for other in (spread, pool):
-        assert {**other, "seconds": 0} == {**alone, "seconds": 0}
-    assert one.read_bytes() == two.read_bytes()
+    for survey in (spread, pool):
+        assert {**survey, "seconds": 0} == {**alone, "seconds": 0}
+    assert alone_file.read_bytes() == two.read_bytes()
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A batch's input, and the digest of its answers."""
     folder = tmp_path_factory.mktemp("undisturbed")
-    given, one = folder / "in.csv", folder / "one.csv"
-    kills.rows(given, 60_000)
-    kills.batch(given, one).communicate(timeout=kills.PATIENCE)
-    return given, kills.digest(one)
+    source, target = folder / "in.csv", folder / "one.csv"
+    kills.rows(source, 60_000)
+    kills.batch(source, target).communicate(timeout=kills.PATIENCE)
+    return source, kills.digest(target)
 
 
-@pytest.mark.parametrize("who", ["worker", "client", "scheduler"])
+@pytest.mark.parametrize("victim", ["worker", "client", "scheduler"])
 def test_a_kill_costs_at_most_the_chunks_in_hand(
-    who: str, whole: kills.Cluster, undisturbed: tuple[Path, str], tmp_path: Path
+    victim: str, whole: kills.Cluster, undisturbed: tuple[Path, str], tmp_path: Path
 ) -> None:
     """One of each here; twenty of each: tests/bench/bench_kills.py."""
-    given, expected = undisturbed
-    told = kills.disturbed(given, tmp_path / "two.csv", expected, who, whole, Random(len(who)), count=3)
-    assert told.same, told
-    assert told.redone == 0
-    assert told.code in {"worker": (0, 3), "client": (0, 3, -9), "scheduler": (0, 1, 3)}[who], told
-    if told.code == 1:
-        assert "the scheduler is gone" in told.err
+    source, expected = undisturbed
+    disturbed = kills.disturbed(source, tmp_path / "two.csv", expected, victim, whole, Random(len(victim)), count=3)
+    assert disturbed.same, disturbed
+    assert disturbed.redone == 0
+    assert disturbed.code in {"worker": (0, 3), "client": (0, 3, -9), "scheduler": (0, 1, 3)}[victim], disturbed
+    if disturbed.code == 1:
+        assert "the scheduler is gone" in disturbed.err
 
 
 def test_no_scheduler_and_another_version_are_told(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,9 +162,9 @@ def test_no_scheduler_and_another_version_are_told(address: str, monkeypatch: py
 def test_an_unreachable_address_is_said_within_three_seconds(place: str, says: str) -> None:
     import_module("distributed")  # whose time is that of every command with a cluster
     began = time.monotonic()
-    with pytest.raises(ClusterError) as told:
+    with pytest.raises(ClusterError) as caught:
         list(in_order(Engine(cluster=place), square, "", range(3)))
-    assert says in str(told.value)
+    assert says in str(caught.value)
     assert time.monotonic() - began < 3
 
 
@@ -180,9 +180,9 @@ def test_an_address_that_drops_packets_is_said_within_three_seconds(monkeypatch:
         deaf.bind(("127.0.0.1", 0))
         deaf.listen(0)
         for _ in range(8):
-            one = stack.enter_context(socket.socket())
-            one.setblocking(False)
-            one.connect_ex(deaf.getsockname())
+            client = stack.enter_context(socket.socket())
+            client.setblocking(False)
+            client.connect_ex(deaf.getsockname())
         import_module("distributed")
         began = time.monotonic()
         with pytest.raises(ClusterError, match=r"no connection in 1.5 s"):

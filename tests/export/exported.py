@@ -61,9 +61,9 @@ class Exported:
 
     def fk(self, q: np.ndarray) -> np.ndarray:
         """The tool's pose (4, 4), in the export's own precision."""
-        out, values = np.empty((4, 4), self.real), np.ascontiguousarray(q, self.real)
-        self._fk(ctypes.c_void_p(values.ctypes.data), ctypes.c_void_p(out.ctypes.data))
-        return out.astype(float)
+        T, values = np.empty((4, 4), self.real), np.ascontiguousarray(q, self.real)
+        self._fk(ctypes.c_void_p(values.ctypes.data), ctypes.c_void_p(T.ctypes.data))
+        return T.astype(float)
 
     def ik(self, target: np.ndarray, near: np.ndarray) -> tuple[int, bool, np.ndarray, int]:
         """How many branches, or -1; whether the target is at an edge; their joint values (count, n); the best one."""
@@ -117,12 +117,12 @@ def agreement(arm: armkin.Arm, folder: Path, count: int) -> Agreement:
             continue
         theirs = np.array([answers[b].q[:] for b in range(total)]).reshape(total, n)
         inside = np.array([bool(answers[b].within) for b in range(total)])
-        own, inside_own = mine[k][valid[k]], legal[k][valid[k]]
-        if len(own) != total:
-            different.append(f"pose {k}: {total} branches, Python {len(own)}")
+        python, inside_own = mine[k][valid[k]], legal[k][valid[k]]
+        if len(python) != total:
+            different.append(f"pose {k}: {total} branches, Python {len(python)}")
             continue
-        order = [np.abs((theirs - row) / unit).max(axis=1).argmin() for row in own]
-        apart = float(np.abs((theirs[order] - own) / unit).max(initial=0.0))
+        order = [np.abs((theirs - row) / unit).max(axis=1).argmin() for row in python]
+        apart = float(np.abs((theirs[order] - python) / unit).max(initial=0.0))
         if sorted(order) != list(range(total)) or apart > 1e-6:
             different.append(f"pose {k}: joint values {apart:.1e} apart")
         elif (inside[order] != inside_own).any():

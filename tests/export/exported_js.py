@@ -51,13 +51,13 @@ def ask(
     assert node, "node runs the module; scripts/test installs it"
     goals = goals_of(arm, q) if targets is None else targets
     close = np.broadcast_to(arm.home, q.shape) if near is None else near
-    asked = {"q": q.tolist(), "targets": goals.tolist(), "near": close.tolist()}
+    question = {"q": q.tolist(), "targets": goals.tolist(), "near": close.tolist()}
     (folder / "arm.mjs").write_text(_text_of(arm, task), encoding="utf-8")
-    (folder / "asked.json").write_text(json.dumps(asked))
+    (folder / "asked.json").write_text(json.dumps(question))
     (folder / "ask.mjs").write_text(_ASK)
     subprocess.run([node, "ask.mjs"], cwd=folder, check=True, timeout=300)
-    told: dict[str, Any] = json.loads((folder / "told.json").read_text())
-    return told
+    answer: dict[str, Any] = json.loads((folder / "told.json").read_text())
+    return answer
 
 
 def goals_of(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
@@ -66,52 +66,54 @@ def goals_of(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
     return targets_of(task, armkin.fk(arm, q), q * arm.ratio)
 
 
-def differences(arm: armkin.Arm, told: list[dict[str, Any]], s: armkin.Solutions) -> list[str]:
+def differences(arm: armkin.Arm, answers: list[dict[str, Any]], s: armkin.Solutions) -> list[str]:
     """What differs between the module's answers and Python's (N,): a line for each target that is not the same."""
-    return [line for k, one in enumerate(told) if (line := _differs(arm, one, s, k))]
+    return [line for k, answer in enumerate(answers) if (line := _differs(arm, answer, s, k))]
 
 
-def _differs(arm: armkin.Arm, told: dict[str, Any], s: armkin.Solutions, k: int) -> str:
+def _differs(arm: armkin.Arm, answer: dict[str, Any], s: armkin.Solutions, k: int) -> str:
     status = armkin.Status(s.status[k]).name.lower()
-    if told["status"] != status:
-        return f"target {k}: {told['status']}, Python {status}"
+    if answer["status"] != status:
+        return f"target {k}: {answer['status']}, Python {status}"
     order = [b for b in s.order[k] if s.valid[k, b]]
-    own, theirs = s.q[k][order], np.array([row["joints"] for row in told["branches"]]).reshape(-1, arm.n)
-    if len(own) != len(theirs):
-        return f"target {k} ({status}): {len(theirs)} branches, Python {len(own)}"
+    python, theirs = s.q[k][order], np.array([row["joints"] for row in answer["branches"]]).reshape(-1, arm.n)
+    if len(python) != len(theirs):
+        return f"target {k} ({status}): {len(theirs)} branches, Python {len(python)}"
     names, free = [s.names[i] for i in s.branch[k][order]], [arm.joint_names[j] for j in np.flatnonzero(s.free[k])]
-    if told["free_joints"] != free:
-        return f"target {k}: free {told['free_joints']}, Python {free}"
+    if answer["free_joints"] != free:
+        return f"target {k}: free {answer['free_joints']}, Python {free}"
     if status == "singular":  # a posture of each self-motion: which one is a matter of the way there
         target = np.repeat(s.target[k][None], len(theirs), axis=0)
-        off = residual(s.task, armkin.fk(arm, theirs), theirs * arm.ratio, target)
-        off[:, : s.task.position] /= arm.reach
-        worst = float(np.abs(off).max(initial=0.0))
-        legal = [any(row["within_limits"] for row in told["branches"]), bool(s.within_limits[k].any())]
+        error = residual(s.task, armkin.fk(arm, theirs), theirs * arm.ratio, target)
+        error[:, : s.task.position] /= arm.reach
+        worst = float(np.abs(error).max(initial=0.0))
+        legal = [any(row["within_limits"] for row in answer["branches"]), bool(s.within_limits[k].any())]
         if worst > 2e-9 or legal[0] != legal[1]:
             return f"target {k}: a row misses by {worst:.1e}; legal ones here and in Python: {legal}"
         return ""
-    if sorted(row["name"] for row in told["branches"]) != sorted(names) and status == "exact":
+    if sorted(row["name"] for row in answer["branches"]) != sorted(names) and status == "exact":
         return f"target {k}: names"
     if status == "boundary":
-        return "" if _one_each(arm, s, k, own, theirs) else f"target {k} (boundary): other solutions"
+        return "" if _one_each(arm, s, k, python, theirs) else f"target {k} (boundary): other solutions"
     unit = np.where(arm.prismatic, arm.reach, 1.0)
-    apart = np.abs((theirs[:, None] - own[None]) / unit).max(axis=2)
+    apart = np.abs((theirs[:, None] - python[None]) / unit).max(axis=2)
     if (worst := float(apart.min(axis=0).max(initial=0.0))) > np.deg2rad(1e-9):
         return f"target {k}: joint values {worst:.1e} apart"
-    if s.within_limits[k][order].tolist() != [row["within_limits"] for row in told["branches"]]:
+    if s.within_limits[k][order].tolist() != [row["within_limits"] for row in answer["branches"]]:
         return f"target {k}: limits"
     best = None if s.best[k] < 0 else 0
-    return "" if told["best"] == best else f"target {k}: best {told['best']}, Python {best}"
+    return "" if answer["best"] == best else f"target {k}: best {answer['best']}, Python {best}"
 
 
-def _one_each(arm: armkin.Arm, s: armkin.Solutions, k: int, own: np.ndarray, theirs: np.ndarray) -> bool:
+def _one_each(arm: armkin.Arm, s: armkin.Solutions, k: int, python: np.ndarray, theirs: np.ndarray) -> bool:
     """Whether each posture (B, n) is of the component of one of Python's, modulo whole turns.
 
     A posture at which the Jacobian loses several directions, so that its component is not known, is at the same place
     but for the root of rounding.
     """
-    at = local_structure(arm, s.task, own * arm.ratio, np.repeat(s.target[k][None], len(own), axis=0))
-    way = difference(arm, theirs[None] * arm.ratio, own[:, None] * arm.ratio)
-    same = members(at, np.arange(len(own)), way) | (np.abs(way).max(axis=2) < np.where(at.known, 1e-7, 1e-4)[:, None])
+    structure = local_structure(arm, s.task, python * arm.ratio, np.repeat(s.target[k][None], len(python), axis=0))
+    way = difference(arm, theirs[None] * arm.ratio, python[:, None] * arm.ratio)
+    same = members(structure, np.arange(len(python)), way) | (
+        np.abs(way).max(axis=2) < np.where(structure.known, 1e-7, 1e-4)[:, None]
+    )
     return bool((same.sum(axis=0) >= 1).all() and (same.sum(axis=1) >= 1).all())

@@ -69,14 +69,14 @@ def test_of_seven_joints_the_redundant_one_is_held_where_near_has_it(robot: str,
     for q, near in zip(rng.uniform(low, high, (count, 7)), rng.uniform(low, high, (count, 7)), strict=True):
         near[6] = q[6] if near[0] > 0 else near[6]
         target = armkin.fk(arm, q)
-        count, edge, found, _ = exported.ik(target, near)
+        count, edge, branches, _ = exported.ik(target, near)
         held = {"J7": float(near[6])}
         s = armkin.ik(armkin.lock(arm, held), target, near=near[:6])
-        own = armkin.unlock(arm, held, s.q[s.valid])
+        python = armkin.unlock(arm, held, s.q[s.valid])
         if not edge:
-            assert count == len(own)
+            assert count == len(python)
         if not edge and count:
-            assert np.abs(found[:, None] - own[None]).max(axis=2).min(axis=1).max(initial=0.0) < 1e-7
+            assert np.abs(branches[:, None] - python[None]).max(axis=2).min(axis=1).max(initial=0.0) < 1e-7
 
 
 def test_a_wrong_number_fails_the_test_program(tmp_path: Path) -> None:
@@ -122,19 +122,19 @@ def test_it_compiles_without_a_warning(robot: str, compiler: list[str], tmp_path
 def test_the_files_say_what_they_were_made_from() -> None:
     arm = armkin.load(ROBOTS / "puma560.yaml")
     for text in program(arm, "puma.c"):
-        for said in (arm.name, arm.sha256, f"armkin {armkin.__version__}", "Task pose; spherical wrist"):
-            assert said in text
+        for word in (arm.name, arm.sha256, f"armkin {armkin.__version__}", "Task pose; spherical wrist"):
+            assert word in text
 
 
 @pytest.mark.parametrize(
     ("robot", "count"), [("three_dof", 4000), ("puma560", 2000), ("stanford", 1000), ("jaco_j2n6s300", 400)]
 )
 def test_it_says_what_python_says(robot: str, count: int, tmp_path: Path) -> None:
-    told = agreement(armkin.load(ROBOTS / f"{robot}.yaml"), tmp_path, count)
-    assert told.different == []
-    assert told.edges <= 0.01 * count
-    assert told.largest_fk < 1e-14
-    assert told.largest < 1e-8
+    compared = agreement(armkin.load(ROBOTS / f"{robot}.yaml"), tmp_path, count)
+    assert compared.different == []
+    assert compared.edges <= 0.01 * count
+    assert compared.largest_fk < 1e-14
+    assert compared.largest < 1e-8
 
 
 def test_a_calibrated_arm_takes_and_gives_commanded_values(tmp_path: Path) -> None:
@@ -186,9 +186,9 @@ def test_a_target_that_is_not_finite_is_none(robot: str, tmp_path: Path) -> None
     target = targets_of(task, armkin.fk(arm, arm.home[None]), arm.home[None]).ravel()
     for place in (3, 7, 11, 0, 5) if len(target) == 16 else range(len(target)):
         for wrong in (np.nan, np.inf, -np.inf, 1e200, 1e16):
-            asked = target.copy()
-            asked[place] = wrong
-            assert code.ik(asked, arm.home)[0] == -1, (place, wrong)
+            spoilt = target.copy()
+            spoilt[place] = wrong
+            assert code.ik(spoilt, arm.home)[0] == -1, (place, wrong)
 
 
 STANDING = ["ur5e", "puma560", "wx250s", "labvolt_5150", "stanford", "three_dof"]
@@ -235,8 +235,8 @@ def test_an_arm_asked_for_its_own_pose_in_few_digits_stays(robot: str, tmp_path:
         q[0], q[4], q[8] = np.radians(right_angles.POSTURES[robot])
     q = np.clip(q, arm.lower, arm.upper)
     for k, (near, T) in enumerate(zip(q, armkin.fk(arm, q), strict=True)):
-        given = [np.round(T, 6), np.round(T, 8), T.astype(np.float32).astype(float)][k % 3]
-        _, _, branches, best = code.ik(given, near)
+        rounded = [np.round(T, 6), np.round(T, 8), T.astype(np.float32).astype(float)][k % 3]
+        _, _, branches, best = code.ik(rounded, near)
         np.testing.assert_array_equal(branches[best], near)
 
 
@@ -256,7 +256,7 @@ def test_a_free_joint_that_cannot_stay_at_near_is_asked_elsewhere(robot: str, tm
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["three_dof.yaml", "--c"], "name the source, for example -o arm.c"),
         (["three_dof.yaml", "--c", "--out", "arm.txt"], "name the source, for example -o arm.c"),
@@ -264,10 +264,10 @@ def test_a_free_joint_that_cannot_stay_at_near_is_asked_elsewhere(robot: str, tm
         (["jaco_j2n6s300.yaml", "--c", "--float", "--out", "arm.c"], "leave --float away"),
     ],
 )
-def test_what_cannot_be_exported_is_refused_in_words(words: list[str], said: str) -> None:
+def test_what_cannot_be_exported_is_refused_in_words(words: list[str], message: str) -> None:
     completed = run_armkin("export", f"robots/{words[0]}", *words[1:])
     assert completed.code == 2
-    assert said in completed.err
+    assert message in completed.err
     assert not completed.out
 
 
@@ -292,9 +292,9 @@ def test_an_arm_a_little_off_its_class_is_written_with_numbered_branches(tmp_pat
     assert "named after that class" in solver(arm, None)[1].why
     assert built(tmp_path, arm) == "8 postures, 0 failed\n"
     assert '"branch 1"' in (tmp_path / "arm.c").read_text()
-    told = agreement(arm, tmp_path, 100)
-    assert told.different == []
-    assert told.largest < 1e-8
+    compared = agreement(arm, tmp_path, 100)
+    assert compared.different == []
+    assert compared.largest < 1e-8
 
 
 CROOKED = [(70, 20, 100), (30, 200, 10), (-50, 150, 20), (80, 50, 60), (40, 10, 80), (0, 10, 80)]

@@ -30,7 +30,7 @@ def test_every_singular_posture_is_an_edge(robot: str, single: bool, tmp_path: P
     assert len(kinds) >= 2
     for kind, q in kinds.items():
         q = q.astype(code.real).astype(float)
-        poses = np.array([code.fk(one) for one in q])
+        poses = np.array([code.fk(posture) for posture in q])
         for near, target in zip(q, targets_of(task, poses, q), strict=True):
             assert code.ik(target, arm.home)[1], kind
             if ((near >= arm.lower) & (near <= arm.upper)).all():

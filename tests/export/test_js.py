@@ -55,25 +55,25 @@ def _tool_down(arm: armkin.Arm, count: int) -> np.ndarray:
     T = armkin.fk(arm, _random(arm, 3 * count))
     T[:, :3, :3] = np.diag([1.0, -1.0, -1.0])
     solutions = armkin.ik(arm, T)
-    found: np.ndarray = solutions.q[:, 0][solutions.valid[:, 0]][:count]
-    assert len(found) == count
-    return found
+    postures: np.ndarray = solutions.q[:, 0][solutions.valid[:, 0]][:count]
+    assert len(postures) == count
+    return postures
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_the_module_answers_as_python_does(name: str, tmp_path: Path) -> None:
     arm = armkin.load(name)
     q = np.concatenate([_random(arm, 60), _typed(arm, 30)])
-    told = ask(arm, tmp_path, q)
-    assert not differences(arm, told["ik"], armkin.ik(arm, goals_of(arm, q)))
-    assert np.abs(np.array(told["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
-    assert np.abs(np.array(told["jacobian"]) - armkin.jacobian(arm, q)).max() < 1e-12 * arm.reach
-    assert np.abs(np.array(told["target"]) - goals_of(arm, q)).max() < 1e-9
-    assert ("pulses" in told) == (arm.motor_gain.size > 0)
-    if "pulses" in told:
-        whole = armkin.pulses(arm, q)
-        assert (np.array(told["pulses"]) == whole).all()
-        assert np.abs(np.array(told["joints"]) - armkin.joints(arm, whole)).max() < 1e-9
+    answers = ask(arm, tmp_path, q)
+    assert not differences(arm, answers["ik"], armkin.ik(arm, goals_of(arm, q)))
+    assert np.abs(np.array(answers["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
+    assert np.abs(np.array(answers["jacobian"]) - armkin.jacobian(arm, q)).max() < 1e-12 * arm.reach
+    assert np.abs(np.array(answers["target"]) - goals_of(arm, q)).max() < 1e-9
+    assert ("pulses" in answers) == (arm.motor_gain.size > 0)
+    if "pulses" in answers:
+        counts = armkin.pulses(arm, q)
+        assert (np.array(answers["pulses"]) == counts).all()
+        assert np.abs(np.array(answers["joints"]) - armkin.joints(arm, counts)).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", ["jaco_j2n6s300", "moveo"])
@@ -138,9 +138,9 @@ def test_singular_postures_are_those_of_python(name: str, tmp_path: Path) -> Non
 def test_a_calibrated_arm_is_commanded_in_its_own_values(tmp_path: Path) -> None:
     arm = armkin.load(Path(__file__).parents[1] / "robots" / "ratio_arm.yaml")
     q = _random(arm, 40)
-    told = ask(arm, tmp_path, q)
-    assert np.abs(np.array(told["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
-    assert not differences(arm, told["ik"], armkin.ik(arm, goals_of(arm, q)))
+    answers = ask(arm, tmp_path, q)
+    assert np.abs(np.array(answers["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
+    assert not differences(arm, answers["ik"], armkin.ik(arm, goals_of(arm, q)))
 
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560", "three_dof"])
@@ -154,14 +154,14 @@ def test_the_arm_that_stands_at_its_target_stays(name: str, tmp_path: Path) -> N
     else:
         R = rounded[:, :3, :3]
         defect = np.abs(R.swapaxes(1, 2) @ R - np.eye(3)).max(axis=(1, 2))
-    told = ask(arm, tmp_path, typed, near=typed, targets=rounded)
+    answers = ask(arm, tmp_path, typed, near=typed, targets=rounded)
     stood = 0
-    for q, target, rounding, answer in zip(typed, rounded, defect, told["ik"], strict=True):
+    for q, target, rounding, answer in zip(typed, rounded, defect, answers["ik"], strict=True):
         task, _ = solver(arm, None)
         goal = nearest_rotation(target[None, :3, :3])[0] if target.ndim == 2 else target
-        off = residual(task, armkin.fk(arm, q[None]), q[None], _with_rotation(target, goal)[None])[0]
-        off[: task.position] /= arm.reach
-        if np.linalg.norm(off) > 1e-9 + rounding:
+        error = residual(task, armkin.fk(arm, q[None]), q[None], _with_rotation(target, goal)[None])[0]
+        error[: task.position] /= arm.reach
+        if np.linalg.norm(error) > 1e-9 + rounding:
             continue  # rounding has turned the pose by more than its columns tell
         stood += 1
         assert answer["best"] == 0
@@ -184,16 +184,16 @@ def _with_rotation(target: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """A target whose rotation is made orthonormal, as the module reads it."""
     if target.ndim != 2:
         return target
-    out = target.copy()
-    out[:3, :3] = goal
-    return out
+    turned = target.copy()
+    turned[:3, :3] = goal
+    return turned
 
 
 def test_a_target_out_of_reach_has_the_nearest_posture_within_limits(tmp_path: Path) -> None:
     arm = armkin.load("three_dof")
     targets = np.array([[900.0, 0.0, 100.0], [10.0, 20.0, 900.0], [0.0, -400.0, -300.0]])
-    told = ask(arm, tmp_path, np.zeros((3, 3)), targets=targets)
-    for target, answer in zip(targets, told["ik"], strict=True):
+    answers = ask(arm, tmp_path, np.zeros((3, 3)), targets=targets)
+    for target, answer in zip(targets, answers["ik"], strict=True):
         assert answer["best"] is None
         mine = armkin.closest(arm, target)
         assert abs(answer["closest"]["distance_mm"] - mine.distance) < 1e-6
@@ -203,16 +203,19 @@ def test_a_target_out_of_reach_has_the_nearest_posture_within_limits(tmp_path: P
 def test_hits_are_those_of_python(name: str, tmp_path: Path) -> None:
     arm = armkin.load(name, scene=str(Path(__file__).parents[2] / "examples" / "scenes" / f"{name}.yaml"))
     q = np.random.default_rng(3).uniform(np.maximum(arm.lower, -3), np.minimum(arm.upper, 3), (60, arm.n))
-    told = ask(arm, tmp_path, q)
+    answers = ask(arm, tmp_path, q)
     apart = armkin.clearance(arm, q)
-    assert np.abs(np.array([one["clearance_mm"] for one in told["clearance"]]) - apart.mm).max() < 1e-9
-    hit = [(one["hits"][0]["body"], one["hits"][0]["with"]) if one["hits"] else ("", "") for one in told["clearance"]]
+    assert np.abs(np.array([answer["clearance_mm"] for answer in answers["clearance"]]) - apart.mm).max() < 1e-9
+    hit = [
+        (answer["hits"][0]["body"], answer["hits"][0]["with"]) if answer["hits"] else ("", "")
+        for answer in answers["clearance"]
+    ]
     told_by_python = zip(apart.body.tolist(), apart.other.tolist(), (apart.mm < 0).tolist(), strict=True)
-    assert hit == [(body, other) if deep else ("", "") for body, other, deep in told_by_python]
+    assert hit == [(body, obstacle) if deep else ("", "") for body, obstacle, deep in told_by_python]
     assert 3 < int((apart.mm < 0).sum()) < 60
     s = armkin.ik(arm, goals_of(arm, q))
-    assert not differences(arm, told["ik"], s)
-    free = [[not row["hits"] for row in one["branches"]] for one in told["ik"]]
+    assert not differences(arm, answers["ik"], s)
+    free = [[not row["hits"] for row in answer["branches"]] for answer in answers["ik"]]
     assert [sorted(row) for row in free] == [sorted(s.clear[k, s.valid[k]].tolist()) for k in range(len(q))]
 
 
@@ -236,13 +239,13 @@ def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
     rng = np.random.default_rng(8)
     q = rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (count, arm.n))
     targets = targets_of(spare.task, armkin.fk(arm, q), q)
-    told = ask(arm, tmp_path, q, near=q, targets=targets, task=task)
-    assert ask(arm, tmp_path, q, near=q, targets=targets.reshape(count, -1), task=task)["ik"] == told["ik"]
-    assert np.abs(np.array(told["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
-    assert np.abs(np.array(told["target"]) - targets).max() < 1e-9
+    answers = ask(arm, tmp_path, q, near=q, targets=targets, task=task)
+    assert ask(arm, tmp_path, q, near=q, targets=targets.reshape(count, -1), task=task)["ik"] == answers["ik"]
+    assert np.abs(np.array(answers["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
+    assert np.abs(np.array(answers["target"]) - targets).max() < 1e-9
     j, joint = spare.joint, arm.joint_names[spare.joint]
-    assert told["redundant"] == joint
-    for posture, target, answer in zip(q, targets, told["ik"], strict=True):
+    assert answers["redundant"] == joint
+    for posture, target, answer in zip(q, targets, answers["ik"], strict=True):
         locked_arm = armkin.lock(arm, {joint: posture[j]})
         s = armkin.ik(locked_arm, target[None], task, near=np.delete(posture, j))
         assert {row["joints"][j] for row in answer["branches"]} == {posture[j]}
@@ -255,19 +258,19 @@ def test_surfaces_of_postures_are_counted_by_the_curves_that_they_are_swept_from
     """An iiwa7 folded, its wrist in its shoulder, and stretched upwards (`tests/inverse/test_surfaces.py`)."""
     arm = armkin.lock(armkin.load("iiwa7"), {"J7": 0.5})
     q = np.deg2rad([[0, -45, 135, 180, -180, 135], [90, 180, 90, 180, 90, 90], [180, 0, 90, 0, 45, -180]])
-    told = ask(arm, tmp_path, q, targets=armkin.fk(arm, q))["ik"]
-    assert [len(answer["branches"]) for answer in told] == [2, 4, 1]
-    assert not differences(arm, told, armkin.ik(arm, armkin.fk(arm, q)))
-    on = np.deg2rad([[10.0, 0, 20, 0, 30, 40]])  # an arm that stands on one stays
-    [answer] = ask(arm, tmp_path, on, near=on, targets=armkin.fk(arm, on))["ik"]
-    assert [row["joints"] for row in answer["branches"]] == on.tolist()
+    answers = ask(arm, tmp_path, q, targets=armkin.fk(arm, q))["ik"]
+    assert [len(answer["branches"]) for answer in answers] == [2, 4, 1]
+    assert not differences(arm, answers, armkin.ik(arm, armkin.fk(arm, q)))
+    standing = np.deg2rad([[10.0, 0, 20, 0, 30, 40]])  # an arm that stands on one stays
+    [answer] = ask(arm, tmp_path, standing, near=standing, targets=armkin.fk(arm, standing))["ik"]
+    assert [row["joints"] for row in answer["branches"]] == standing.tolist()
 
 
 def test_a_held_joint_outside_its_limits_leaves_no_best_branch(tmp_path: Path) -> None:
     arm = armkin.load("panda", scene=str(ROOT / "examples" / "scenes" / "ur5e.yaml"))
     q = np.array([[0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 0.5], [0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 3.0]])
-    told = ask(arm, tmp_path, q, near=q, targets=armkin.fk(arm, q))
-    inside, outside = told["ik"]
+    answers = ask(arm, tmp_path, q, near=q, targets=armkin.fk(arm, q))
+    inside, outside = answers["ik"]
     assert (inside["best"], inside["closest"]) == (0, None)
     hit = [bool(row["hits"]) for row in inside["branches"] if row["within_limits"]]
     assert hit == sorted(hit)

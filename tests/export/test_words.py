@@ -58,36 +58,36 @@ def test_a_table_is_the_same_arm(path: Path) -> None:
     arm = armkin.load(path)
     q = values(arm)
     for kind, write in KINDS.items():
-        other = again(write(arm))
-        off = np.abs(armkin.fk(other, q) - armkin.fk(arm, q))
-        assert off[:, :3, 3].max() < 1e-9, kind
-        assert off[:, :3, :3].max() < 1e-12, kind
-        assert solver(other) == solver(arm), kind
+        read_back = again(write(arm))
+        error = np.abs(armkin.fk(read_back, q) - armkin.fk(arm, q))
+        assert error[:, :3, 3].max() < 1e-9, kind
+        assert error[:, :3, :3].max() < 1e-12, kind
+        assert solver(read_back) == solver(arm), kind
         for field in ("lower", "upper", "home", "ratio", "motor_gain", "motor_bias", "pose_joints", "dh_sign"):
-            assert np.array_equal(getattr(other, field), getattr(arm, field)), (kind, field)
-        assert np.array_equal(other.max_speed, arm.max_speed, equal_nan=True)
+            assert np.array_equal(getattr(read_back, field), getattr(arm, field)), (kind, field)
+        assert np.array_equal(read_back.max_speed, arm.max_speed, equal_nan=True)
         if arm.task in ("xyz_pitch", "xyz_yaw"):
-            assert task_for(other).offsets == pytest.approx(task_for(arm).offsets, abs=1e-12)
+            assert task_for(read_back).offsets == pytest.approx(task_for(arm).offsets, abs=1e-12)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_out_to_urdf_and_back_is_the_same_arm(path: Path) -> None:
     arm = armkin.load(path)
     turned = actual(arm)
-    other = again(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)
+    read_back = again(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)
     q = values(arm)
-    off = np.abs(armkin.fk(other, q) - armkin.fk(turned, q))
-    assert off[:, :3, 3].max() < 1e-9
-    assert off[:, :3, :3].max() < 1e-12
-    assert other.joint_names == arm.joint_names
-    assert np.array_equal(other.prismatic, arm.prismatic)
+    error = np.abs(armkin.fk(read_back, q) - armkin.fk(turned, q))
+    assert error[:, :3, 3].max() < 1e-9
+    assert error[:, :3, :3].max() < 1e-12
+    assert read_back.joint_names == arm.joint_names
+    assert np.array_equal(read_back.prismatic, arm.prismatic)
     limited = np.isfinite(turned.lower) & np.isfinite(turned.upper)
-    assert other.lower[limited] == pytest.approx(turned.lower[limited], abs=1e-10)
-    assert other.upper[limited] == pytest.approx(turned.upper[limited], abs=1e-10)
-    assert not np.isfinite(other.lower[~limited]).any()
-    assert other.max_speed == pytest.approx(turned.max_speed, abs=1e-10, nan_ok=True)
+    assert read_back.lower[limited] == pytest.approx(turned.lower[limited], abs=1e-10)
+    assert read_back.upper[limited] == pytest.approx(turned.upper[limited], abs=1e-10)
+    assert not np.isfinite(read_back.lower[~limited]).any()
+    assert read_back.max_speed == pytest.approx(turned.max_speed, abs=1e-10, nan_ok=True)
     if arm.task not in ("xy", "xy_theta", "xyz", "xyz_yaw"):  # a URDF has no task
-        assert solver(other) == solver(arm)
+        assert solver(read_back) == solver(arm)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -115,8 +115,8 @@ def test_links_are_drawn_from_axis_to_axis() -> None:
         place = joint.find("origin")
         roll = numbers(place, "rpy")[0]
         z = np.array([0, -np.sin(roll), np.cos(roll)])  # both of its turns are about x alone
-        off = end - numbers(place, "xyz")
-        assert np.linalg.norm(off - (off @ z) * z) < 1e-6
+        offset = end - numbers(place, "xyz")
+        assert np.linalg.norm(offset - (offset @ z) * z) < 1e-6
 
 
 def test_a_makers_table_comes_back_as_printed() -> None:
@@ -137,8 +137,8 @@ def test_axes_a_hair_from_parallel_have_no_table() -> None:
     arm = from_links(link, [False, False], name="hair")
     with pytest.raises(UsageError, match=r"the axes of q1 and q2 are 5.7e-08 deg from parallel.*screws say it"):
         conventions.dh(arm)
-    off = np.abs(armkin.fk(again(conventions.screws(arm)), values(arm)) - armkin.fk(arm, values(arm)))
-    assert off[:, :3, 3].max() < 1e-9
+    error = np.abs(armkin.fk(again(conventions.screws(arm)), values(arm)) - armkin.fk(arm, values(arm)))
+    assert error[:, :3, 3].max() < 1e-9
 
 
 def test_what_targets_count_from_is_said_where_it_changes() -> None:

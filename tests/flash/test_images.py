@@ -77,9 +77,9 @@ def drive(tmp_path: Path) -> Path:
 
 def test_a_picos_boot_drive_gets_the_image(drive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("armkin.flash.upload_firmware._RESTART", 0.0)
-    done = upload(Image("pico6", Path("pico6.uf2"), UF2), str(drive))
+    flashed = upload(Image("pico6", Path("pico6.uf2"), UF2), str(drive))
     assert (drive / "pico6.uf2").read_bytes() == UF2
-    assert (done.port, done.bytes, done.uploader) == (None, len(UF2), "UF2")
+    assert (flashed.port, flashed.bytes, flashed.uploader) == (None, len(UF2), "UF2")
 
 
 def test_the_command_says_what_it_copied(drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,11 +97,11 @@ def test_bytes_are_counted_from_when_the_boot_loader_is_found(monkeypatch: pytes
         page = 4
         written = b""
 
-        def write(self, at: int, page: bytes) -> None:
+        def write(self, address: int, page: bytes) -> None:
             self.written += page
 
-        def read(self, at: int, size: int) -> bytes:
-            return self.written[at : at + size]
+        def read(self, address: int, size: int) -> bytes:
+            return self.written[address : address + size]
 
         def leave(self) -> None: ...
 
@@ -110,8 +110,10 @@ def test_bytes_are_counted_from_when_the_boot_loader_is_found(monkeypatch: pytes
     monkeypatch.setattr(upload_firmware, "_answered_version", lambda kind, port: "3.0")
     monkeypatch.setattr(avrdude, "find_avrdude", lambda: None)
     data = b":04001000DEADBEEFB4\n:00000001FF\n"
-    upload(Image("uno_servos", Path("uno_servos.hex"), data), "port", lambda done, total: counted.append((done, total)))
-    assert counted == [(done, 40) for done in range(0, 41, 4)]
+    upload(
+        Image("uno_servos", Path("uno_servos.hex"), data), "port", lambda count, total: counted.append((count, total))
+    )
+    assert counted == [(count, 40) for count in range(0, 41, 4)]
 
 
 def test_another_folder_is_no_boot_drive(tmp_path: Path) -> None:
@@ -158,9 +160,9 @@ def test_an_answer_of_the_boot_loader_that_is_damaged_is_refused(answer: str) ->
         Stk500v1(cast(Port, BootLoader(bytes.fromhex(answer)))).signature()
 
 
-@pytest.mark.parametrize(("silent", "found"), [(2, True), (3, False)])
+@pytest.mark.parametrize(("silent", "is_found"), [(2, True), (3, False)])
 def test_a_boot_loader_that_was_called_twice_and_is_silent_is_called_anew(
-    silent: int, found: bool, monkeypatch: pytest.MonkeyPatch
+    silent: int, is_found: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a busy computer its first answer comes after a second call, of which it hears a part: it says no more."""
 
@@ -171,26 +173,26 @@ def test_a_boot_loader_that_was_called_twice_and_is_silent_is_called_anew(
             self.resets += 1
 
         def write(self, data: bytes) -> None:
-            said = {b"\x30\x20": b"\x14\x10", b"\x75\x20": b"\x14\x1e\x95\x0f\x10"}[data]
-            self.left = b"" if data[0] == 0x75 and self.resets <= silent else said
+            reply = {b"\x30\x20": b"\x14\x10", b"\x75\x20": b"\x14\x1e\x95\x0f\x10"}[data]
+            self.left = b"" if data[0] == 0x75 and self.resets <= silent else reply
 
     monkeypatch.setattr(stk500v1, "_ANSWER", 0.01)
     port = Late(b"")
     heard = upload_firmware._identify_chip(Stk500v1, cast(SerialPort, port))
-    assert (heard is not None, port.resets) == (found, min(silent + 1, 3))
+    assert (heard is not None, port.resets) == (is_found, min(silent + 1, 3))
     assert heard is None or heard[1].hex() == "1e950f"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell plays avrdude")
 def test_avrdude_tells_how_far_it_is(tmp_path: Path) -> None:
-    program, bar, told = tmp_path / "avrdude", "#" * 50, list[float]()
+    program, bar, shares = tmp_path / "avrdude", "#" * 50, list[float]()
     program.write_text(
         f'#!/bin/sh\nfor bar in Reading Writing Reading; do echo "$bar | {bar} |" >&2; sleep 0.05; done\n'
     )
     program.chmod(0o755)
-    avrdude.write_image(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex", told.append)
-    assert told == sorted(told)
-    assert (told[0], told[-1]) == (0.0, 1.0)
+    avrdude.write_image(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex", shares.append)
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
     program.write_text(f'#!/bin/sh\necho "Reading | {bar} |\navrdude: error: no such port" >&2; exit 1\n')
     with pytest.raises(LinkError, match=r"^avrdude: error: no such port$"):
         avrdude.write_image(str(program), "atmega328p", "COM3", 115_200, tmp_path / "x.hex")

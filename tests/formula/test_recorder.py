@@ -73,14 +73,14 @@ def expressions(operations: dict[str, Callable[..., Any]]) -> st.SearchStrategy[
 
 def value(expression: Expression, inputs: Sequence[Any], operations: dict[str, Callable[..., Any]]) -> Any:
     """An expression of arrays, numbers or symbols."""
-    name, *rest = expression
+    name, *operands = expression
     if name == "input":
-        return inputs[rest[0]]
+        return inputs[operands[0]]
     if name == "constant":
-        return rest[0]
+        return operands[0]
     if name == "column":
-        return COLUMNS[rest[0]]
-    arguments = [value(part, inputs, operations) for part in rest]
+        return COLUMNS[operands[0]]
+    arguments = [value(part, inputs, operations) for part in operands]
     if all(isinstance(a, float) for a in arguments):
         return float(operations[name](*arguments))  # constants stay numbers, as `arrays` keeps them
     return operations[name](*arguments)
@@ -92,13 +92,13 @@ def check(expression: Expression, operations: dict[str, Callable[..., Any]], tol
     expected = np.asarray(value(expression, inputs, operations), dtype=float)
     formula = StraightLineCode(lambda symbols: [value(expression, symbols, operations)], INPUTS)
     [batch] = formula.run(inputs, formula.workspace(len(inputs[0])))
-    whole = np.broadcast_to(np.asarray(batch, dtype=float), expected.shape)
-    np.testing.assert_allclose(whole, expected, rtol=tolerance, atol=tolerance)
+    values = np.broadcast_to(np.asarray(batch, dtype=float), expected.shape)
+    np.testing.assert_allclose(values, expected, rtol=tolerance, atol=tolerance)
     for i in range(len(inputs[0])):
         [single] = formula.one_by_one([[float(x[i]) for x in inputs]])
         rows = np.broadcast_to(expected, np.broadcast_shapes(expected.shape, (len(inputs[0]),)))
-        here = rows[..., i]
-        np.testing.assert_allclose(np.broadcast_to(single[..., 0], here.shape), here, rtol=tolerance, atol=tolerance)
+        row = rows[..., i]
+        np.testing.assert_allclose(np.broadcast_to(single[..., 0], row.shape), row, rtol=tolerance, atol=tolerance)
 
 
 @settings(max_examples=300, deadline=None)
@@ -131,11 +131,11 @@ def test_signs_of_branches_move_outwards() -> None:
     sign = COLUMNS[0]
     made = record(lambda x: [(sign * x[0]) * x[1] * 3.0, (sign * x[0]) ** 2, np.arctan2(sign * x[0], x[1])], 2)
     rows = [(node.op, node.axes) for node in made.nodes]
-    one, both = (), (2,)
+    single, two = (), (2,)
     assert rows == [
-        ("multiply", one), ("multiply", one), ("multiply", both),
-        ("multiply", one),
-        ("arctan2", one), ("multiply", both),
+        ("multiply", single), ("multiply", single), ("multiply", two),
+        ("multiply", single),
+        ("arctan2", single), ("multiply", two),
     ]  # fmt: skip
 
 

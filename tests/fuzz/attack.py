@@ -66,10 +66,10 @@ def spoilt(rng: random.Random, text: str) -> str:
         k = rng.randrange(len(lines))
         kind = rng.randrange(10)
         if kind < 6:
-            found = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])", text))
-            if found:
-                one = rng.choice(found)
-                text = text[: one.start()] + rng.choice(NUMBERS) + text[one.end() :]
+            numbers = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.])", text))
+            if numbers:
+                number = rng.choice(numbers)
+                text = text[: number.start()] + rng.choice(NUMBERS) + text[number.end() :]
             continue
         if kind == 6:
             del lines[k]
@@ -79,7 +79,7 @@ def spoilt(rng: random.Random, text: str) -> str:
             j = rng.randrange(len(lines))
             lines[k], lines[j] = lines[j], lines[k]
         else:
-            at = rng.randrange(len(lines[k]))
-            lines[k] = lines[k][:at] + rng.choice("{}[]:,#&*!|>'\"%@`\t \\x\u00e9\x07") + lines[k][at + 1 :]
+            column = rng.randrange(len(lines[k]))
+            lines[k] = lines[k][:column] + rng.choice("{}[]:,#&*!|>'\"%@`\t \\x\u00e9\x07") + lines[k][column + 1 :]
         text = "".join(lines)
     return text

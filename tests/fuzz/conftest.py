@@ -25,8 +25,8 @@ A_MILLION = 31_000  # rounds, of 32.7 inputs over all fuzzers: files 14.7, words
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """How many inputs there were, of a run without workers (-n 0)."""
     if ATTACKS:
-        each = ", ".join(f"{command} {count:,}" for command, count in sorted(ATTACKS.items()))
-        terminalreporter.write_line(f"{ATTACKS.total():,} inputs: {each}")
+        counts = ", ".join(f"{command} {count:,}" for command, count in sorted(ATTACKS.items()))
+        terminalreporter.write_line(f"{ATTACKS.total():,} inputs: {counts}")
 
 
 @pytest.fixture

@@ -91,10 +91,10 @@ def test_any_words(seed: int, rounds: int, tmp_path: Path, monkeypatch: pytest.M
                 words.append(rng.choice(TEXTS))
             else:
                 words.append("".join(rng.choices(string.printable, k=rng.randrange(12))))
-        out = [k for k, word in enumerate(words[:-1]) if word in ("--out", "-o", "--trace", "--plot")]
-        for k in out:
+        positions = [k for k, word in enumerate(words[:-1]) if word in ("--out", "-o", "--trace", "--plot")]
+        for k in positions:
             words[k + 1] = str(tmp_path / "out.csv")
-        if words[0] == "plot" and not out:
+        if words[0] == "plot" and not positions:
             words += ["--out", str(tmp_path / "picture.svg")]
         if words[0] == "workspace":  # as many samples as a million inputs have time for
             words = ["50" if word in MANY else word for word in words]
@@ -120,19 +120,19 @@ def test_any_rows(seed: int, rounds: int) -> None:
 @pytest.mark.parametrize("seed", range(2))
 def test_any_piped_answer(seed: int, rounds: int) -> None:
     rng = generator(seed)
-    whole = json.loads(attack("pulses", "three_dof", 10, 80, -70, "--json").out)
+    intact = json.loads(attack("pulses", "three_dof", 10, 80, -70, "--json").out)
     odd: list[object] = [None, True, "x", 10**400, -1, 1e300, [], {}, [1e9] * 3, "three_dof", 1.5, [[1]], [None] * 3]
     for _ in range(rounds):
-        answer = dict(whole)
+        answer = dict(intact)
         for _ in range(rng.randrange(1, 3)):
             answer[rng.choice(list(answer))] = rng.choice(odd)
         text = json.dumps(answer)
         if rng.random() < 0.3:
             k = rng.randrange(len(text))
             text = text[:k] + rng.choice('{}[],:"e9 ') + text[k + 1 :]
-        done = attack("send", "--dry-run", "--json", stdin=text.encode())
-        if done.code == 0:  # what is sent is what was asked for
-            assert json.loads(done.out)["pulses"] == whole["pulses"], text
+        completed = attack("send", "--dry-run", "--json", stdin=text.encode())
+        if completed.code == 0:  # what is sent is what was asked for
+            assert json.loads(completed.out)["pulses"] == intact["pulses"], text
 
 
 @pytest.mark.parametrize(
@@ -141,11 +141,11 @@ def test_any_piped_answer(seed: int, rounds: int) -> None:
 )
 def test_an_answer_that_contradicts_itself_moves_nothing(key: str, value: list[int]) -> None:
     answer = json.loads(attack("pulses", "three_dof", 10, 80, -70, "--json").out)
-    done = attack("send", "--port", "sim", "--json", stdin=json.dumps({**answer, key: value}).encode())
-    assert done.code == 2
+    completed = attack("send", "--port", "sim", "--json", stdin=json.dumps({**answer, key: value}).encode())
+    assert completed.code == 2
     if len(value) == 3 and value[0] < 10**9:
-        assert "q3 = -" in json.loads(done.err)["error"]
-        assert json.loads(done.err)["joint"] == "q3"
+        assert "q3 = -" in json.loads(completed.err)["error"]
+        assert json.loads(completed.err)["joint"] == "q3"
     best = json.loads(attack("pulses", "three_dof", 10.01, 80.01, -70.01, "--best", "--json").out)
     assert (
         json.loads(attack("send", "--dry-run", "--json", stdin=json.dumps(best).encode()).out)["pulses"]

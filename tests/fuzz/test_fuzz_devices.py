@@ -84,17 +84,17 @@ class Unreliable:
         self.port.close()
 
     def spoilt(self, data: bytes) -> bytes:
-        out = bytearray()
+        damaged = bytearray()
         share = 0.02 * self.share
         if not share:
             return data
         for byte in data:
             if self.rng.random() >= share:
-                out.append(byte)
+                damaged.append(byte)
                 continue
             kind = self.rng.randrange(3)
-            out += bytes([byte, byte] if kind == 0 else [byte ^ 1 << self.rng.randrange(8)] if kind == 1 else [])
-        return bytes(out)
+            damaged += bytes([byte, byte] if kind == 0 else [byte ^ 1 << self.rng.randrange(8)] if kind == 1 else [])
+        return bytes(damaged)
 
 
 class Numbers:
@@ -109,7 +109,7 @@ def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest
     rng = generator(robot.rpartition("/")[2])
     boards: list[Port] = []
 
-    def opened(*given: object, **options: object) -> Port:
+    def opened(*words_given: object, **options: object) -> Port:
         if not boards or rng.random() < 0.4:  # else the one of the command before, as that has left it
             boards[:] = [BOARDS_OF[robot](rng)]
         return Unreliable(boards[0], rng)
@@ -141,9 +141,9 @@ def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest
             )
         )
         stdin = b"0,85,-85\n5,80,-80\n" if "bus" not in robot else b"1,2\n3,4\n"
-        done = attack(*words, "--port", "fuzzed", *(["--json"] if words[0] != "stop" else []), stdin=stdin)
-        assert "no port fuzzed" not in done.err, words
-        codes.append(done.code)
-        moved += done.code == 0 and words[0] in ("send", "path") and "home" not in words
+        completed = attack(*words, "--port", "fuzzed", *(["--json"] if words[0] != "stop" else []), stdin=stdin)
+        assert "no port fuzzed" not in completed.err, words
+        codes.append(completed.code)
+        moved += completed.code == 0 and words[0] in ("send", "path") and "home" not in words
     assert {0, 5} <= set(codes)
     assert moved

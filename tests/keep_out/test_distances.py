@@ -52,8 +52,8 @@ def test_segments_are_as_far_apart_as_the_search_finds() -> None:
     (a, b), (c, d) = (_segments(rng, MANY, 300.0) for _ in range(2))
     third = np.arange(MANY) % 3 == 0  # parallel, and nearly so
     d = np.where(third, c + (b - a) * rng.uniform(-2, 2, MANY) + rng.choice([0.0, 1e-9, 1e-5], MANY), d)
-    found = segment_distance(a, b, c, d)
-    assert np.abs(found - _least(lambda s: _point_to_segment(a + s * (b - a), c, d), MANY)).max() < 1e-9
+    distances = segment_distance(a, b, c, d)
+    assert np.abs(distances - _least(lambda s: _point_to_segment(a + s * (b - a), c, d), MANY)).max() < 1e-9
 
 
 def test_crossing_segments_touch() -> None:
@@ -63,9 +63,9 @@ def test_crossing_segments_touch() -> None:
 
 def _signed(box: Box, p: Array) -> Array:
     """Signed distance of points (3, M) to a box, point by point."""
-    own = np.abs(box.axes.T @ (p - box.centre[:, None])) - box.half[:, None]
-    beyond = np.linalg.norm(np.maximum(own, 0.0), axis=0)
-    return np.asarray(np.where(beyond > 0, beyond, own.max(axis=0)))
+    local = np.abs(box.axes.T @ (p - box.centre[:, None])) - box.half[:, None]
+    beyond = np.linalg.norm(np.maximum(local, 0.0), axis=0)
+    return np.asarray(np.where(beyond > 0, beyond, local.max(axis=0)))
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -75,10 +75,10 @@ def test_segments_are_as_far_from_a_box_as_the_search_finds(turned: bool) -> Non
     box = Box(T[:3, 3], T[:3, :3], np.array([60.0, 100.0, 30.0]))
     a, b = _segments(rng, MANY, 250.0)
     expected = _least(lambda t: _signed(box, a + t * (b - a)), MANY)
-    found = box.distance(a, b)
-    assert np.abs(found - expected).max() < 1e-9
-    assert (np.sign(found) == np.sign(np.where(np.abs(expected) < 1e-12, 0.0, expected))).mean() > 0.999
-    assert 0.05 < (found < 0).mean() < 0.9
+    distances = box.distance(a, b)
+    assert np.abs(distances - expected).max() < 1e-9
+    assert (np.sign(distances) == np.sign(np.where(np.abs(expected) < 1e-12, 0.0, expected))).mean() > 0.999
+    assert 0.05 < (distances < 0).mean() < 0.9
 
 
 def test_depth_is_the_way_to_the_nearest_face() -> None:

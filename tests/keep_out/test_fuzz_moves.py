@@ -64,11 +64,11 @@ def _robot(kind: str) -> str:
     document = yaml.safe_load(KINDS["feetech" if kind == "dynamixel" else kind])
     document["board"] = {**document["board"], "kind": kind}
     if kind == OURS:
-        for joint, at in zip(document["joints"], SWITCHES, strict=True):
-            way, axis = int(np.sign(at)), joint["drive"]["axis"]
+        for joint, switch_value in zip(document["joints"], SWITCHES, strict=True):
+            way, axis = int(np.sign(switch_value)), joint["drive"]["axis"]
             joint["homing"] = {
                 "switch": axis,
-                "at": at,
+                "at": switch_value,
                 "direction": way,
                 "normally": "closed",
                 "speed": 40,
@@ -86,8 +86,8 @@ def _pressed(arm: armkin.Arm) -> Callable[[int, Sequence[int]], bool]:
     def level(number: int, net: Sequence[int]) -> bool:
         if number >= 3:
             return True
-        home, turn, at = turns[number]
-        return bool((home + turn * net[number] - at) * at >= 0)
+        home, turn, switch_value = turns[number]
+        return bool((home + turn * net[number] - switch_value) * switch_value >= 0)
 
     return level
 
@@ -141,8 +141,8 @@ class Arms:
         completed = run(name, *words, "--port", self.moving.name, stdin=stdin)
         line = f"{kind}: armkin {name} {' '.join(map(str, words))}: {completed.code} {completed.err}"
         assert completed.code in ((0, 2, 3) if until == np.inf else (0, 3, STOPPED)), line
-        for one in self.given:
-            apart = self.held.least_clearances(one.q(np.linspace(0.0, one.duration, 1500)))[0]
+        for trajectory in self.given:
+            apart = self.held.least_clearances(trajectory.q(np.linspace(0.0, trajectory.duration, 1500)))[0]
             assert apart.min() >= min(apart[0], 0.0) - DEEP, line
         if self.seen[kind]:
             counts = np.unique(np.array(self.seen[kind]), axis=0)
@@ -153,13 +153,13 @@ class Arms:
 
     def search(self) -> None:
         """What is counted before the last switch is found is a search, which nobody proves."""
-        seen, board = self.seen[OURS], self.ports[OURS].board
+        counts, board = self.seen[OURS], self.ports[OURS].board
         self.noted = noted = getattr(self, "noted", board.advance)
 
         def advance(seconds: float) -> None:
             noted(seconds)
             if board.motors.state == State.HOMING:
-                seen.clear()
+                counts.clear()
 
         board.advance = advance
 
@@ -178,17 +178,19 @@ def arms() -> Iterator[Arms]:
         board_catalogue._entry_points.cache_clear()
         stack.callback(board_catalogue._entry_points.cache_clear)
         stack.enter_context(mock.patch.dict("os.environ", XDG_STATE_HOME=str(folder)))
-        found, checked = Arms(folder), StartedTrajectory.__post_init__
+        fuzzed, checked = Arms(folder), StartedTrajectory.__post_init__
 
         def note(laid: StartedTrajectory) -> None:
             checked(laid)
-            found.given.append(laid.trajectory)
+            fuzzed.given.append(laid.trajectory)
 
         stack.enter_context(mock.patch.object(StartedTrajectory, "__post_init__", note))
-        stack.enter_context(mock.patch.object(Stop, "__call__", lambda stop: found.stops(stop)))
-        for one in (Board, FirmwareBoard, KlipperBoard):
-            stack.enter_context(mock.patch.object(one, "open", lambda *words, **more: found.open(*words, **more)))
-        yield found
+        stack.enter_context(mock.patch.object(Stop, "__call__", lambda stop: fuzzed.stops(stop)))
+        for board_class in (Board, FirmwareBoard, KlipperBoard):
+            stack.enter_context(
+                mock.patch.object(board_class, "open", lambda *words, **more: fuzzed.open(*words, **more))
+            )
+        yield fuzzed
 
 
 def _joints(rng: np.random.Generator) -> list[str]:
@@ -236,85 +238,85 @@ def _words(rng: np.random.Generator, robot: Path, groups: list[list[str]]) -> li
 
 def fuzz(count: int, seed: int) -> Counter[str]:
     """Carry out commands; how many of what came of them. AssertionError for a hit."""
-    rng, done = np.random.default_rng(seed), Counter[str]()
-    with arms() as found:
-        scene = ["--scene", str(found.scene)]
-        found.begin()
+    rng, tally = np.random.default_rng(seed), Counter[str]()
+    with arms() as fuzzed:
+        scene = ["--scene", str(fuzzed.scene)]
+        fuzzed.begin()
         for number in range(count):
-            kind = list(found.files)[number % len(found.files)]
-            _one(found, kind, rng, scene, done)
-    return done
+            kind = list(fuzzed.files)[number % len(fuzzed.files)]
+            _one(fuzzed, kind, rng, scene, tally)
+    return tally
 
 
-def _one(found: Arms, kind: str, rng: np.random.Generator, scene: list[str], done: Counter[str]) -> None:
+def _one(fuzzed: Arms, kind: str, rng: np.random.Generator, scene: list[str], tally: Counter[str]) -> None:
     """A command on a kind's arm, and what belongs to it."""
-    robot, dice = found.files[kind], rng.random()
+    robot, dice = fuzzed.files[kind], rng.random()
     if dice < 0.12 and kind == OURS:
-        if found.ask(kind, "send", robot, "home", *scene).code == 0:
-            assert found.ask(kind, "home", robot, *scene).code == 0
-            done["home"] += 1
+        if fuzzed.ask(kind, "send", robot, "home", *scene).code == 0:
+            assert fuzzed.ask(kind, "home", robot, *scene).code == 0
+            tally["home"] += 1
         return
     if dice < 0.12 and kind != "klipper":
         name, words = ("relax", []) if kind in BUSES and dice < 0.06 else ("grip", [rng.choice(["open", "closed"])])
-        assume = ["--assume", "open"] * (kind == OURS and name == "grip" and not done["grip " + kind])
-        told = found.ask(kind, name, robot, *words, *assume)
-        assert told.code == (2 if (kind, name) == ("dynamixel", "grip") else 0), told.err
-        assert found.made < np.deg2rad(0.2)
-        done[f"{name} {kind}"] += 1
+        assume = ["--assume", "open"] * (kind == OURS and name == "grip" and not tally["grip " + kind])
+        completed = fuzzed.ask(kind, name, robot, *words, *assume)
+        assert completed.code == (2 if (kind, name) == ("dynamixel", "grip") else 0), completed.err
+        assert fuzzed.made < np.deg2rad(0.2)
+        tally[f"{name} {kind}"] += 1
         return
-    name, groups, stdin = _motion(rng, found.scene.parent)
+    name, groups, stdin = _motion(rng, fuzzed.scene.parent)
     if rng.random() < 0.08:  # without the scene that the port remembers
-        told = found.ask(kind, name, *_words(rng, robot, groups), stdin=stdin)
-        assert (told.code, "was last used with the scene" in told.err) == (2, True), told.err
-        assert not found.given or not found.seen[kind] or found.made < np.deg2rad(0.2)
-        done["without scene"] += 1
+        completed = fuzzed.ask(kind, name, *_words(rng, robot, groups), stdin=stdin)
+        assert (completed.code, "was last used with the scene" in completed.err) == (2, True), completed.err
+        assert not fuzzed.given or not fuzzed.seen[kind] or fuzzed.made < np.deg2rad(0.2)
+        tally["without scene"] += 1
         return
     words = _words(rng, robot, [*groups, scene])
     until = rng.uniform(0.1, 3.0) if rng.random() < 0.3 and name != "jog" else np.inf
-    told = found.ask(kind, name, *words, stdin=stdin, until=until)
-    assert told.code != 2, told.err
-    done[f"{told.code} {kind}"] += 1
-    if told.code == STOPPED and kind == OURS and not stdin:
-        told = found.ask(kind, name, *words, "--resume")
-        assert told.code == 0, told.err
-        done["resume"] += 1
+    completed = fuzzed.ask(kind, name, *words, stdin=stdin, until=until)
+    assert completed.code != 2, completed.err
+    tally[f"{completed.code} {kind}"] += 1
+    if completed.code == STOPPED and kind == OURS and not stdin:
+        completed = fuzzed.ask(kind, name, *words, "--resume")
+        assert completed.code == 0, completed.err
+        tally["resume"] += 1
 
 
 def test_no_command_takes_an_arm_through_a_keep_out() -> None:
-    done = fuzz(15, 2)
+    tally = fuzz(15, 2)
     for kind in (OURS, "grbl", "klipper", *BUSES):
-        assert sum(done[f"{code} {kind}"] for code in (0, 3, STOPPED)), done
-    assert sum(done[key] for key in done if key.startswith("3 ")) > 1, done
-    assert sum(done[key] for key in done if key.startswith("0 ")) > 4, done
+        assert sum(tally[f"{code} {kind}"] for code in (0, 3, STOPPED)), tally
+    assert sum(tally[key] for key in tally if key.startswith("3 ")) > 1, tally
+    assert sum(tally[key] for key in tally if key.startswith("0 ")) > 4, tally
 
 
 def test_grip_home_and_a_motion_that_is_gone_on_with() -> None:
-    with arms() as found:
-        robot, scene = found.files[OURS], ["--scene", found.scene]
-        found.begin()
-        assert found.ask(OURS, "grip", robot, "closed", "--assume", "open").code == 0
-        assert found.made == 0.0
-        assert found.ask(OURS, "send", robot, -60, 80, -80, *scene, until=0.6).code == STOPPED
-        assert 0.05 < found.made < 1.0
-        assert found.ask(OURS, "send", robot, -60, 80, -80, *scene, "--resume").code == 0
-        assert found.made > 0.5
-        assert found.ask(OURS, "jog", robot, "q2", -60, "--seconds", 1, *scene).code == 0
+    with arms() as fuzzed:
+        robot, scene = fuzzed.files[OURS], ["--scene", fuzzed.scene]
+        fuzzed.begin()
+        assert fuzzed.ask(OURS, "grip", robot, "closed", "--assume", "open").code == 0
+        assert fuzzed.made == 0.0
+        assert fuzzed.ask(OURS, "send", robot, -60, 80, -80, *scene, until=0.6).code == STOPPED
+        assert 0.05 < fuzzed.made < 1.0
+        assert fuzzed.ask(OURS, "send", robot, -60, 80, -80, *scene, "--resume").code == 0
+        assert fuzzed.made > 0.5
+        assert fuzzed.ask(OURS, "jog", robot, "q2", -60, "--seconds", 1, *scene).code == 0
 
 
 def test_after_the_search_for_switches_the_move_is_proved() -> None:
-    with arms() as found:
-        robot, port = found.files[OURS], found.ports[OURS].name
-        found.begin()
-        post = found.scene.with_name("post.yaml")
+    with arms() as fuzzed:
+        robot, port = fuzzed.files[OURS], fuzzed.ports[OURS].name
+        fuzzed.begin()
+        post = fuzzed.scene.with_name("post.yaml")
         post.write_text("keep_out:\n  - capsule: {from: [0, -190, 0], to: [0, -190, 600], radius: 30}\n    name: post")
-        found.given.clear()
-        told = run("home", robot, "--scene", post, "--port", port)
-        assert (told.code, "would hit post" in told.err, found.given) == (3, True, []), told.err
-        stands = np.rad2deg(armkin.joints(found.arms[OURS], found.seen[OURS][-1]))
+        fuzzed.given.clear()
+        completed = run("home", robot, "--scene", post, "--port", port)
+        assert (completed.code, "would hit post" in completed.err, fuzzed.given) == (3, True, []), completed.err
+        stands = np.rad2deg(armkin.joints(fuzzed.arms[OURS], fuzzed.seen[OURS][-1]))
         assert np.abs(stands - SWITCHES).max() < 1.5  # where the search ended
-        told = found.ask(OURS, "home", robot, "--scene", found.scene)
-        assert (told.code, "the move after it is" in told.err) == (0, True)
-        assert found.made > 2.0  # q1 comes back from its switch
+        completed = fuzzed.ask(OURS, "home", robot, "--scene", fuzzed.scene)
+        assert (completed.code, "the move after it is" in completed.err) == (0, True)
+        assert fuzzed.made > 2.0  # q1 comes back from its switch
 
 
 if __name__ == "__main__":

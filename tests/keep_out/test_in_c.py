@@ -70,14 +70,14 @@ def test_exported_c_tells_whether_a_posture_is_free(scene: Path, tmp_path: Path)
     subprocess.run(words, cwd=tmp_path, check=True)
     arm = armkin.load("three_dof", scene=scene)
     q = np.random.default_rng(4).uniform(-2, 2, (200, 3))
-    given = "".join(f"{a!r} {b!r} {c!r}\n" for a, b, c in q.tolist())
-    told = subprocess.run([tmp_path / "free"], input=given, capture_output=True, text=True, check=True).stdout
+    text = "".join(f"{a!r} {b!r} {c!r}\n" for a, b, c in q.tolist())
+    output = subprocess.run([tmp_path / "free"], input=text, capture_output=True, text=True, check=True).stdout
     plain = armkin.clearance(arm, q)
-    for line, mm, other in zip(told.splitlines(), plain.mm.tolist(), plain.other.tolist(), strict=True):
+    for line, mm, obstacle in zip(output.splitlines(), plain.mm.tolist(), plain.other.tolist(), strict=True):
         free, distance, name = line.split(" ", 2)
         assert abs(float(distance) - mm) < 1e-9
         assert (free == "1") == (mm >= 0)
-        assert name == other
+        assert name == obstacle
     assert (
         "three_dof_free"
         not in (run("export", "three_dof", "--c", "-o", tmp_path / "b.c"), (tmp_path / "b.h"))[1].read_text()

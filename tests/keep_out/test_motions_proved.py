@@ -86,10 +86,10 @@ def test_a_body_moves_no_farther_than_its_levers(ratio: float, table: Path) -> N
         bound = np.abs(step) @ levers(held, np.where(arm.prismatic, np.abs(q).max(axis=0) + 5.0, 0.0))
         assert (moved <= bound + 1e-9).all()
         assert (moved.max(axis=0) > 0.2 * bound.max(axis=0)).any()  # and the bound is no guess in the sky
-        out = np.where(arm.prismatic, np.abs(q).max(axis=0), 0.0)
+        travel = np.where(arm.prismatic, np.abs(q).max(axis=0), 0.0)
         last = [k for k, pair in enumerate(held.pairs) if pair.body == arm.n and not pair.other]
         tip = armkin.fk(arm, q)[:, :2, 3]  # axis 1 stands upright in the base's origin
-        assert (levers(held, out)[0, last] >= ratio * np.hypot(*tip.T).max()).all()
+        assert (levers(held, travel)[0, last] >= ratio * np.hypot(*tip.T).max()).all()
 
 
 def test_parts_of_cubics_go_no_farther_than_told() -> None:
@@ -98,22 +98,22 @@ def test_parts_of_cubics_go_no_farther_than_told() -> None:
     way.points[0, 1:] = way.points[3, :-1]
     begin = rng.uniform(0, 7, 200)
     end = begin + rng.uniform(0, 1, 200) * (7 - begin)
-    told = way.variation(begin, end)
+    bounds = way.variation(begin, end)
     places = begin[:, None] + np.linspace(0, 1, 400) * (end - begin)[:, None]
     gone = np.abs(np.diff(way.joints_at(places.ravel()).reshape(200, 400, 2), axis=1)).sum(axis=1)
-    assert (gone <= told + 1e-12).all()
-    whole = way.variation(np.zeros(1), np.full(1, 7.0))[0]
-    assert whole == pytest.approx(np.abs(np.diff(way.points, axis=0)).sum(axis=(0, 1)))
+    assert (gone <= bounds + 1e-12).all()
+    full_bound = way.variation(np.zeros(1), np.full(1, 7.0))[0]
+    assert full_bound == pytest.approx(np.abs(np.diff(way.points, axis=0)).sum(axis=(0, 1)))
 
 
 def test_a_path_tells_a_lower_bound_of_its_clearance(table: Path) -> None:
     arm = armkin.load("three_dof", scene=table)
     for jerk in (None, 8.0):
-        found = armkin.path(arm, [[390, 80, 300], [390, -80, 200], [300, -80, 250]], blend=5, jerk=jerk)
-        assert found.clearance is not None
-        sampled = float(np.min(armkin.clearance(arm, found.q(np.linspace(0, found.duration, 5000))).mm))
-        assert 0 <= found.clearance["mm"] <= sampled <= found.clearance["mm"] + 1.0
-        assert found.clearance["with"] == "table"
+        plan = armkin.path(arm, [[390, 80, 300], [390, -80, 200], [300, -80, 250]], blend=5, jerk=jerk)
+        assert plan.clearance is not None
+        sampled = float(np.min(armkin.clearance(arm, plan.q(np.linspace(0, plan.duration, 5000))).mm))
+        assert 0 <= plan.clearance["mm"] <= sampled <= plan.clearance["mm"] + 1.0
+        assert plan.clearance["with"] == "table"
 
 
 def test_a_path_through_the_table_is_refused_with_the_place(table: Path) -> None:
@@ -133,8 +133,8 @@ def test_the_first_hit_is_where_the_clearance_runs_out(table: Path) -> None:
     proof = prove_trajectory(way)
     assert proof is not None
     assert (proof.free, proof.stretch, proof.body, proof.keep_out) == (False, 1, "q3", "table")
-    at = hit_time(way, proof)
-    assert way.q(at) == pytest.approx(proof.joints, abs=1e-6)
+    time = hit_time(way, proof)
+    assert way.q(time) == pytest.approx(proof.joints, abs=1e-6)
     assert abs(float(armkin.clearance(arm, proof.joints).mm)) < 0.02
     with pytest.raises(NoSolutionError, match="q3 would hit table on the way to waypoint 2"):
         check_free(way)

@@ -130,9 +130,9 @@ def test_a_port_remembers_its_scene(table: str, tmp_path: Path, monkeypatch: pyt
 
 
 def test_path_tells_its_clearance(table: str) -> None:
-    got = run("path", "three_dof", "--via", "390,80,300", "--via", "390,-80,230", "--scene", table, "--json").json
-    assert set(got["clearance"]) == {"mm", "s_mm", "body", "with"}
-    assert 0 < got["clearance"]["mm"] < 60
+    answer = run("path", "three_dof", "--via", "390,80,300", "--via", "390,-80,230", "--scene", table, "--json").json
+    assert set(answer["clearance"]) == {"mm", "s_mm", "body", "with"}
+    assert 0 < answer["clearance"]["mm"] < 60
     assert "clearance" not in run("path", "three_dof", "--via", "390,80,300", "--via", "390,-80,230", "--json").json
     hit = run("path", "three_dof", "-", "--scene", table, "--json", stdin=b"moves:\n  - joint: [0, 10, -30]\n")
     assert hit.code == 3

@@ -60,9 +60,9 @@ def test_a_slides_body_is_as_long_as_it_is_out(tmp_path: Path) -> None:
     assert [segment.get("slide", False) for segment in named["q2"]["segments"]] == [True, False]
     assert named["q3"]["radius_mm"] == 0.0
     arm = armkin.load(path)
-    found = armkin.clearance(arm, [[0.0, 100.0, 0.0], [0.0, 300.0, 0.0]])
-    assert found.mm == pytest.approx([100 - 5 - 10] * 2)  # the slide begins 100 beside the base
-    assert (found.body.tolist(), found.other.tolist()) == (["q2", "q2"], ["base", "base"])
+    clearance = armkin.clearance(arm, [[0.0, 100.0, 0.0], [0.0, 300.0, 0.0]])
+    assert clearance.mm == pytest.approx([100 - 5 - 10] * 2)  # the slide begins 100 beside the base
+    assert (clearance.body.tolist(), clearance.other.tolist()) == (["q2", "q2"], ["base", "base"])
 
 
 def test_fk_tells_clearance_and_hits() -> None:
@@ -98,10 +98,10 @@ def test_the_nearest_pair_is_the_least_of_all(robot: str, table: Path) -> None:
     """Found by middles and half lengths first, as most segments are too far to matter."""
     held = guard(armkin.load(robot, scene=table))
     q = np.random.default_rng(4).uniform(-3, 3, (3000, held.arm.n)) * np.where(held.arm.prismatic, 100.0, 1.0)
-    mm, which = held.least_clearances(q)
+    mm, pairs = held.least_clearances(q)
     every = held.clearances(q)
     assert np.abs(mm - every.min(axis=1)).max() < 1e-9
-    assert np.abs(every[np.arange(len(q)), which] - mm).max() < 1e-9
+    assert np.abs(every[np.arange(len(q)), pairs] - mm).max() < 1e-9
 
 
 def test_no_free_branch_is_no_solution_and_names_the_hits() -> None:

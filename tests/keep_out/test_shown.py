@@ -26,33 +26,33 @@ def test_a_bench_leaves_its_arm_room(robot: str) -> None:
 
 
 def test_a_hit_is_red_in_a_picture(tmp_path: Path) -> None:
-    out = tmp_path / "arm.svg"
+    picture = tmp_path / "arm.svg"
     scene = "examples/scenes/three_dof.yaml"
-    assert run("plot", "three_dof", "--target", "400,40,100", "--scene", scene, "-o", out).code == 0
-    drawn = out.read_text()
+    assert run("plot", "three_dof", "--target", "400,40,100", "--scene", scene, "-o", picture).code == 0
+    drawn = picture.read_text()
     assert "hits table by 11.9 mm" in drawn
     assert "#d62728" in drawn
 
 
 def test_branches_that_hit_much_leave_the_arm_its_room(tmp_path: Path) -> None:
-    out, words = tmp_path / "arm.svg", ["ur5e", "--target", "500,200,50,180,0,0"]
-    assert run("plot", *words, "--scene", "examples/scenes/ur5e.yaml", "-o", out).code == 0
-    assert "hits floor by 270.5 mm (J2) and 3 more" in out.read_text()
-    lines = [float(x) for x in re.findall(r'id="axis3d_.*?M (\d+\.\d+)', out.read_text(), re.DOTALL)]
+    picture, words = tmp_path / "arm.svg", ["ur5e", "--target", "500,200,50,180,0,0"]
+    assert run("plot", *words, "--scene", "examples/scenes/ur5e.yaml", "-o", picture).code == 0
+    assert "hits floor by 270.5 mm (J2) and 3 more" in picture.read_text()
+    lines = [float(x) for x in re.findall(r'id="axis3d_.*?M (\d+\.\d+)', picture.read_text(), re.DOTALL)]
     assert lines
     assert min(lines) < 0.5 * 9.6 * 72
 
 
 def test_the_workspace_tells_the_free_share() -> None:
     words = ("workspace", "three_dof", "--samples", "500")
-    found = run(*words, "--scene", "examples/scenes/three_dof.yaml", "--json").json
-    assert 0.2 < found["free_share"] < 0.95
+    survey = run(*words, "--scene", "examples/scenes/three_dof.yaml", "--json").json
+    assert 0.2 < survey["free_share"] < 0.95
     assert "free_share" not in run(*words, "--json").json
 
 
 def test_the_page_is_told_of_hits() -> None:
     arm = armkin.load("three_dof", scene="examples/scenes/three_dof.yaml")
-    told = answer_question(arm, Question(q=np.deg2rad([0.0, 0.0, -45.0])))
-    assert told["outside"][0].startswith("it hits table by 47.5 mm (q3)")
-    assert any(branch["hits"] for branch in told["branches"])
+    answer = answer_question(arm, Question(q=np.deg2rad([0.0, 0.0, -45.0])))
+    assert answer["outside"][0].startswith("it hits table by 47.5 mm (q3)")
+    assert any(branch["hits"] for branch in answer["branches"])
     assert answer_question(arm, Question(q=arm.home))["outside"] == []

@@ -45,8 +45,8 @@ def test_the_task_follows_from_the_joints_that_are_left(
     s = armkin.ik(arm, targets_of(definition, armkin.fk(arm, q), q))
     away = np.abs(np.angle(np.exp(1j * (s.q - q[:, None])))).max(axis=2)
     assert np.nanmin(away, axis=1).max() < 1e-6
-    whole = armkin.unlock(armkin.load(ROBOTS / f"{name}.yaml"), held, q)
-    np.testing.assert_allclose(armkin.fk(armkin.load(ROBOTS / f"{name}.yaml"), whole), armkin.fk(arm, q), atol=1e-9)
+    full_q = armkin.unlock(armkin.load(ROBOTS / f"{name}.yaml"), held, q)
+    np.testing.assert_allclose(armkin.fk(armkin.load(ROBOTS / f"{name}.yaml"), full_q), armkin.fk(arm, q), atol=1e-9)
 
 
 def test_the_task_of_the_file_stays() -> None:

@@ -16,12 +16,12 @@ def test_roll_pitch_yaw_are_turns_about_fixed_axes() -> None:
     """R = Rz(yaw) Ry(pitch) Rx(roll), of one and of many to the same bits."""
     roll, pitch, yaw = np.radians(ANGLES).T
     R = rotation_about(2, yaw) @ rotation_about(1, pitch) @ rotation_about(0, roll)
-    many = transforms(PLACES, ANGLES)
-    np.testing.assert_allclose(many[:, :3, :3], R, atol=1e-15)
-    assert (many[:, :3, 3] == PLACES).all()
-    assert (many[:, 3] == [0, 0, 0, 1]).all()
-    one = np.array([transform(list(p), list(a)) for p, a in zip(PLACES, ANGLES, strict=True)])
-    assert one.tobytes() == many.tobytes()
+    batch = transforms(PLACES, ANGLES)
+    np.testing.assert_allclose(batch[:, :3, :3], R, atol=1e-15)
+    assert (batch[:, :3, 3] == PLACES).all()
+    assert (batch[:, 3] == [0, 0, 0, 1]).all()
+    row_by_row = np.array([transform(list(p), list(a)) for p, a in zip(PLACES, ANGLES, strict=True)])
+    assert row_by_row.tobytes() == batch.tobytes()
     again = transforms(PLACES, np.degrees(rpy(R)))
     np.testing.assert_allclose(again[:, :3, :3], R, atol=1e-14)
 

@@ -25,8 +25,8 @@ def test_limits_home_and_poses_are_those_of_the_file(path: Path) -> None:
     joints = arm.file.joints
     assert units.limits_out(arm) == [j.limits or (-math.inf, math.inf) for j in joints]
     assert units.home_out(arm) == [j.home for j in joints]
-    given = {name: list(values) for name, values in (arm.file.poses or {}).items()}
-    assert units.poses_out(arm) == {"home": [j.home for j in joints], **given}
+    poses = {name: list(values) for name, values in (arm.file.poses or {}).items()}
+    assert units.poses_out(arm) == {"home": [j.home for j in joints], **poses}
 
 
 @given(st.integers(-(10**9), 10**9), st.integers(0, 9))

@@ -42,11 +42,11 @@ def legal_copies(arm: Arm, q: np.ndarray) -> list[np.ndarray]:
 def nodes(arm: Arm, targets: np.ndarray) -> Nodes:
     """All legal joint values at all targets."""
     solutions = armkin.ik(arm, targets)
-    out = []
+    columns = []
     for row, valid in zip(solutions.q, solutions.valid, strict=True):
         rows = [copy for q in row[valid] for copy in legal_copies(arm, q)]
-        out.append(np.array(rows).reshape(-1, arm.n))
-    return Nodes(out)
+        columns.append(np.array(rows).reshape(-1, arm.n))
+    return Nodes(columns)
 
 
 def edges(arm: Arm, a: np.ndarray, b: np.ndarray, tolerance: float) -> np.ndarray:
@@ -80,19 +80,19 @@ def carried(arm: Arm, targets: np.ndarray, tolerance: float, start: np.ndarray |
         turning = ~arm.prismatic
         away[..., turning] = np.abs((away[..., turning] + np.pi) % TURN - np.pi)
         first = first[away.max(axis=2).min(axis=1, initial=np.inf) < 1e-6]
-    out = [first]
+    columns = [first]
     for i in range(len(targets) - 1):
-        if not len(out[-1]) or not len(n.q[i + 1]):
+        if not len(columns[-1]) or not len(n.q[i + 1]):
             break
-        out.append(n.q[i + 1][edges(arm, out[-1], n.q[i + 1], tolerance).any(axis=0)])
-    return out if len(out[-1]) else out[:-1]
+        columns.append(n.q[i + 1][edges(arm, columns[-1], n.q[i + 1], tolerance).any(axis=0)])
+    return columns if len(columns[-1]) else columns[:-1]
 
 
 def runs(arm: Arm, targets: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
     """The fewest runs that carry all that can be carried, as first and last samples: each goes as far as any can."""
     n = nodes(arm, targets)
     goes = [edges(arm, n.q[i], n.q[i + 1], tolerance) for i in range(len(targets) - 1)]
-    out = []
+    spans = []
     i = 0
     while i < len(goes):
         alive: np.ndarray = np.ones(len(n.q[i]), bool)
@@ -100,10 +100,10 @@ def runs(arm: Arm, targets: np.ndarray, tolerance: float) -> list[tuple[int, int
         while i < len(goes) and goes[i][alive].any():
             alive, i = goes[i][alive].any(axis=0), i + 1
         if i > begin:
-            out.append((begin, i))
+            spans.append((begin, i))
         else:
             i += 1
-    return out
+    return spans
 
 
 def zoomed(arm: Arm, targets: Callable[[np.ndarray], np.ndarray], s: np.ndarray, tolerance: float) -> float:

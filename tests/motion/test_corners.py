@@ -34,27 +34,27 @@ def wander(arm: Arm, count: int, step: float) -> np.ndarray:
 @pytest.mark.parametrize("hold", [None, 1.5])
 def test_corners_are_rounded_within_their_blend_and_all_limits(three_dof: Arm, hold: float | None) -> None:
     rows = wander(three_dof, 200, 15.0)
-    one = round_waypoints(three_dof, rows[0], rows[1:], 10.0, hold=hold)
-    t = np.arange(0, one.duration, 0.001)
-    q = one.q(t)
+    trajectory = round_waypoints(three_dof, rows[0], rows[1:], 10.0, hold=hold)
+    t = np.arange(0, trajectory.duration, 0.001)
+    q = trajectory.q(t)
     v, a = np.diff(q, axis=0) / 0.001, np.diff(q, n=2, axis=0) / 1e-6
     assert np.abs(v / three_dof.max_speed).max() <= 1.002
     assert np.abs(a / three_dof.max_accel).max() <= 1.002
     assert np.all((q >= three_dof.lower - 1e-9) & (q <= three_dof.upper + 1e-9))
     for row in rows:
         assert np.rad2deg(np.linalg.norm(q - row, axis=1).min()) < 10.0 / np.sqrt(2) + 0.1
-    assert one.q(one.duration) == pytest.approx(rows[-1])
+    assert trajectory.q(trajectory.duration) == pytest.approx(rows[-1])
     stopping = plan_joint_moves(three_dof, rows[0], rows[1:]).duration
-    assert stopping / one.duration > 1.4
+    assert stopping / trajectory.duration > 1.4
 
 
 def test_there_and_back_again_turns_round_within_the_limits(three_dof: Arm) -> None:
     rows = np.deg2rad([[0, 90, -90], [40, 90, -90], [0, 90, -90]])
-    one = round_waypoints(three_dof, rows[0], rows[1:], 10.0)
-    t = np.arange(0, one.duration, 0.001)
-    a = np.diff(one.q(t), n=2, axis=0) / 1e-6
+    trajectory = round_waypoints(three_dof, rows[0], rows[1:], 10.0)
+    t = np.arange(0, trajectory.duration, 0.001)
+    a = np.diff(trajectory.q(t), n=2, axis=0) / 1e-6
     assert np.abs(a / three_dof.max_accel).max() <= 1.002
-    assert np.rad2deg(one.q(t)[:, 0].max()) == pytest.approx(35.0, abs=0.01)
+    assert np.rad2deg(trajectory.q(t)[:, 0].max()) == pytest.approx(35.0, abs=0.01)
 
 
 def test_what_makes_no_sense_is_refused(three_dof: Arm) -> None:
@@ -67,7 +67,7 @@ def test_what_makes_no_sense_is_refused(three_dof: Arm) -> None:
 
 def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = wander(three_dof, 60, 20.0)
-    whole = cut_trajectory(
+    at_once = cut_trajectory(
         round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
     )
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 50)
@@ -75,10 +75,12 @@ def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, mon
     parts = cut_trajectory(
         round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
     )
-    assert parts.duration == pytest.approx(whole.duration, rel=1e-12)
-    [[one], [other]] = ([*map(list, (move.segments for move in laid.moves()))] for laid in (whole, parts))
-    assert len(one) == len(other) > 500
-    assert [s.ticks for s in one] == [s.ticks for s in other]
+    assert parts.duration == pytest.approx(at_once.duration, rel=1e-12)
+    [[segments], [segments_in_parts]] = (
+        [*map(list, (move.segments for move in laid.moves()))] for laid in (at_once, parts)
+    )
+    assert len(segments) == len(segments_in_parts) > 500
+    assert [s.ticks for s in segments] == [s.ticks for s in segments_in_parts]
 
 
 def test_waypoints_cost_little_memory_beyond_the_way_itself(three_dof: Arm, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,9 +86,9 @@ def worst_miss(points: np.ndarray, way: np.ndarray, tolerance: float) -> tuple[f
         passed.append(i)
     for k in range(len(step)):
         allowed = 0.0
-        for other, corner in ((k - 1, k), (k + 1, k + 1)):
-            if 0 <= other < len(step) and turned[corner] <= CORNER and size[other] >= size[k] / 3:
-                c = points[k - 1] if other < k else points[k + 2]
+        for neighbour, corner in ((k - 1, k), (k + 1, k + 1)):
+            if 0 <= neighbour < len(step) and turned[corner] <= CORNER and size[neighbour] >= size[k] / 3:
+                c = points[k - 1] if neighbour < k else points[k + 2]
                 allowed = max(allowed, sagitta(points[k], points[k + 1], c))
         beside = way[passed[k + 1] : passed[k + 2] + 1]
         excess = max(excess, float(to_segment(beside, points[k], points[k + 1]).max() - allowed))
@@ -210,9 +210,9 @@ def test_many_rests_are_planned_at_once_as_each_alone(
     assert plan.duration == pytest.approx(alone.duration, rel=4e-3)
     for share in ("speed", "accel"):
         assert plan.limits[share].max() <= 1.001
-    for one, other in zip(plan.motion.stretches, alone.motion.stretches, strict=True):
-        np.testing.assert_allclose(one.end, other.end, atol=1e-9)
-        assert np.abs(one.evaluate(np.array([0.0, one.duration]), 1)).max() <= 1e-9
+    for together, by_itself in zip(plan.motion.stretches, alone.motion.stretches, strict=True):
+        np.testing.assert_allclose(together.end, by_itself.end, atol=1e-9)
+        assert np.abs(together.evaluate(np.array([0.0, together.duration]), 1)).max() <= 1e-9
     tip = armkin.fk(three_dof, plan.q(plan.motion.begins[1:]))[:, :3, 3]
     np.testing.assert_allclose(tip, saw, atol=1e-6)
 
@@ -296,11 +296,11 @@ def test_an_empty_cell_of_blend_or_speed_leaves_it_to_what_is_said_of_all(three_
 def test_a_way_shown_with_too_few_samples_is_shown_best_where_it_bends_most(three_dof: Arm) -> None:
     plan = armkin.path(three_dof, np.concatenate([[CENTRE - [0, 240, 0]], circle(60, 20.0)]), corners="tolerance")
     begins = plan.motion.begins.tolist()
-    whole, off = playback_times.sample_times(three_dof, plan, begins, 0.02, 10_000)
-    assert off <= 0.02
-    few, worse = playback_times.sample_times(three_dof, plan, begins, 0.02, len(whole) // 2)
-    assert len(few) == len(whole) // 2
-    assert worse <= 6 * off  # halves are off by a quarter as much
+    all_times, deviation = playback_times.sample_times(three_dof, plan, begins, 0.02, 10_000)
+    assert deviation <= 0.02
+    half_times, worse = playback_times.sample_times(three_dof, plan, begins, 0.02, len(all_times) // 2)
+    assert len(half_times) == len(all_times) // 2
+    assert worse <= 6 * deviation  # halves are off by a quarter as much
 
 
 @pytest.mark.parametrize("seed", [6, 51, 54, 93])

@@ -35,11 +35,11 @@ def test_noise_in_a_tight_bend_is_no_corner() -> None:
     bend = np.stack([np.cos(a), np.sin(a)], axis=1)
     legs = np.linspace(10, 0.1, 100)[:, None]
     way = np.concatenate([[1, 0] - legs * [0, 1], bend, [-1, 0] - legs[::-1] * [0, 1]])
-    found = 0
+    corner_count = 0
     for seed in range(5):
         noise = np.random.default_rng(seed).uniform(-0.02, 0.02, way.shape)
-        found += int(fit_points.corner_points(way + noise, 0.05).sum())
-    assert found <= 1  # 42 where it is seen from afar alone
+        corner_count += int(fit_points.corner_points(way + noise, 0.05).sum())
+    assert corner_count <= 1  # 42 where it is seen from afar alone
     sharp = np.concatenate([np.linspace([0, 0], [10, 0], 100), np.linspace([10, 0], [10, 10], 100)[1:]])
     assert np.flatnonzero(fit_points.corner_points(sharp, 0.05)).tolist() == [99]
 
@@ -51,9 +51,9 @@ def test_noise_in_tight_bends_takes_little_time(three_dof: armkin.Arm) -> None:
     plan = armkin.path(three_dof, points, corners="tolerance")
     assert plan.deviation <= plan.tolerance
     assert on_path(plan) <= 1.04 * on_path(armkin.path(three_dof, loops(4, 20_000), corners="tolerance"))
-    way, at = tips(plan), 0
+    way, index = tips(plan), 0
     for point in points:  # in order: each behind the first place where the one before it is passed
-        at += int(np.flatnonzero(np.linalg.norm(way[at:] - point, axis=1) <= plan.tolerance + 1e-3)[0])
+        index += int(np.flatnonzero(np.linalg.norm(way[index:] - point, axis=1) <= plan.tolerance + 1e-3)[0])
 
 
 def test_noise_that_leaves_the_tolerance_never_brings_the_law_to_rest(three_dof: armkin.Arm) -> None:
@@ -69,8 +69,8 @@ def test_noise_in_a_cusp_is_no_row_of_corners() -> None:
     a = np.linspace(-2.0, 2.0, 240)
     y = np.sign(a) * np.abs(a) ** 3
     cusp = np.stack([4 * a**2, y, 0 * a], axis=1)
-    found = 0
+    corner_count = 0
     for seed in range(5):
         noise = np.random.default_rng(seed).uniform(-0.02, 0.02, cusp.shape)
-        found += int(fit_points.corner_points(cusp + noise, 0.05).sum())
-    assert found <= 1
+        corner_count += int(fit_points.corner_points(cusp + noise, 0.05).sum())
+    assert corner_count <= 1

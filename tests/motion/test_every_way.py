@@ -24,13 +24,13 @@ def test_reach_is_that_of_brute_force(name: str) -> None:
         columns = link_branches(
             arm, way.targets, np.linspace(0, way.length, 150), task=None, tolerance=0.05, near=arm.home
         )
-        all_ = chains_of_columns(arm, columns)
-        mine = max((columns.s[c.carries(0)] for c in all_ if c.first == 0 and c.carries(0) >= 0), default=-1.0)
+        chains = chains_of_columns(arm, columns)
+        mine = max((columns.s[c.carries(0)] for c in chains if c.first == 0 and c.carries(0) >= 0), default=-1.0)
         dense = np.linspace(0, way.length, 401)
-        found = brute.reach(arm, way.targets(dense), 0.05)
-        assert mine <= (dense[min(found + 1, 400)] if found >= 0 else 0.0) + 1e-6
-        assert mine >= (dense[found] if found >= 0 else -1.0) - 1e-6
-        runs = fewest_runs(all_, len(columns.s))
+        reached = brute.reach(arm, way.targets(dense), 0.05)
+        assert mine <= (dense[min(reached + 1, 400)] if reached >= 0 else 0.0) + 1e-6
+        assert mine >= (dense[reached] if reached >= 0 else -1.0) - 1e-6
+        runs = fewest_runs(chains, len(columns.s))
         for a, b in pairwise(runs):
             assert b.first >= a.last
 

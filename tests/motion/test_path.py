@@ -38,9 +38,9 @@ def test_a_circle_is_followed_within_every_limit(three_dof: Arm) -> None:
     assert a.max() <= 1.002
     assert max(v.max(), a.max()) > 0.99  # and nothing is left unused
     tip = armkin.fk(three_dof, q)[:, :3, 3]
-    on = plan.s(np.arange(0.0, plan.duration, 0.001)) > 0
-    off = np.hypot(np.hypot(*(tip[on, :2] - [340, 80]).T) - 50, tip[on, 2] - 300)
-    assert off.max() < plan.deviation + 1e-9 < plan.tolerance
+    on_path = plan.s(np.arange(0.0, plan.duration, 0.001)) > 0
+    deviation = np.hypot(np.hypot(*(tip[on_path, :2] - [340, 80]).T) - 50, tip[on_path, 2] - 300)
+    assert deviation.max() < plan.deviation + 1e-9 < plan.tolerance
     assert plan.length == pytest.approx(100 * np.pi)
     assert [run.end for run in plan.runs] == [pytest.approx(100 * np.pi)]
 
@@ -110,7 +110,7 @@ def test_moves_that_make_no_sense_are_refused_in_words(three_dof: Arm, moves: li
 
 def test_a_way_of_many_turns_is_planned(three_dof: Arm) -> None:
     """The grid grows with the way: 100 turns of 50 mm are 31 m."""
-    one, many = (
+    one_turn, hundred_turns = (
         armkin.path(
             three_dof,
             {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300], "turns": turns}}]},
@@ -118,8 +118,8 @@ def test_a_way_of_many_turns_is_planned(three_dof: Arm) -> None:
         )
         for turns in (1, 100)
     )
-    assert many.deviation <= 0.1
-    assert many.duration == pytest.approx(100 * one.duration, rel=0.08)
+    assert hundred_turns.deviation <= 0.1
+    assert hundred_turns.duration == pytest.approx(100 * one_turn.duration, rel=0.08)
 
 
 def test_a_very_long_way_is_solved_every_two_millimetres() -> None:
@@ -132,18 +132,18 @@ def test_branches_do_not_depend_on_the_blocks_they_are_solved_in(
     three_dof: Arm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     moves = {"moves": [{"point": [390, 80, 300]}, CIRCLE]}
-    whole = armkin.path(three_dof, moves, start=three_dof.home)
+    at_once = armkin.path(three_dof, moves, start=three_dof.home)
     monkeypatch.setattr("armkin.motion.branches.linked_branches._BLOCK", 64)
     monkeypatch.setattr("armkin.motion.branches.branch_columns._BLOCK", 64)
     monkeypatch.setattr("armkin.motion.plan.path_plan._BLOCK", 100)
     parts = armkin.path(three_dof, moves, start=three_dof.home)
-    assert parts.duration == pytest.approx(whole.duration, rel=1e-12)
-    assert [b.carries for b in parts.branches] == [b.carries for b in whole.branches]
-    for key, share in whole.limits.items():
+    assert parts.duration == pytest.approx(at_once.duration, rel=1e-12)
+    assert [b.carries for b in parts.branches] == [b.carries for b in at_once.branches]
+    for key, share in at_once.limits.items():
         np.testing.assert_allclose(parts.limits[key], share, rtol=1e-9)
     assert parts.nearest_singularity is not None
-    assert whole.nearest_singularity is not None
-    assert parts.nearest_singularity[:2] == pytest.approx(whole.nearest_singularity[:2])
+    assert at_once.nearest_singularity is not None
+    assert parts.nearest_singularity[:2] == pytest.approx(at_once.nearest_singularity[:2])
 
 
 def test_a_path_that_begins_on_a_boundary_is_carried_by_the_branches_that_meet_there(three_dof: Arm) -> None:
@@ -161,6 +161,6 @@ def test_one_jerk_for_all_joints_is_each_ones_where_a_joint_is_redundant() -> No
     arm = replace(armkin.load("panda"), max_accel=np.full(7, 2.0))
     goals = np.repeat(armkin.fk(arm, arm.home)[None], 2, axis=0)
     goals[1, :3, 3] += [0, 2, -2]
-    one, each = (armkin.path(arm, goals, jerk=jerk, samples=9) for jerk in (50.0, np.full(7, 50.0)))
-    assert one.held == each.held
-    assert one.duration == each.duration
+    by_number, by_array = (armkin.path(arm, goals, jerk=jerk, samples=9) for jerk in (50.0, np.full(7, 50.0)))
+    assert by_number.held == by_array.held
+    assert by_number.duration == by_array.duration

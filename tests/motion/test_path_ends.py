@@ -38,8 +38,8 @@ def test_both_branches_go_on_from_a_boundary_and_end_on_it(joints: tuple[float, 
     """The arm is straight at the edge of its reach, where the two elbows meet."""
     arm = armkin.load("three_dof")
     edge = armkin.fk(arm, np.deg2rad(joints))[:3, 3]
-    out = edge - np.array([0.0, 0.0, 170.0])
-    inside = edge - 30 * out / np.linalg.norm(out)
+    outwards = edge - np.array([0.0, 0.0, 170.0])
+    inside = edge - 30 * outwards / np.linalg.norm(outwards)
     beside = inside + np.array([0.0, 5.0, 3.0])
     for start, way in (
         ({"joints": list(joints)}, [inside]),
@@ -96,13 +96,13 @@ def test_a_stretched_arm_stands_at_its_path_s_start() -> None:
         T[:, 2, 3] += s
         return T
 
-    found = Samples(arm, up, None, arm.home, 20.0).solve_at(np.array([0.0, 20.0]))
-    assert found.valid.any(axis=1).tolist() == [True, False]
+    solutions = Samples(arm, up, None, arm.home, 20.0).solve_at(np.array([0.0, 20.0]))
+    assert solutions.valid.any(axis=1).tolist() == [True, False]
 
 
 def test_an_offset_in_the_tool_s_frame_takes_the_posture_that_carries_what_follows() -> None:
     """The tool's axes are another posture's with each branch, so that a point and an offset have several lines."""
-    arm, rng, other = armkin.load("labvolt_5150"), np.random.default_rng(1), 0
+    arm, rng, other_posture_count = armkin.load("labvolt_5150"), np.random.default_rng(1), 0
     arm = replace(arm, max_speed=np.full(5, 1.0), max_accel=np.full(5, 2.0))
     arm = replace(arm, lower=np.full(5, -2.8), upper=np.full(5, 2.8))
     postures = rng.uniform(-2.6, 2.6, (19, 5))
@@ -125,8 +125,8 @@ def test_an_offset_in_the_tool_s_frame_takes_the_posture_that_carries_what_follo
         except NoSolutionError:
             planned = False
         assert planned == any(carried)
-        other += planned and not carried[0]
-    assert other > 0
+        other_posture_count += planned and not carried[0]
+    assert other_posture_count > 0
 
 
 def test_sums_stay_what_was_typed() -> None:

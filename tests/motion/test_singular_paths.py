@@ -100,10 +100,10 @@ def test_free_joints_stay_where_the_whole_way_is_singular(name: str) -> None:
     assert np.ptp(q[:, 1]) == pytest.approx(0.4, abs=1e-6)
 
 
-def beside(arm: armkin.Arm, q: list[float], off: float, turn: float) -> tuple[armkin.PathPlan, np.ndarray]:
+def beside(arm: armkin.Arm, q: list[float], distance: float, turn: float) -> tuple[armkin.PathPlan, np.ndarray]:
     """A line of 170 mm that passes a singular posture at so many mm, and where it begins and ends."""
     ends = np.tile(armkin.fk(arm, q), (2, 1, 1))
-    ends[:, :3, 3] += np.array([[-60.0, -60, 0], [60, 60, 0]]) + off * np.array([0.3, 0.5, 0.7])
+    ends[:, :3, 3] += np.array([[-60.0, -60, 0], [60, 60, 0]]) + distance * np.array([0.3, 0.5, 0.7])
     turned = np.rad2deg(rpy(ends[0, :3, :3])).tolist()
     moves = [{key: [*end[:3, 3].tolist(), *turned]} for key, end in zip(("point", "line"), ends, strict=True)]
     return armkin.path(arm, {"task": "pose", "turn_tolerance": turn, "moves": moves}, hold=None), ends
@@ -124,16 +124,18 @@ def seconds(plan: armkin.PathPlan) -> float:
 
 
 @pytest.mark.parametrize(
-    ("name", "off", "turn"),
+    ("name", "distance", "turn"),
     [("puma560", 0.01, 0.002), ("puma560", 0.1, 0.1), ("irb120", 1.0, 0.1), ("ar4", 0.01, 0.002),
      ("puma560", 0.001, 0.0), ("puma560", 0.01, 0.0), ("irb120", 0.001, 0.0), ("irb120", 0.01, 0.0),
      ("irb120", 0.02, 0.0), ("ar4", 0.001, 0.0), ("ar4", 0.01, 0.0)],
 )  # fmt: skip
-def test_beside_a_singularity_a_line_takes_as_long_as_straight_through_it(name: str, off: float, turn: float) -> None:
+def test_beside_a_singularity_a_line_takes_as_long_as_straight_through_it(
+    name: str, distance: float, turn: float
+) -> None:
     """The tool turned a little and its tip on the line, or, where it may not be turned, aside within the tolerance."""
     arm = with_rates(name)
-    plan, ends = beside(arm, QS[name], off, turn)
-    slack = 1.05 if off == 1.0 else 1.002
+    plan, ends = beside(arm, QS[name], distance, turn)
+    slack = 1.05 if distance == 1.0 else 1.002
     assert seconds(plan) <= slack * seconds(straight_through(name))
     assert (plan.turned is not None) == (turn > 0)
     t = np.linspace(0.0, plan.duration, 4001)
@@ -154,22 +156,22 @@ def test_beside_a_singularity_a_line_takes_as_long_as_straight_through_it(name: 
 def test_a_plan_says_where_and_how_a_singularity_is_passed() -> None:
     for turn, how in ((0.0, "the tip at most 0.0045 mm aside"), (0.002, "the tool turned by at most 0.0017 deg")):
         plan, _ = beside(with_rates("puma560"), QS["puma560"], 0.01, turn)
-        [said] = wrist_pass_lines(plan)
-        assert said.startswith("a wrist singularity is passed between 35.817 and 134.741 mm: ")
-        assert how in said
+        [line] = wrist_pass_lines(plan)
+        assert line.startswith("a wrist singularity is passed between 35.817 and 134.741 mm: ")
+        assert how in line
         names = [branch["name"] for branch in plan_fields(plan)["branches"]]
         assert len(names) == len(set(names))
-        [one] = plan_fields(plan)["wrists_passed"]
-        assert (one["aside_mm"] > 0) == (turn == 0)
-        assert (one["turned_deg"] > 0) == (turn > 0)
+        [passed] = plan_fields(plan)["wrists_passed"]
+        assert (passed["aside_mm"] > 0) == (turn == 0)
+        assert (passed["turned_deg"] > 0) == (turn > 0)
 
 
 def test_a_picture_says_how_a_singularity_is_passed(tmp_path: Path) -> None:
     for turn, how in ((0.0, "tip 0.0045 mm aside"), (0.002, "tool turned by 0.0017 deg")):
         plan, _ = beside(with_rates("puma560"), QS["puma560"], 0.01, turn)
         plot_path(plan, str(tmp_path / "plan.svg"))
-        said = f"straight through a wrist singularity, 36 to 135 mm: {how}"
-        assert said in (tmp_path / "plan.svg").read_text()
+        caption = f"straight through a wrist singularity, 36 to 135 mm: {how}"
+        assert caption in (tmp_path / "plan.svg").read_text()
 
 
 def test_nothing_goes_along_the_line_faster_than_its_slowest_joint_alone() -> None:
@@ -219,10 +221,10 @@ def test_a_whole_stretch_of_singular_postures_is_solved_at_few_samples(
     way: list[float], split: bool, carried: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From the Stanford arm's home: straight up joints 4 and 6 are free all along, and divided steps multiplied."""
-    seen, solved = [], Samples.solve_at
+    sample_counts, solved = [], Samples.solve_at
 
     def counted(self: Samples, s: np.ndarray, examine: bool = True) -> Columns:
-        seen.append(len(s))
+        sample_counts.append(len(s))
         return solved(self, s, examine)
 
     monkeypatch.setattr(Samples, "solved", counted)
@@ -233,7 +235,7 @@ def test_a_whole_stretch_of_singular_postures_is_solved_at_few_samples(
     else:
         with pytest.raises(NoSolutionError, match=r"q3 meets its limit 304\.8 mm"):
             armkin.path(arm, moves, split=split)
-    assert sum(seen) < 1500
+    assert sum(sample_counts) < 1500
 
 
 def test_a_home_that_is_singular_and_a_way_that_is_not_keep_their_branch() -> None:
@@ -244,10 +246,10 @@ def test_a_home_that_is_singular_and_a_way_that_is_not_keep_their_branch() -> No
 
 def test_an_ordinary_line_asks_once_how_straight_a_wrist_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """Joint 5 alone tells; the axes were asked anew for each branch of a line, which took up to 15 % of its time."""
-    asked = []
+    counts = []
 
     def counted(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
-        asked.append(len(q))
+        counts.append(len(q))
         return armkin.jacobian(arm, q)
 
     monkeypatch.setattr(wrist_turn, "jacobian", counted)
@@ -255,21 +257,21 @@ def test_an_ordinary_line_asks_once_how_straight_a_wrist_is(monkeypatch: pytest.
     ends = np.tile(armkin.fk(arm, [0.3, 0.3, 0.2, 0.5, 1.0, 0.3]), (2, 1, 1))
     ends[1, :3, 3] += [60.0, 60.0, 0.0]
     assert armkin.path(arm, ends).motion.duration > 0
-    assert asked == [3]
+    assert counts == [3]
 
 
 def test_a_way_that_is_singular_throughout_has_one_place_where_its_wrist_is_straight(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Rounding made every other sample one, each with windows to plan: 8.5 s of a core for a second's motion."""
-    found: list[int] = []
+    place_counts: list[int] = []
     straight = wrist_turn._straight_samples
 
     def counted(*arguments: Any) -> list[int]:
         places = straight(*arguments)
-        found.append(len(places))
+        place_counts.append(len(places))
         return places
 
     monkeypatch.setattr(wrist_turn, "_straight_samples", counted)
     test_free_joints_stay_where_the_whole_way_is_singular("puma560")
-    assert max(found) == 1
+    assert max(place_counts) == 1

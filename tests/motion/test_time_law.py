@@ -39,15 +39,15 @@ def test_a_long_way_takes_little_memory_beside_its_own() -> None:
     s, q = way(0, 100_000, arm.n)
     tracemalloc.start()
     law = armkin.time_law(arm, q, s)
-    kept, most = tracemalloc.get_traced_memory()
+    kept_bytes, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert law.duration > 0
-    assert kept / len(s) <= 100  # bytes a sample: the slopes of three joints, steps, (ds/dt)^2, times
+    assert kept_bytes / len(s) <= 100  # bytes a sample: the slopes of three joints, steps, (ds/dt)^2, times
     assert most / len(s) <= 400
 
 
 def test_slopes_do_not_depend_on_the_parts_of_a_long_way(monkeypatch: pytest.MonkeyPatch) -> None:
     s, q = way(1, 500, 3)
-    whole = knots_of_samples(s, q, (100, 250))
+    knots = knots_of_samples(s, q, (100, 250))
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 37)
-    np.testing.assert_array_equal(knots_of_samples(s, q, (100, 250)).d, whole.d)
+    np.testing.assert_array_equal(knots_of_samples(s, q, (100, 250)).d, knots.d)

@@ -37,19 +37,21 @@ def test_a_trapezoid_is_bounded_and_ends_at_rest(length: float, speed: float, ac
 
 def test_position_speed_and_acceleration_belong_together(three_dof: Arm) -> None:
     goals = np.deg2rad([[-30, 5, -5], [20, 60, -60], [20, 60, -60], [0, 90, -90]])
-    one = plan_joint_moves(three_dof, three_dof.home, goals, speed=0.7)
-    t, h = np.linspace(0, one.duration, 4001)[1:-1], 1e-5
-    laws = [s.law for s in one.stretches if isinstance(s, Straight)]
-    assert len(laws) == len(one.stretches)
-    edges = np.concatenate([law.times + b for law, b in zip(laws, one.begins, strict=False)])
+    trajectory = plan_joint_moves(three_dof, three_dof.home, goals, speed=0.7)
+    t, h = np.linspace(0, trajectory.duration, 4001)[1:-1], 1e-5
+    laws = [s.law for s in trajectory.stretches if isinstance(s, Straight)]
+    assert len(laws) == len(trajectory.stretches)
+    edges = np.concatenate([law.times + b for law, b in zip(laws, trajectory.begins, strict=False)])
     clear = np.abs(t[:, None] - edges).min(axis=1) > 2 * h
-    assert np.allclose(one.qd(t)[clear], (one.q(t + h) - one.q(t - h))[clear] / (2 * h), atol=1e-7)
-    assert np.allclose(one.qdd(t)[clear], (one.qd(t + h) - one.qd(t - h))[clear] / (2 * h), atol=1e-6)
-    assert np.all(np.abs(one.qd(t)) <= 0.7 * three_dof.max_speed * (1 + 1e-12))
-    assert np.all(np.abs(one.qdd(t)) <= three_dof.max_accel * (1 + 1e-12))
-    assert one.q(one.begins) == pytest.approx(np.vstack([three_dof.home, goals]))
-    assert one.q([[-1.0, one.duration + 1]]) == pytest.approx(np.array([[three_dof.home, goals[-1]]]))
-    assert one.q(0.5).shape == (3,)
+    assert np.allclose(trajectory.qd(t)[clear], (trajectory.q(t + h) - trajectory.q(t - h))[clear] / (2 * h), atol=1e-7)
+    assert np.allclose(
+        trajectory.qdd(t)[clear], (trajectory.qd(t + h) - trajectory.qd(t - h))[clear] / (2 * h), atol=1e-6
+    )
+    assert np.all(np.abs(trajectory.qd(t)) <= 0.7 * three_dof.max_speed * (1 + 1e-12))
+    assert np.all(np.abs(trajectory.qdd(t)) <= three_dof.max_accel * (1 + 1e-12))
+    assert trajectory.q(trajectory.begins) == pytest.approx(np.vstack([three_dof.home, goals]))
+    assert trajectory.q([[-1.0, trajectory.duration + 1]]) == pytest.approx(np.array([[three_dof.home, goals[-1]]]))
+    assert trajectory.q(0.5).shape == (3,)
 
 
 def test_an_arm_without_drives_has_trajectories() -> None:

@@ -18,22 +18,22 @@ def test_it_is_what_the_command_plans() -> None:
     arm = armkin.load("three_dof")
     plan = armkin.path(arm, armkin.drawing(arm, SVG, [320, -50, 200], feed=60.0, lift=4.0, scale=0.5))
     words = ("--at", "320,-50,200", "--feed", 60, "--lift", 4, "--scale", 0.5)
-    told = run("path", "three_dof", SVG, *words, "--json").json
-    assert plan.length == pytest.approx(told["length_mm"], abs=1e-9)
-    assert plan.duration == pytest.approx(told["duration_s"], abs=1e-9)
+    answer = run("path", "three_dof", SVG, *words, "--json").json
+    assert plan.length == pytest.approx(answer["length_mm"], abs=1e-9)
+    assert plan.duration == pytest.approx(answer["duration_s"], abs=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("name", "at", "error", "says"),
+    ("name", "place", "error", "says"),
     [
         ("path.yaml", [0, 0, 0], UsageError, "ends in .gcode, .gco, .nc, .ngc or .svg"),
         ("part.nc", [300, 0], UsageError, "at: where the drawing's zero lies is x y z"),
         ("nope.nc", [300, 0, 50], FileError, "cannot read the path file"),
     ],
 )
-def test_what_it_does_not_take_is_said(name: str, at: list[float], error: Any, says: str, tmp_path: Path) -> None:
+def test_what_it_does_not_take_is_said(name: str, place: list[float], error: Any, says: str, tmp_path: Path) -> None:
     with pytest.raises(error, match=says):
-        armkin.drawing(armkin.load("three_dof"), tmp_path / name, at)
+        armkin.drawing(armkin.load("three_dof"), tmp_path / name, place)
 
 
 def test_a_drawing_without_a_place_names_the_function() -> None:

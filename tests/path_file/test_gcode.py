@@ -23,21 +23,21 @@ AS_IT_IS = Placing((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0
 
 def moves(text: str, **options: Any) -> list[tuple[str, Any]]:
     """Kinds and values of the moves, polylines and targets rounded."""
-    out: list[tuple[str, Any]] = []
+    listed: list[tuple[str, Any]] = []
     for move in gcode.parse_gcode(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions(**options)).moves:
         value = getattr(move, move.kind)
         if move.kind in ("polyline", "point"):
             value = np.round(value, 6).tolist()
-        out.append((move.kind, value))
-    return out
+        listed.append((move.kind, value))
+    return listed
 
 
 def ends(text: str) -> list[list[float]]:
     """Where each line ends, the jump to the first point included."""
-    out: list[list[float]] = []
+    points: list[list[float]] = []
     for kind, value in moves(text):
-        out += [value] if kind == "point" else value if kind == "polyline" else []
-    return out
+        points += [value] if kind == "point" else value if kind == "polyline" else []
+    return points
 
 
 @pytest.mark.parametrize(
@@ -132,8 +132,8 @@ def test_a_checksum_counts_the_comments_before_it(comment: str) -> None:
 def test_events_and_speeds() -> None:
     text = "G0 X1\nM3 S1000\nG1 X2 F120\nX3 F240\nM4\nG4 P0.5\nG4 S2\nM5\nM0\nG0 X4\nG28"
     file = gcode.parse_gcode(text.encode(), "t.nc", AS_IT_IS, DrawingOptions(grip_by="M3"))
-    found = [(move.kind, move.tool_speed) for move in file.moves]
-    assert found == [
+    kinds_and_speeds = [(move.kind, move.tool_speed) for move in file.moves]
+    assert kinds_and_speeds == [
         ("point", None), ("grip", None), ("polyline", 2.0), ("polyline", 4.0), ("wait", None), ("wait", None),
         ("grip", None), ("wait", None), ("polyline", None), ("joint", None),
     ]  # fmt: skip
@@ -181,11 +181,11 @@ def test_a_program_has_as_many_points_as_any_path() -> None:
 
 
 def test_a_cycle_that_ends_leaves_the_motion_as_it_was() -> None:
-    one, other = (
+    with_cycle, without = (
         gcode.parse_gcode(f"G0 X1\nG1 X2 F60{word}\nX3".encode(), "t", AS_IT_IS, DrawingOptions())
         for word in ("\nG80", "")
     )
-    assert one.moves == other.moves
+    assert with_cycle.moves == without.moves
     assert gcode.parse_gcode(b"G80 G0 X1\nG1 X2 F60", "t", AS_IT_IS, DrawingOptions()).notes == (
         "G80 is ignored (line 1)",
     )
@@ -237,9 +237,9 @@ def test_what_is_refused_names_line_and_word(text: str, words: str) -> None:
 def test_the_plan_draws_what_the_program_says(tmp_path: Path) -> None:
     file = tmp_path / "d.gcode"
     file.write_text("G21 G90\nG0 X0 Y0 Z2\nG1 Z0 F600\nX40 F3000\nY20\nG3 X30 Y30 I-10 J0\nG1 X0\nY0\nM2\n")
-    found = run("path", "three_dof", file, "--at", "300,0,250", "--json").json
-    assert found["length_mm"] == pytest.approx(2 + 40 + 20 + 5 * math.pi + 30 + 30, abs=0.5)
-    assert found["deviation_mm"] <= 0.05
+    plan = run("path", "three_dof", file, "--at", "300,0,250", "--json").json
+    assert plan["length_mm"] == pytest.approx(2 + 40 + 20 + 5 * math.pi + 30 + 30, abs=0.5)
+    assert plan["deviation_mm"] <= 0.05
     refused = run("path", "three_dof", file)
     assert refused.code == 2
     assert "--at X,Y,Z" in refused.err

@@ -54,9 +54,9 @@ def test_what_is_damaged_is_read_or_refused_with_its_line(kind: str) -> None:
             refused.append((str(error), raw.count(b"\n") + 1))
     assert len(refused) >= 10
     for message, lines in refused:
-        found = re.match(r"t:(\d+): .", message)
-        assert found, message
-        assert 1 <= int(found[1]) <= lines
+        match = re.match(r"t:(\d+): .", message)
+        assert match, message
+        assert 1 <= int(match[1]) <= lines
 
 
 def test_a_cell_without_end_is_refused_with_its_line() -> None:
@@ -66,7 +66,7 @@ def test_a_cell_without_end_is_refused_with_its_line() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("x,y,w\n390,80,300\n", "t.csv:1: column w is unknown beside those of a target: x, y, z"),  # w was taken for z
         ("q1,x,y,z\n1,390,80,300\n", "t.csv:1: column q1 is unknown"),
@@ -74,7 +74,7 @@ def test_a_cell_without_end_is_refused_with_its_line() -> None:
         ("x,y,z\n390,80,300\n1e300,80,300\n", "t.csv:3: '1e300' is beyond 1e+07"),  # was an internal error
     ],
 )
-def test_a_table_s_columns_and_numbers_are_those_of_a_path(text: str, said: str) -> None:
-    with pytest.raises(PathFileError) as found:
+def test_a_table_s_columns_and_numbers_are_those_of_a_path(text: str, message: str) -> None:
+    with pytest.raises(PathFileError) as caught:
         csv_path.parse_csv(text.encode(), "t.csv")
-    assert str(found.value).startswith(said)
+    assert str(caught.value).startswith(message)

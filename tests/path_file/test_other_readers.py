@@ -30,9 +30,9 @@ def test_a_broken_line_is_refused_with_its_number(seed: int) -> None:
         program_read("\n".join(lines))
 
 
-@pytest.mark.parametrize("which", range(len(random_drawings.BROKEN_ELEMENTS)))
-def test_a_broken_element_is_refused_with_its_line(which: int) -> None:
-    text, place, words = spoilt(which, which)
-    said = refusal(text)
-    assert said.startswith(place)
-    assert words in said
+@pytest.mark.parametrize("number", range(len(random_drawings.BROKEN_ELEMENTS)))
+def test_a_broken_element_is_refused_with_its_line(number: int) -> None:
+    text, place, words = spoilt(number, number)
+    message = refusal(text)
+    assert message.startswith(place)
+    assert words in message

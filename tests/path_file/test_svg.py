@@ -19,12 +19,12 @@ BOX = 'viewBox="0 0 100 100" width="100mm" height="100mm"'
 def drawn(body: str, head: str = BOX, lift: float = 0.0) -> np.ndarray:
     """All points, (N, 3) [mm]."""
     text = f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="x" {head}>\n{body}</svg>'
-    out: list[list[float]] = []
+    points: list[list[float]] = []
     for move in svg.parse_svg(text.encode(), "t.svg", AS_IT_IS, DrawingOptions(lift=lift)).moves:
         if move.point is not None:
-            out.append(list(move.point))
-        out += move.polyline or []
-    return np.array(out)
+            points.append(list(move.point))
+        points += move.polyline or []
+    return np.array(points)
 
 
 @pytest.mark.parametrize(
@@ -42,9 +42,9 @@ def drawn(body: str, head: str = BOX, lift: float = 0.0) -> np.ndarray:
     ],
 )
 def test_shapes_with_corners(body: str, points: list[list[float]]) -> None:
-    found = drawn(body)[:, :2]
-    keep = np.append(True, np.abs(np.diff(found, axis=0)).max(axis=1) > 1e-9)
-    np.testing.assert_allclose(found[keep], points, atol=1e-9)
+    corners = drawn(body)[:, :2]
+    keep = np.append(True, np.abs(np.diff(corners, axis=0)).max(axis=1) > 1e-9)
+    np.testing.assert_allclose(corners[keep], points, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -159,6 +159,6 @@ def test_entities_and_bombs_of_uses_are_refused() -> None:
 def test_a_drawing_is_planned(tmp_path: Path) -> None:
     file = tmp_path / "d.svg"
     file.write_text('<svg viewBox="0 0 40 40" width="40mm" height="40mm"><circle cx="20" cy="20" r="15"/></svg>')
-    found = run("path", "three_dof", file, "--at", "320,0,250", "--feed", "60", "--json").json
-    assert found["length_mm"] == pytest.approx(2 * np.pi * 15 + 10, abs=0.5)
-    assert found["deviation_mm"] <= 0.05
+    plan = run("path", "three_dof", file, "--at", "320,0,250", "--feed", "60", "--json").json
+    assert plan["length_mm"] == pytest.approx(2 * np.pi * 15 + 10, abs=0.5)
+    assert plan["deviation_mm"] <= 0.05

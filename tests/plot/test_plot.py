@@ -94,9 +94,9 @@ def test_skeleton_of_a_slide() -> None:
 
 
 def test_single_pose(tmp_path: Path, drawn: list[Any]) -> None:
-    out = tmp_path / "arm.png"
-    plot_poses(THREE_DOF, POSE, str(out), title="three_dof")
-    width, height = size_of_png(out)
+    picture = tmp_path / "arm.png"
+    plot_poses(THREE_DOF, POSE, str(picture), title="three_dof")
+    width, height = size_of_png(picture)
     assert width >= 1200
     assert height >= 800
     [figure] = drawn
@@ -125,7 +125,7 @@ def test_all_branches_of_a_target(tmp_path: Path, drawn: list[Any]) -> None:
     names = [s.names[k] for k in s.branch]
     plot_poses(THREE_DOF, s.q, str(tmp_path / "branches.png"), names=names, target=[390, 80, 300])
     [figure] = drawn
-    legal = {name for name, ok in zip(names, s.within_limits, strict=True) if ok}
+    legal = {name for name, is_legal in zip(names, s.within_limits, strict=True) if is_legal}
     assert legal == {"left, elbow up", "left, elbow down"}
     labels = [name if name in legal else f"{name} (outside limits)" for name in names]
     assert [text for text in texts(figure) if "elbow" in text] == labels
@@ -228,9 +228,9 @@ def test_planar_arm_is_drawn_in_its_plane(tmp_path: Path, drawn: list[Any]) -> N
 
 @pytest.mark.parametrize("colour", ["manipulability", "step_error", "reach", "z"])
 def test_workspace_picture(tmp_path: Path, drawn: list[Any], surveyed: Workspace, colour: str) -> None:
-    out = tmp_path / "cloud.png"
-    plot_workspace(surveyed, str(out), colour=colour)
-    width, _ = size_of_png(out)
+    picture = tmp_path / "cloud.png"
+    plot_workspace(surveyed, str(picture), colour=colour)
+    width, _ = size_of_png(picture)
     assert width >= 1200
     [figure] = drawn
     cloud, above, side, bar = figure.axes
@@ -305,15 +305,15 @@ def test_messages(tmp_path: Path, q: Any, options: dict[str, Any], message: str)
 
 
 def test_messages_of_workspace_pictures(tmp_path: Path) -> None:
-    out = str(tmp_path / "cloud.png")
-    bare, kept = workspace(THREE_DOF, 50, volume=False), workspace(THREE_DOF, 50, volume=False, keep=50)
+    picture = str(tmp_path / "cloud.png")
+    bare, with_samples = workspace(THREE_DOF, 50, volume=False), workspace(THREE_DOF, 50, volume=False, keep=50)
     for survey, colour, message in [
-        (kept, "speed", "there is no colour 'speed'; there are manipulability, step_error, reach, z"),
-        (kept, "step_error", "the survey has no step_error; ask for it with measures=['step_error']"),
+        (with_samples, "speed", "there is no colour 'speed'; there are manipulability, step_error, reach, z"),
+        (with_samples, "step_error", "the survey has no step_error; ask for it with measures=['step_error']"),
         (bare, "z", "the survey kept no samples to draw; ask for them with keep=100_000"),
     ]:
         with pytest.raises(UsageError) as caught:
-            plot_workspace(survey, out, colour=colour)
+            plot_workspace(survey, picture, colour=colour)
         assert str(caught.value) == message
     assert list(tmp_path.iterdir()) == []
 

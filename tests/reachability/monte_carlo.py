@@ -52,12 +52,12 @@ def cells(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, co
     reach_map = armkin.reach(arm, grid=grid, azimuths=24, rolls=1, tool_down=_down(arm), measures=False)
     cell, rng = reach_map.grid, np.random.default_rng(8)
     weight = np.repeat(cell.rings[:, 0] + 0.5, cell.azimuths)
-    some = rng.choice(reach_map.cells, count, p=weight / weight.sum())
-    turn = np.asarray((some % cell.azimuths) * (TURN / cell.azimuths), dtype=float)
-    target = cell.targets(cell.rings[some // cell.azimuths], turn, np.zeros(count, int), np.zeros(count))
-    other = counted(cell, target, scene_of(scene, info), starts, seed=3)
-    differs = other.reached != (reach_map.share[some] == 1.0)
-    return Cells(float(other.known.mean()), int((differs & other.known).sum()), float(other.reached.mean()))
+    sampled = rng.choice(reach_map.cells, count, p=weight / weight.sum())
+    turn = np.asarray((sampled % cell.azimuths) * (TURN / cell.azimuths), dtype=float)
+    target = cell.targets(cell.rings[sampled // cell.azimuths], turn, np.zeros(count, int), np.zeros(count))
+    by_count = counted(cell, target, scene_of(scene, info), starts, seed=3)
+    differs = by_count.reached != (reach_map.share[sampled] == 1.0)
+    return Cells(float(by_count.known.mean()), int((differs & by_count.known).sum()), float(by_count.reached.mean()))
 
 
 def volume(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, count: int, starts: int) -> Volume:
@@ -87,12 +87,12 @@ def counted(grid: Grid, targets: Array, scene: dict[str, Any], starts: int, seed
     else:
         T[:, : targets.shape[1], 3] = targets[:, :3]
     goals = Goal(task.position, task.sums, task.offsets, task.orientation, T, np.zeros((len(T), len(task.sums))))
-    reached, known = np.zeros(len(T), bool), np.ones(len(T), bool)
+    reached, is_known = np.zeros(len(T), bool), np.ones(len(T), bool)
     for k, q in enumerate(branches(screws(arm.file), goals, starts, seed)):
         far = depth(arm, legal(arm, q), scene)
         reached[k] = bool((far > 0).any())
-        known[k] = bool((far > CLOSE).any()) or not (np.abs(far) <= CLOSE).any()
-    return Counted(reached, known)
+        is_known[k] = bool((far > CLOSE).any()) or not (np.abs(far) <= CLOSE).any()
+    return Counted(reached, is_known)
 
 
 def legal(arm: armkin.Arm, q: Array) -> Array:
@@ -109,36 +109,39 @@ def depth(arm: armkin.Arm, q: Array, scene: dict[str, Any]) -> Array:
     t = np.linspace(0.0, 1.0, POINTS)[:, None]
     clouds = []
     for i, body in enumerate(scene["bodies"]):
-        ends = [(np.array(one["from"]), np.array(one["to"])) for one in body["segments"]]
+        ends = [(np.array(segment["from"]), np.array(segment["to"])) for segment in body["segments"]]
         local = np.concatenate([a + t * (b - a) for a, b in ends] or [np.zeros((0, 3))])
         placed = np.einsum("bij,pj->bpi", frames[:, i, :3, :3], local) + frames[:, i, None, :3, 3]
         clouds.append(placed if i else np.broadcast_to(local, (len(q), *local.shape)))
-    out = np.full(len(q), np.inf)
+    least = np.full(len(q), np.inf)
     for i, (body, cloud) in enumerate(zip(scene["bodies"], clouds, strict=True)):
         if not i or not cloud.shape[1]:
             continue
-        out = np.minimum(out, cloud[:, :, 2].min(axis=1) - scene["floor"] - body["radius_mm"])
+        least = np.minimum(least, cloud[:, :, 2].min(axis=1) - scene["floor"] - body["radius_mm"])
         for low, high in scene["boxes"]:
             beyond = np.maximum(low - cloud, cloud - high)
             signed = np.where(
                 (beyond > 0).any(axis=2), np.linalg.norm(np.maximum(beyond, 0), axis=2), beyond.max(axis=2)
             )
-            out = np.minimum(out, signed.min(axis=1) - body["radius_mm"])
-        for j, other in enumerate(scene["bodies"][: i - 1]):  # neighbours are never held against each other
-            if clouds[j].shape[1] and {body["name"], other["name"]} not in scene["left_out"]:
+            least = np.minimum(least, signed.min(axis=1) - body["radius_mm"])
+        for j, neighbour in enumerate(scene["bodies"][: i - 1]):  # neighbours are never held against each other
+            if clouds[j].shape[1] and {body["name"], neighbour["name"]} not in scene["left_out"]:
                 away = np.linalg.norm(cloud[:, :, None] - clouds[j][:, None], axis=3).min(axis=(1, 2))
-                out = np.minimum(out, away - body["radius_mm"] - other["radius_mm"])
-    return np.asarray(out - scene["clearance"])
+                least = np.minimum(least, away - body["radius_mm"] - neighbour["radius_mm"])
+    return np.asarray(least - scene["clearance"])
 
 
 def scene_of(path: Path, info: dict[str, Any]) -> dict[str, Any]:
     """What `depth` needs: from the scene's file, and the bodies of `armkin info --json`."""
-    given = yaml.safe_load(path.read_text())
+    document = yaml.safe_load(path.read_text())
     boxes = [
-        tuple(np.array(one["box"][end], float) for end in ("min", "max")) for one in given["keep_out"] if "box" in one
+        tuple(np.array(obstacle["box"][end], float) for end in ("min", "max"))
+        for obstacle in document["keep_out"]
+        if "box" in obstacle
     ]
-    floor = next(one["floor"] for one in given["keep_out"] if "floor" in one)
+    floor = next(obstacle["floor"] for obstacle in document["keep_out"] if "floor" in obstacle)
     left_out = [set(pair) for pair in info["pairs_left_out"]]
     return {
-        "boxes": boxes, "floor": floor, "clearance": given["clearance"], "left_out": left_out, "bodies": info["bodies"],
+        "boxes": boxes, "floor": floor, "clearance": document["clearance"], "left_out": left_out,
+        "bodies": info["bodies"],
     }  # fmt: skip

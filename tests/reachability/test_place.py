@@ -29,14 +29,14 @@ def test_places_are_what_each_says_when_asked_directly(name: str) -> None:
     q = rng.uniform(0.4 * low, 0.4 * high, (4, arm.n))
     targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
     yaw = np.radians(60.0)
-    [found] = armkin.place(arm, targets, step=arm.reach / 3, yaw=float(yaw))
-    question = place_targets.Question(arm, task_for(arm), targets, len(found.yaw), float(yaw), 0.0)
-    assert found.of == 4
-    assert found.reached.max() > 0
+    [places] = armkin.place(arm, targets, step=arm.reach / 3, yaw=float(yaw))
+    question = place_targets.Question(arm, task_for(arm), targets, len(places.yaw), float(yaw), 0.0)
+    assert places.of == 4
+    assert places.reached.max() > 0
     for _ in range(60):
-        i, j, k = (int(rng.integers(size)) for size in found.reached.shape)
-        at = np.array([found.x[i], found.y[j]])
-        assert place_targets.legal_from(question, at, float(found.yaw[k])).sum() == found.reached[i, j, k]
+        i, j, k = (int(rng.integers(size)) for size in places.reached.shape)
+        place = np.array([places.x[i], places.y[j]])
+        assert place_targets.legal_from(question, place, float(places.yaw[k])).sum() == places.reached[i, j, k]
 
 
 @pytest.mark.parametrize("name", ["so100", "so101", "three_dof", "ra02", "labvolt_5150", "planar_2dof"])
@@ -52,49 +52,51 @@ def test_joint_1_beside_the_base_s_axis_is_read_off_by_radius(name: str, monkeyp
     targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
     ask: dict[str, Any] = {"step": arm.reach / 7, "yaw": 0.11, "z": -0.03 * arm.reach}
     read: list[int] = []
-    off = place_upright.by_radius
+    by_radius = place_upright.by_radius
 
-    def counted(*given: Any) -> Any:
-        found = off(*given)
-        assert found is not None
-        read.append(int(found[0].sum()) - int(found[1].sum()))
-        return found
+    def counted(*arguments: Any) -> Any:
+        places = by_radius(*arguments)
+        assert places is not None
+        read.append(int(places[0].sum()) - int(places[1].sum()))
+        return places
 
     monkeypatch.setattr(place_targets, "by_radius", counted)
-    [found] = armkin.place(arm, targets, **ask)
-    assert sum(read) > 0.5 * found.reached.sum() > 0
+    [places] = armkin.place(arm, targets, **ask)
+    assert sum(read) > 0.5 * places.reached.sum() > 0
     monkeypatch.setattr(place_targets, "RADII", 10**9)  # not worth it: each place is asked
-    [asked] = armkin.place(arm, targets, **ask)
-    assert np.array_equal(found.reached, asked.reached)
+    [one_by_one] = armkin.place(arm, targets, **ask)
+    assert np.array_equal(places.reached, one_by_one.reached)
 
 
 def test_machine_code_finds_the_same_places(tmp_path: Path) -> None:
-    arm, given = armkin.load("three_dof"), tmp_path / "targets.csv"
-    given.write_text("x,y,z\n600,0,200\n600,300,200\n500,100,900\n")
-    table = np.loadtxt(given, delimiter=",", skiprows=1)
+    arm, path = armkin.load("three_dof"), tmp_path / "targets.csv"
+    path.write_text("x,y,z\n600,0,200\n600,300,200\n500,100,900\n")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
     for yaw in (np.pi / 6, 1.0):  # by arcs, and yaw by yaw
-        [found] = armkin.place(arm, table, step=100.0, yaw=yaw)
+        [places] = armkin.place(arm, table, step=100.0, yaw=yaw)
         [fast] = armkin.place(arm, table, step=100.0, yaw=yaw, solve=compiled_ik.ik)
-        assert (fast.reached == found.reached).all()
-        assert fast.best == found.best
-    assert run("place", "three_dof", given, "--compiled") == run("place", "three_dof", given)
+        assert (fast.reached == places.reached).all()
+        assert fast.best == places.best
+    assert run("place", "three_dof", path, "--compiled") == run("place", "three_dof", path)
 
 
 def test_a_margin_is_the_distance_to_the_nearest_place_that_does_not_reach_all() -> None:
     targets = [[600, 0, 200], [600, 300, 200]]
     arm = armkin.load("three_dof")
-    [whole] = armkin.place(arm, targets, step=100.0, yaw=np.pi / 4)
-    good = whole.reached == whole.of
+    [places] = armkin.place(arm, targets, step=100.0, yaw=np.pi / 4)
+    good = places.reached == places.of
     for i, j, k in np.argwhere(good)[::3]:
         x, y = np.argwhere(~good[:, :, k]).T
-        assert whole.margin[i, j, k] == pytest.approx(100.0 * np.hypot(x - i, y - j).min())
-    assert not whole.margin[~good].any()
-    best = whole.margin[whole.best]
-    assert best == whole.margin[good].max()
+        assert places.margin[i, j, k] == pytest.approx(100.0 * np.hypot(x - i, y - j).min())
+    assert not places.margin[~good].any()
+    best = places.margin[places.best]
+    assert best == places.margin[good].max()
     # a small area inside knows what is around it
-    i, j, _ = whole.best
-    at = [float(whole.x[i]), float(whole.y[j])]
-    [small] = armkin.place(arm, targets, area=[at[0], at[0], at[1], at[1]], step=100.0, yaw=np.pi / 4)
+    i, j, _ = places.best
+    best_place = [float(places.x[i]), float(places.y[j])]
+    [small] = armkin.place(
+        arm, targets, area=[best_place[0], best_place[0], best_place[1], best_place[1]], step=100.0, yaw=np.pi / 4
+    )
     assert small.margin.max() == best
 
 
@@ -112,9 +114,9 @@ def test_the_command_tells_the_best_and_exits_3_where_none_reaches_all(tmp_path:
     assert none.code == 3
     assert none.json["robots"][0]["best"]["reached"] == 1
     assert "no place reaches all 2 targets; three_dof reaches 1 at best" in none.err
-    other = run("place", "three_dof", path, *more, "--out", tmp_path / "places.txt")
-    assert other.code == 2
-    assert "places are written as .npz, .parquet, .jsonl or .csv" in other.err
+    wrong_ending = run("place", "three_dof", path, *more, "--out", tmp_path / "places.txt")
+    assert wrong_ending.code == 2
+    assert "places are written as .npz, .parquet, .jsonl or .csv" in wrong_ending.err
     assert not (tmp_path / "places.txt").exists()
 
 
@@ -123,45 +125,45 @@ def test_a_scene_stands_with_the_targets(tmp_path: Path) -> None:
     scene = ROOT / "examples/scenes/three_dof.yaml"
     targets, rng = [[500.0, 0.0, 200.0], [420.0, 160.0, 90.0]], np.random.default_rng(5)
     settings = {"area": (-200.0, 800.0, -600.0, 600.0), "step": 200.0, "yaw": float(np.radians(90.0))}
-    [found] = armkin.place(armkin.load("three_dof"), targets, scene=scene, **settings)  # type: ignore[arg-type]
+    [places] = armkin.place(armkin.load("three_dof"), targets, scene=scene, **settings)  # type: ignore[arg-type]
     [alone] = armkin.place(armkin.load("three_dof"), targets, **settings)  # type: ignore[arg-type]
     [loaded] = armkin.place(armkin.load("three_dof", scene=scene), targets, **settings)  # type: ignore[arg-type]
-    assert np.array_equal(found.reached, loaded.reached)
-    assert found.reached.sum() < alone.reached.sum()
+    assert np.array_equal(places.reached, loaded.reached)
+    assert places.reached.sum() < alone.reached.sum()
     text = (ROOT / "robots/three_dof.yaml").read_text()
     assert "\nbase:" not in text
-    asked = 0
+    count = 0
     for i, j, k in rng.permutation(np.argwhere(alone.reached > 0))[:12]:
-        x, y, yaw = float(found.x[i]), float(found.y[j]), float(np.degrees(found.yaw[k]))
+        x, y, yaw = float(places.x[i]), float(places.y[j]), float(np.degrees(places.yaw[k]))
         if 245 <= x <= 555 and abs(y) <= 305:
-            assert found.reached[i, j, k] == 0  # its base would stand in the table
+            assert places.reached[i, j, k] == 0  # its base would stand in the table
             continue
         moved = tmp_path / "moved.yaml"
         moved.write_text(f"{text}\nbase: {{xyz: [{x}, {y}, 0], rpy: [0, 0, {yaw}]}}\n")
         s = armkin.ik(armkin.load(moved, scene=scene), targets)
-        assert (s.within_limits & s.clear).any(axis=1).sum() == found.reached[i, j, k]
-        asked += 1
-    assert asked > 4
+        assert (s.within_limits & s.clear).any(axis=1).sum() == places.reached[i, j, k]
+        count += 1
+    assert count > 4
 
 
 @pytest.mark.parametrize("end", ["npz", "csv"])
 def test_places_are_a_file_that_goes_on_after_a_kill(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str) -> None:
-    path, whole, out = tmp_path / "targets.csv", tmp_path / f"whole.{end}", tmp_path / f"out.{end}"
+    path, undisturbed, resumed = tmp_path / "targets.csv", tmp_path / f"whole.{end}", tmp_path / f"out.{end}"
     path.write_text("x,y,z\n600,0,200\n600,300,200\n")
     monkeypatch.setattr(places, "SOLVES", 40)
     words = ("place", "three_dof", "roarm_m2", path, "--step", 200, "--yaw", 90)
-    completed = run(*words, "--out", whole)
+    completed = run(*words, "--out", undisturbed)
     with monkeypatch.context() as patch:
         patch.setattr(places, "count_chunk", interrupted(places.count_chunk, 5))
-        assert run(*words, "--out", out).code == 130
-    other = run("place", "three_dof", path, "--step", 100, "--out", out)
-    assert other.code == 2
-    assert "belongs to another job" in other.err
-    assert run(*words, "--out", out) == completed
-    assert out.read_bytes() == whole.read_bytes()
-    assert {file.name for file in tmp_path.iterdir()} == {path.name, whole.name, out.name}
+        assert run(*words, "--out", resumed).code == 130
+    refused = run("place", "three_dof", path, "--step", 100, "--out", resumed)
+    assert refused.code == 2
+    assert "belongs to another job" in refused.err
+    assert run(*words, "--out", resumed) == completed
+    assert resumed.read_bytes() == undisturbed.read_bytes()
+    assert {file.name for file in tmp_path.iterdir()} == {path.name, undisturbed.name, resumed.name}
     if end == "csv":
-        rows = whole.read_text().splitlines()
+        rows = undisturbed.read_text().splitlines()
         assert rows[0] == "robot,x_mm,y_mm,z_mm,yaw_deg,reached,of,margin_mm"
         assert {row.split(",")[0] for row in rows[1:]} == {"three_dof", "roarm_m2"}
 
@@ -182,19 +184,19 @@ def test_a_path_is_carried_from_the_places_that_plan_it(name: str, tmp_path: Pat
         path.write_text(PATH)
     arm = armkin.load(name)
     arm = replace(arm, max_accel=np.where(np.isfinite(arm.max_accel), arm.max_accel, 5.0))
-    [found] = armkin.place(arm, path, step=arm.reach / 3, yaw=np.pi / 2)
-    assert found.planned
-    assert {one.refused for one in found.planned} == {""}
-    assert found.reached[found.best] == found.of
+    [places] = armkin.place(arm, path, step=arm.reach / 3, yaw=np.pi / 2)
+    assert places.planned
+    assert {candidate.refused for candidate in places.planned} == {""}
+    assert places.reached[places.best] == places.of
     rng, file = np.random.default_rng(4), place_path.path_of(path)
     assert file is not None
-    whole = found.reached == found.of
-    for some in (np.argwhere(whole), np.argwhere(~whole & (found.reached > 0.6 * found.of))):
-        assert len(some)
-        for i, j, k in rng.permutation(some)[:3].tolist():
-            at = (float(found.x[i]), float(found.y[j]), 0.0)
-            asked = place_path.plan_from_place(arm, Obstacles(), (i, j, k), at, float(found.yaw[k]), file)
-            assert (asked.plan is not None) == whole[i, j, k], asked.refused
+    carries = places.reached == places.of
+    for cells in (np.argwhere(carries), np.argwhere(~carries & (places.reached > 0.6 * places.of))):
+        assert len(cells)
+        for i, j, k in rng.permutation(cells)[:3].tolist():
+            place = (float(places.x[i]), float(places.y[j]), 0.0)
+            answer = place_path.plan_from_place(arm, Obstacles(), (i, j, k), place, float(places.yaw[k]), file)
+            assert (answer.plan is not None) == carries[i, j, k], answer.refused
 
 
 LINE = """
@@ -204,38 +206,38 @@ moves:
 """
 
 
-@pytest.mark.parametrize(("said", "step"), [("", 600.0), ("\n  - joint: {J7: 100}", 400.0)])
-def test_a_path_of_seven_joints_is_carried_where_path_plans_it(said: str, step: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("first_move", "step"), [("", 600.0), ("\n  - joint: {J7: 100}", 400.0)])
+def test_a_path_of_seven_joints_is_carried_where_path_plans_it(first_move: str, step: float, tmp_path: Path) -> None:
     """Some places of a coarse grid against `armkin.path` of the arm that stands there."""
     path = tmp_path / "path.yaml"
-    path.write_text(LINE.replace("moves:", f"moves:{said}"))
+    path.write_text(LINE.replace("moves:", f"moves:{first_move}"))
     arm = replace(armkin.load("panda"), max_accel=np.ones(7))
-    [found] = armkin.place(arm, path, step=step, yaw=np.pi / 2)
-    whole = found.reached == found.of
-    assert found.reached[found.best] == found.of
-    assert {one.refused for one in found.planned} == {""}
-    assert found.held == found.planned[0].plan.held  # type: ignore[union-attr]
-    assert found.postures.shape == (found.of, 7)
-    assert np.unique(found.postures[:, 6]) == pytest.approx(list(found.held.values()))
-    if said:
-        assert found.held["J7"] == pytest.approx(np.radians(100.0))
+    [places] = armkin.place(arm, path, step=step, yaw=np.pi / 2)
+    carries = places.reached == places.of
+    assert places.reached[places.best] == places.of
+    assert {candidate.refused for candidate in places.planned} == {""}
+    assert places.held == places.planned[0].plan.held  # type: ignore[union-attr]
+    assert places.postures.shape == (places.of, 7)
+    assert np.unique(places.postures[:, 6]) == pytest.approx(list(places.held.values()))
+    if first_move:
+        assert places.held["J7"] == pytest.approx(np.radians(100.0))
     rng = np.random.default_rng(2)
-    for some in (np.argwhere(whole), np.argwhere(~whole & (found.reached > 0))):
-        assert len(some)
-        for i, j, k in rng.permutation(some)[:4].tolist():
-            stands = arm_at_place(arm, Obstacles(), (float(found.x[i]), float(found.y[j]), 0.0), float(found.yaw[k]))
+    for cells in (np.argwhere(carries), np.argwhere(~carries & (places.reached > 0))):
+        assert len(cells)
+        for i, j, k in rng.permutation(cells)[:4].tolist():
+            stands = arm_at_place(arm, Obstacles(), (float(places.x[i]), float(places.y[j]), 0.0), float(places.yaw[k]))
             try:
                 armkin.path(stands, path)
                 planned = True
             except NoSolutionError:
                 planned = False
-            assert planned == whole[i, j, k]
+            assert planned == carries[i, j, k]
 
 
 def test_the_command_tells_where_the_redundant_joint_is_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     all_values = path_redundant.values_to_hold
     monkeypatch.setattr(
-        path_redundant, "values_to_hold", lambda *asked: all_values(*asked)[:6]
+        path_redundant, "values_to_hold", lambda *arguments: all_values(*arguments)[:6]
     )  # each is an arm to prepare
     path, scene = tmp_path / "path.yaml", tmp_path / "scene.yaml"
     path.write_text(LINE)
@@ -257,14 +259,14 @@ def test_a_path_in_a_scene_is_asked_yaw_by_yaw_and_planned_in_it(
     scene.write_text("keep_out:\n  - box: {min: [200, -600, 0], max: [230, 600, 900]}\n    name: wall\n")
     path.write_text("moves:\n  - point: [420, -60, 170]\n  - line: [420, 60, 170]\n")
     words = ("place", "three_dof", path, "--step", 150, "--yaw", 180, "--area", "-100,650,-150,150", "--json")
-    alone, found = run(*words).json["robots"][0], run(*words, "--scene", scene).json["robots"][0]
-    assert 0 < found["reach_all"] < alone["reach_all"]
-    assert found["best"]["reached"] == found["best"]["of"]
-    assert [one["refused"] for one in found["planned"]] == [None]
+    alone, in_scene = run(*words).json["robots"][0], run(*words, "--scene", scene).json["robots"][0]
+    assert 0 < in_scene["reach_all"] < alone["reach_all"]
+    assert in_scene["best"]["reached"] == in_scene["best"]["of"]
+    assert [candidate["refused"] for candidate in in_scene["planned"]] == [None]
 
 
 def test_paths_that_say_nothing_of_a_place_are_told(tmp_path: Path) -> None:
-    for moves, said in (
+    for moves, message in (
         ("- joint: home", "the path has no target of the tool"),
         ("- line: [390, 80, 300]", "put a point before it"),
         ("- point: [390, 80, 300]\n  - offset: {xyz: [0, 0, 9], frame: tool}", "offsets in the frame of targets"),
@@ -273,7 +275,7 @@ def test_paths_that_say_nothing_of_a_place_are_told(tmp_path: Path) -> None:
         path.write_text(f"moves:\n  {moves}\n")
         completed = run("place", "three_dof", path)
         assert completed.code == 2
-        assert said in completed.err
+        assert message in completed.err
     path.write_text(PATH)
     completed = run("place", "ur5e", path, "--step", 500, "--yaw", 90)
     assert completed.code == 0

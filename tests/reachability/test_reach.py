@@ -35,12 +35,12 @@ ARMS = (
 def asked(grid: Grid, rings: np.ndarray) -> np.ndarray:
     """share, share_any, branches, single of every cell, by asking each pose."""
     N, L = grid.directions_count, grid.rolls_count
-    each, rows = np.arange(N * L), []
+    orientation, rows = np.arange(N * L), []
     for ring in rings:
         for k in range(grid.azimuths):
             turn = np.full(N * L, k * TURN / grid.azimuths)
-            roll = (each % L) * TURN / L
-            s = armkin.ik(grid.arm, grid.targets(np.repeat(ring[None], N * L, 0), turn, each // L, roll))
+            roll = (orientation % L) * TURN / L
+            s = armkin.ik(grid.arm, grid.targets(np.repeat(ring[None], N * L, 0), turn, orientation // L, roll))
             legal = s.within_limits.sum(axis=1)
             mean = legal.sum() / (legal > 0).sum() if legal.any() else np.nan
             rows.append([(legal > 0).mean(), s.valid.any(axis=1).mean(), mean, (legal == 1).mean()])
@@ -50,13 +50,13 @@ def asked(grid: Grid, rings: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", ARMS)
 def test_arcs_are_what_each_pose_says(name: str) -> None:
     arm = armkin.load(name)
-    few = name in ("jaco_j2n6s300",)
-    grid = Grid(arm, arm.reach / 9, 3 if few else 7, 4 if few else 9, 2 if few else 5, False)
+    is_slow = name in ("jaco_j2n6s300",)
+    grid = Grid(arm, arm.reach / 9, 3 if is_slow else 7, 4 if is_slow else 9, 2 if is_slow else 5, False)
     question = Question(grid)
-    rings = grid.rings[np.random.default_rng(4).permutation(len(grid.rings))[: 2 if few else 20]]
-    found = cell_columns(question, rings)
+    rings = grid.rings[np.random.default_rng(4).permutation(len(grid.rings))[: 2 if is_slow else 20]]
+    values_of = cell_columns(question, rings)
     assert question.by_arcs
-    columns = np.stack([found[name] for name in ("share", "share_any", "branches", "single")], axis=1)
+    columns = np.stack([values_of[name] for name in ("share", "share_any", "branches", "single")], axis=1)
     assert np.allclose(columns, asked(grid, rings), rtol=0, atol=1e-12, equal_nan=True)
     assert columns[:, 1].max() > 0
 
@@ -75,10 +75,12 @@ def test_pose_by_pose_says_the_same_as_arcs(name: str) -> None:
 
     arm = armkin.load(name)
     nearly = replace(arm, ratio=np.where(np.arange(arm.n) == 1, 1 + 1e-15, 1.0))
-    one, other = (armkin.reach(a, grid=arm.reach / 4, azimuths=5, directions=7, rolls=4) for a in (arm, nearly))
-    assert (one.method, other.method) == ("arcs", "poses")
-    for column in one.columns:
-        assert np.allclose(one.columns[column], other.columns[column], rtol=1e-6, atol=1e-9, equal_nan=True), column
+    by_arcs, by_poses = (armkin.reach(a, grid=arm.reach / 4, azimuths=5, directions=7, rolls=4) for a in (arm, nearly))
+    assert (by_arcs.method, by_poses.method) == ("arcs", "poses")
+    for column in by_arcs.columns:
+        assert np.allclose(by_arcs.columns[column], by_poses.columns[column], rtol=1e-6, atol=1e-9, equal_nan=True), (
+            column
+        )
 
 
 def test_cells_stand_where_the_contract_puts_them() -> None:
@@ -112,12 +114,12 @@ def test_keep_outs_take_orientations_away_and_are_asked_pose_by_pose() -> None:
 def test_the_share_under_keep_outs_is_what_another_count_finds() -> None:
     """Cells at random, asked again by multi-start Newton on screws and points along the bodies; then the volume."""
     scene = ROOT / "examples/scenes/three_dof.yaml"
-    said = run("info", "three_dof", "--scene", scene, "--json").json
-    cells = monte_carlo.cells(armkin.load("three_dof", scene=scene), scene, said, grid=30.0, count=120, starts=20)
+    info = run("info", "three_dof", "--scene", scene, "--json").json
+    cells = monte_carlo.cells(armkin.load("three_dof", scene=scene), scene, info, grid=30.0, count=120, starts=20)
     assert cells.known > 0.97
     assert cells.different == 0
     assert 0.05 < cells.share < 0.6
-    volume = monte_carlo.volume(armkin.load("three_dof", scene=scene), scene, said, grid=30.0, count=250, starts=20)
+    volume = monte_carlo.volume(armkin.load("three_dof", scene=scene), scene, info, grid=30.0, count=250, starts=20)
     assert abs(volume.map - volume.counted) < 4 * volume.sigma
 
 
@@ -126,12 +128,12 @@ def test_an_arm_of_seven_joints_is_asked_pose_by_pose() -> None:
     question = Question(grid)
     assert not question.by_arcs
     ring = np.array([[1, 1]])
-    found = {name: float(values[0]) for name, values in cell_columns(question, ring).items()}
+    value_of = {name: float(values[0]) for name, values in cell_columns(question, ring).items()}
     T = grid.targets(np.repeat(ring, 2, 0), np.zeros(2), np.arange(2), np.zeros(2))
     legal = armkin.ik(grid.arm, T).within_limits.sum(axis=1)
-    assert found["share"] == (legal > 0).mean() > 0
-    assert found["branches"] == legal.sum() / (legal > 0).sum()
-    assert found["manipulability"] > 0
+    assert value_of["share"] == (legal > 0).mean() > 0
+    assert value_of["branches"] == legal.sum() / (legal > 0).sum()
+    assert value_of["manipulability"] > 0
 
 
 def test_a_voxel_takes_the_cell_that_its_centre_lies_in() -> None:
@@ -170,8 +172,8 @@ def test_engines_and_kills_change_no_byte(tmp_path: Path, monkeypatch: pytest.Mo
     def digest(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
 
-    one, two, three = (tmp_path / f"{name}.{end}" for name in "abc")
-    assert reach("--out", one).code == 0
+    first, two, three = (tmp_path / f"{name}.{end}" for name in "abc")
+    assert reach("--out", first).code == 0
     assert reach("--out", two, "--workers", 2).code == 0
     with monkeypatch.context() as patch:
         patch.setattr(maps, "answer_chunk", interrupted(maps.answer_chunk, 4))
@@ -181,7 +183,7 @@ def test_engines_and_kills_change_no_byte(tmp_path: Path, monkeypatch: pytest.Mo
     assert completed.code == 2
     assert "belongs to another job: " in completed.err
     assert reach("--out", three).code == 0
-    assert digest(one) == digest(two) == digest(three)
+    assert digest(first) == digest(two) == digest(three)
     assert {path.name for path in tmp_path.iterdir()} == {f"{name}.{end}" for name in "abc"}
 
 
@@ -191,7 +193,7 @@ def test_a_picture_of_the_section_and_a_slice(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("settings", "said"),
+    ("settings", "message"),
     [
         ({"grid": 0.0}, "a cell needs a size above 0"),
         ({"grid": float("nan")}, "a cell needs a size above 0"),
@@ -203,8 +205,8 @@ def test_a_picture_of_the_section_and_a_slice(tmp_path: Path) -> None:
         ({"out": "map.ply"}, "a map is written as"),
     ],
 )
-def test_bad_input_is_told(settings: dict[str, float], said: str) -> None:
-    with pytest.raises(UsageError, match=said):
+def test_bad_input_is_told(settings: dict[str, float], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
         armkin.reach(armkin.load("puma560"), **settings)  # type: ignore[arg-type]
 
 

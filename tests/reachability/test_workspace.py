@@ -95,12 +95,12 @@ KNOWN = {
 
 @pytest.mark.parametrize("name", KNOWN)
 def test_volume_is_the_known_one_within_its_own_error(name: str) -> None:
-    arm, true, tolerance = KNOWN[name]
+    arm, volume, tolerance = KNOWN[name]
     size = extent(arm)
-    assert abs(size.value - true) <= size.error
-    assert size.value == pytest.approx(true, rel=tolerance)
-    assert size.error <= 2.5 * tolerance * true
-    assert size.dimensions == (2 if true < 1e6 else 3)
+    assert abs(size.value - volume) <= size.error
+    assert size.value == pytest.approx(volume, rel=tolerance)
+    assert size.error <= 2.5 * tolerance * volume
+    assert size.dimensions == (2 if volume < 1e6 else 3)
 
 
 def test_volume_of_an_arm_with_a_wrist() -> None:
@@ -119,8 +119,8 @@ def test_volume_of_an_arm_with_a_wrist() -> None:
     far = np.linalg.norm(tip, axis=1).max()
     assert 560 < far < 580  # chance alone does not get to the end
     size = extent(arm)
-    true = 4 / 3 * math.pi * (580**3 - 20**3)
-    assert abs(size.value - true) <= size.error <= 0.01 * true
+    volume = 4 / 3 * math.pi * (580**3 - 20**3)
+    assert abs(size.value - volume) <= size.error <= 0.01 * volume
 
 
 @pytest.mark.parametrize(
@@ -209,8 +209,8 @@ def test_step_error_is_the_worst_of_all_signs() -> None:
     J = jacobian(THREE_DOF, q)[:, :3] @ joints_per_pulse(THREE_DOF)
     worst = np.max([np.linalg.norm(J @ (0.5 * np.array(s)), axis=1) for s in product((-1, 1), repeat=3)], axis=0)
     assert measure_function(THREE_DOF, "step_error")(q) == pytest.approx(worst, rel=1e-12)
-    many = np.random.default_rng(6).uniform(THREE_DOF.lower, THREE_DOF.upper, (20_000, 3))
-    ratio = rounding(THREE_DOF, many).error / measure_function(THREE_DOF, "step_error")(many)
+    postures = np.random.default_rng(6).uniform(THREE_DOF.lower, THREE_DOF.upper, (20_000, 3))
+    ratio = rounding(THREE_DOF, postures).error / measure_function(THREE_DOF, "step_error")(postures)
     assert 0.9 < ratio.max() < 1.001  # a bound, and a tight one
 
 
@@ -303,9 +303,9 @@ def test_a_full_disk_leaves_no_file(tmp_path: Path, end: str) -> None:
         "except armkin.FileError as error:\n"
         "    print(error)\n"
     )
-    robot, out = str(ROOT / "robots/three_dof.yaml"), str(tmp_path / f"cloud.{end}")
-    run = subprocess.run([sys.executable, "-c", code, robot, out], capture_output=True, text=True, check=True)
-    assert run.stdout == f"{out}: cannot write: File too large\n"
+    robot, target = str(ROOT / "robots/three_dof.yaml"), str(tmp_path / f"cloud.{end}")
+    run = subprocess.run([sys.executable, "-c", code, robot, target], capture_output=True, text=True, check=True)
+    assert run.stdout == f"{target}: cannot write: File too large\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -360,16 +360,16 @@ def test_an_endless_slide_is_an_error() -> None:
 
 
 def test_progress_counts_to_the_end() -> None:
-    seen: list[int] = []
-    workspace(THREE_DOF, CHUNK + 5, progress=seen.append, volume=False)
-    assert seen == [CHUNK, CHUNK + 5]
+    counts: list[int] = []
+    workspace(THREE_DOF, CHUNK + 5, progress=counts.append, volume=False)
+    assert counts == [CHUNK, CHUNK + 5]
 
 
 def test_few_samples_do_not_wait_for_the_volume() -> None:
     """The whole effort for the volume took half a second, whatever was asked for."""
-    few, many = armkin.workspace(THREE_DOF, 1), armkin.workspace(THREE_DOF, 100_000)
-    assert few.extent is not None
-    assert many.extent is not None
-    assert few.seconds < 0.5 * many.seconds
-    assert abs(few.extent.value - many.extent.value) < few.extent.error + many.extent.error
-    assert many.extent.error < few.extent.error < 0.1 * few.extent.value
+    one_sample, samples = armkin.workspace(THREE_DOF, 1), armkin.workspace(THREE_DOF, 100_000)
+    assert one_sample.extent is not None
+    assert samples.extent is not None
+    assert one_sample.seconds < 0.5 * samples.seconds
+    assert abs(one_sample.extent.value - samples.extent.value) < one_sample.extent.error + samples.extent.error
+    assert samples.extent.error < one_sample.extent.error < 0.1 * one_sample.extent.value

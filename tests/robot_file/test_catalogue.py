@@ -45,7 +45,7 @@ def test_a_path_wins_over_a_name_and_a_name_over_a_folder(tmp_path: Path, monkey
 
 
 @pytest.mark.parametrize(
-    ("robot", "said"),
+    ("robot", "message"),
     [
         ("three-dof", "there is no robot three-dof; did you mean three_dof?"),
         ("Three_DOF.yml", "there is no robot Three_DOF.yml; did you mean three_dof?"),
@@ -60,14 +60,14 @@ def test_a_path_wins_over_a_name_and_a_name_over_a_folder(tmp_path: Path, monkey
     ],
 )
 def test_what_is_neither_is_said_with_what_is_near(
-    robot: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    robot: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "arms").mkdir()
     (tmp_path / "arms" / "mine.yaml").write_text("")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(FileError) as caught:
         armkin.load(robot)
-    assert str(caught.value) == said
+    assert str(caught.value) == message
     assert caught.value.fields == {"file": robot}
 
 

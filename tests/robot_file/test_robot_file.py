@@ -97,9 +97,9 @@ def test_an_error_carries_every_problem() -> None:
 def test_shipped_robots_are_those_of_the_documents() -> None:
     names = {path.stem for path in (ROOT / "robots").glob("*.yaml")}
     papers = {"three_dof", "ra02", "ra02_screws", "planar_2dof", "planar_3dof", "labvolt_5150"}
-    others = {"pan_tilt", "yaw_two_link", "puma560", "stanford", "ur3e", "ur5e", "irb120", "irb2400"}
+    named_elsewhere = {"pan_tilt", "yaw_two_link", "puma560", "stanford", "ur3e", "ur5e", "irb120", "irb2400"}
     more = {"jaco_j2n6s300", "cobra600", "moveo", "ar4", "thor", "parol6", "panda"}
-    assert papers | others | more <= names
+    assert papers | named_elsewhere | more <= names
 
 
 def test_schema_file_is_current() -> None:
@@ -273,8 +273,8 @@ SNIPPETS = [
 )
 def test_mutated_files_load_or_are_refused(text: str, edits: list[tuple[float, int, str]]) -> None:
     for place, length, snippet in edits:
-        at = int(place * len(text))
-        text = text[:at] + snippet + text[at + length :]
+        index = int(place * len(text))
+        text = text[:index] + snippet + text[index + length :]
     robot, refusal = None, ""
     try:
         robot = robot_file.parse_robot_file(text.encode(errors="surrogatepass"), "arm.yaml")

@@ -53,9 +53,9 @@ def test_values(text: str, value: object) -> None:
         with pytest.raises(StrictYamlError):
             load_yaml(f"a: {text}")
         return
-    found = load_yaml(f"a: {text}").data["a"]
-    assert found == value
-    assert type(found) is type(value)
+    read = load_yaml(f"a: {text}").data["a"]
+    assert read == value
+    assert type(read) is type(value)
 
 
 @pytest.mark.parametrize("text", ["1", "-3", "0.25", "-1.5e-3", "text", "'017'", "true", ".5", "10."])
@@ -68,13 +68,13 @@ def test_accepted_values_are_what_pyyaml_reads(text: str) -> None:
 def test_a_plain_scalar_is_read_as_pyyaml_does_or_refused(text: str) -> None:
     """No number is silently another number, and no text silently a number."""
     try:
-        found = load_yaml(f"a: {text}").data["a"]
+        read = load_yaml(f"a: {text}").data["a"]
     except StrictYamlError:
         return
     expected = yaml.safe_load(f"a: {text}")["a"]
-    assert type(found) is type(expected)
-    assert found == expected
-    assert not isinstance(found, float) or math.isfinite(found)
+    assert type(read) is type(expected)
+    assert read == expected
+    assert not isinstance(read, float) or math.isfinite(read)
 
 
 @settings(max_examples=100, deadline=None)

@@ -33,14 +33,14 @@ def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
     assert chain["expected"]
     arm = imported(chain)
     joints = [joint for joint in moving(chain) if joint["type"] != "fixed"]
-    given = [(case["q_si"], np.array(case["T_m"])) for case in chain.get("expected", [])]
+    cases = [(case["q_si"], np.array(case["T_m"])) for case in chain.get("expected", [])]
     slides = np.array([joint["type"] == "prismatic" for joint in joints])
     for q in np.random.default_rng(7).uniform(-3, 3, (20, len(joints))) * np.where(slides, 0.1, 1.0):
-        given.append((q, pose(chain, {joint["name"]: value for joint, value in zip(joints, q, strict=True)})))
-    for q, T in given:
-        got = armkin.fk(arm, np.asarray(q) * np.where(slides, 1000.0, 1.0))
-        assert np.abs(got[:3, 3] - 1000 * T[:3, 3]).max() < 1e-9
-        assert np.abs(got[:3, :3] - T[:3, :3]).max() < 1e-12
+        cases.append((q, pose(chain, {joint["name"]: value for joint, value in zip(joints, q, strict=True)})))
+    for q, T in cases:
+        T_read = armkin.fk(arm, np.asarray(q) * np.where(slides, 1000.0, 1.0))
+        assert np.abs(T_read[:3, 3] - 1000 * T[:3, 3]).max() < 1e-9
+        assert np.abs(T_read[:3, :3] - T[:3, :3]).max() < 1e-12
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -50,13 +50,13 @@ def test_a_real_chain_goes_out_to_urdf_and_comes_back(name: str) -> None:
     again = build(robot_file.parse_robot_file(format_robot_file(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)))
     slides = np.where(arm.prismatic, 100.0, 1.0)
     q = np.random.default_rng(8).uniform(-2, 2, (20, arm.n)) * slides
-    off = np.abs(armkin.fk(again, q) - armkin.fk(arm, q))
-    assert off[:, :3, 3].max() < 1e-9
-    assert off[:, :3, :3].max() < 1e-12
+    error = np.abs(armkin.fk(again, q) - armkin.fk(arm, q))
+    assert error[:, :3, 3].max() < 1e-9
+    assert error[:, :3, :3].max() < 1e-12
     for bound in ("lower", "upper"):
-        values, others = getattr(arm, bound), getattr(again, bound)
-        assert np.array_equal(np.isfinite(values), np.isfinite(others))
-        assert others[np.isfinite(others)] == pytest.approx(values[np.isfinite(values)], abs=1e-10)
+        values, values_again = getattr(arm, bound), getattr(again, bound)
+        assert np.array_equal(np.isfinite(values), np.isfinite(values_again))
+        assert values_again[np.isfinite(values_again)] == pytest.approx(values[np.isfinite(values)], abs=1e-10)
     assert solver(again) == solver(arm)
 
 
@@ -105,9 +105,9 @@ TWO_ENDS = (
 
 def document(*changes: tuple[str, str]) -> bytes:
     body = JOINTS
-    for old, new in changes:
-        assert old in body
-        body = body.replace(old, new, 1)
+    for before, after in changes:
+        assert before in body
+        body = body.replace(before, after, 1)
     return f'<robot name="spoilt">{body}</robot>'.encode()
 
 

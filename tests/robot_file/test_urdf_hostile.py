@@ -77,17 +77,17 @@ def test_it_ends_in_words_or_in_a_robot_file(name: str, tmp_path: Path) -> None:
     path.write_bytes(raw if isinstance(raw, bytes) else raw.encode("utf-8", "surrogatepass"))
     results = []
     assert least(lambda: results.append(run("import", path)), 2.0) < 2.0
-    done = results[0]
-    assert "internal error" not in done.err
-    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u202e]", done.err)
-    if done.code == 0:
-        made.write_text(done.out)
+    completed = results[0]
+    assert "internal error" not in completed.err
+    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u202e]", completed.err)
+    if completed.code == 0:
+        made.write_text(completed.out)
         arm = armkin.load(made)
         assert np.isfinite(armkin.fk(arm, np.zeros(arm.n))).all()
         return
-    assert (done.code in (2, 4), done.out) == (True, "")
-    assert len(done.err.splitlines()) <= 2
-    assert max(map(len, done.err.splitlines())) < 700
+    assert (completed.code in (2, 4), completed.out) == (True, "")
+    assert len(completed.err.splitlines()) <= 2
+    assert max(map(len, completed.err.splitlines())) < 700
 
 
 def test_what_looks_like_another_unit_is_asked_for(tmp_path: Path) -> None:

@@ -72,19 +72,19 @@ def opened(browser: Browser, address: str, **settings: object) -> Iterator[Page]
     page = context.new_page()
     page.add_init_script(str(script))
     page.set_default_timeout(120_000)
-    said: list[str] = []
-    asked: list[str] = []
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: asked.append(request.url))
+    console: list[str] = []
+    requested: list[str] = []
+    page.on("console", lambda message: console.append(message.text))
+    page.on("pageerror", lambda error: console.append(str(error)))
+    page.on("request", lambda request: requested.append(request.url))
     base = address.split("#")[0]
     page.goto(address)
     page.wait_for_selector("html[data-ready]")
     yield page
     context.close()
     # An action that is refused is told to the person, and by Chromium to its console, too.
-    assert not quiet or [text for text in said if "Failed to load resource" not in text] == []
-    assert [url for url in asked if not url.startswith((base, "data:", "blob:"))] == []
+    assert not quiet or [text for text in console if "Failed to load resource" not in text] == []
+    assert [url for url in requested if not url.startswith((base, "data:", "blob:"))] == []
 
 
 def value(page: Page, selector: str) -> float:
@@ -110,20 +110,22 @@ def until(page: Page, condition: str, argument: object = None, seconds: float = 
     end = time.monotonic() + seconds
     while not page.evaluate(f"argument => {condition}", argument):
         if time.monotonic() > end:
-            seen = page.evaluate(
+            shown = page.evaluate(
                 "['standing', 'arrived', 'trouble'].map(id => document.getElementById(id).textContent)"
             )
-            raise AssertionError(f"not within {seconds:g} s: {condition} ({argument}); the page says {seen}")
+            raise AssertionError(f"not within {seconds:g} s: {condition} ({argument}); the page says {shown}")
         page.wait_for_timeout(20)
 
 
-def jogged(page: Page, press: Callable[[], None], release: Callable[[], None], there: Callable[[], object]) -> None:
+def jogged(
+    page: Page, press: Callable[[], None], release: Callable[[], None], has_arrived: Callable[[], object]
+) -> None:
     """A jog's button is held until the board is there, and stays held. On a busy computer the page's signs of life come
     late, which ends the jog, or ended it before the button was held: it is pressed anew then, as a person would."""
     end = time.monotonic() + 120
     pressed = time.monotonic()
     press()
-    while not there():
+    while not has_arrived():
         assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
         unheard = time.monotonic() > pressed + 10 and not standing(page).startswith("jog")
         if unheard or "press again" in page.inner_text("#arrived"):

@@ -30,7 +30,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @cache
 def _needs_browser(module: ModuleType) -> bool:
-    return any(getattr(one, "__module__", None) == "browsing" for one in vars(module).values())
+    return any(getattr(value, "__module__", None) == "browsing" for value in vars(module).values())
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +44,8 @@ def browser() -> Browser:
 @pytest.fixture
 def drawing_browser(browser: Browser) -> Iterator[Browser]:
     """For tests that look at the picture."""
-    with launched(browser.browser_type) as one:
-        yield one
+    with launched(browser.browser_type) as fresh_browser:
+        yield fresh_browser
 
 
 @pytest.hookimpl(wrapper=True)
@@ -62,8 +62,8 @@ def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def tab(browser: Browser) -> Iterator[Tab]:
     """A page of three_dof without a board, for the tests of a file that begin at a target or a program of their own."""
-    with served() as server, opened(browser, server.address) as one:
-        yield one
+    with served() as server, opened(browser, server.address) as page:
+        yield page
 
 
 @pytest.fixture

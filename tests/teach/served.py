@@ -140,11 +140,11 @@ class Page:
     def let_go(self) -> None:
         assert self.act("jog_end", press=self.presses)[0] == 200
 
-    def jog(self, there: Callable[[Any], bool], **jog: Any) -> None:
+    def jog(self, has_arrived: Callable[[Any], bool], **jog: Any) -> None:
         """A jog's button is held until the board's state is as it shall be, and stays held; it is pressed anew where
         its signs of life came late."""
         end = time.monotonic() + 100
-        while not there(self.state()):
+        while not has_arrived(self.state()):
             assert time.monotonic() < end, self.state()
             if self.state()["doing"] == "jog":
                 self.hold()

@@ -42,12 +42,12 @@ DAE = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COL
 
 
 def binary(corners: np.ndarray) -> bytes:
-    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *one.ravel(), 0) for one in corners)
+    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *triangle.ravel(), 0) for triangle in corners)
     return b"\0" * 80 + struct.pack("<I", len(corners)) + rows
 
 
 def plain(corners: np.ndarray) -> str:
-    loops = ["".join(f"vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in one) for one in corners]
+    loops = ["".join(f"vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in triangle) for triangle in corners]
     facets = "".join(f"facet normal 0 0 0\nouter loop\n{loop}endloop\nendfacet\n" for loop in loops)
     return f"solid one\n{facets}endsolid"
 
@@ -77,10 +77,10 @@ def written(folder: Path, mesh: str = "package://arm/meshes/link.stl") -> Path:
 
 
 def loaded(file: Path, base: list[float] | None = None) -> Any:
-    found = urdf_reader.read_urdf(file, tip="l3").data
+    document = urdf_reader.read_urdf(file, tip="l3").data
     if base is not None:
-        found = {"base": {"xyz": base, "rpy": [0, 0, 30]}} | found
-    return build(robot_file.parse_robot_file(format_robot_file(found), "arm.yaml"))
+        document = {"base": {"xyz": base, "rpy": [0, 0, 30]}} | document
+    return build(robot_file.parse_robot_file(format_robot_file(document), "arm.yaml"))
 
 
 def corners(drawn: dict[str, Any], body: int) -> np.ndarray:
@@ -101,11 +101,11 @@ def test_a_mesh_stands_where_the_urdf_has_it(tmp_path: Path, base: list[float] |
         assert robot.parent[name].name == joint
     frames = [np.eye(4), arm.link[0], arm.link[0] @ arm.link[1], arm.link[0] @ arm.link[1] @ arm.link[2]]
     for body, (name, shift) in enumerate({"base": 0.0, "l1": 0.01, "l2": 0.02, "l3": 0.04}.items()):
-        seen = corners(drawn, body) @ frames[body][:3, :3].T + frames[body][:3, 3]
-        wanted = (CORNERS + np.array([shift, 0, 0])) @ poses[name][:3, :3].T + poses[name][:3, 3]
-        wanted = wanted * 1000 @ arm.base[:3, :3].T + arm.base[:3, 3]
-        for triangle in wanted:
-            assert np.abs(seen - triangle).max(axis=(1, 2)).min() < 2 * drawn["unit"]
+        placed = corners(drawn, body) @ frames[body][:3, :3].T + frames[body][:3, 3]
+        expected = (CORNERS + np.array([shift, 0, 0])) @ poses[name][:3, :3].T + poses[name][:3, 3]
+        expected = expected * 1000 @ arm.base[:3, :3].T + arm.base[:3, 3]
+        for triangle in expected:
+            assert np.abs(placed - triangle).max(axis=(1, 2)).min() < 2 * drawn["unit"]
     assert [len(corners(drawn, body)) for body in range(4)] == [2, 2, 2, 6]  # with the hand and its finger
 
 
@@ -121,8 +121,8 @@ def test_three_kinds_of_files_hold_the_same_triangles(tmp_path: Path) -> None:
 def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
     file = written(tmp_path)
     rng = np.random.default_rng(1)
-    many = rng.uniform(-0.2, 0.2, (20_000, 1, 3)) + rng.uniform(-0.005, 0.005, (20_000, 3, 3))
-    (tmp_path / "arm" / "meshes" / "link.stl").write_bytes(binary(many))
+    triangles = rng.uniform(-0.2, 0.2, (20_000, 1, 3)) + rng.uniform(-0.005, 0.005, (20_000, 3, 3))
+    (tmp_path / "arm" / "meshes" / "link.stl").write_bytes(binary(triangles))
     arm = loaded(file)
     drawn = meshes_json(arm, str(file))
     assert 0.2 * MOST < sum(len(corners(drawn, k)) for k in range(4)) <= MOST
@@ -130,7 +130,7 @@ def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mesh", "raw", "said"),
+    ("mesh", "raw", "message"),
     [
         ("http://example.org/a.stl", None, "no local file"),
         ("package://arm/../../../etc/passwd", None, "neither .stl nor .dae"),
@@ -146,12 +146,12 @@ def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
         ("../meshes/link.dae", b"<COLLADA/>", "has no meshes"),
     ],
 )
-def test_what_is_no_mesh_is_refused(tmp_path: Path, mesh: str, raw: bytes | None, said: str) -> None:
+def test_what_is_no_mesh_is_refused(tmp_path: Path, mesh: str, raw: bytes | None, message: str) -> None:
     file = written(tmp_path, mesh)
     arm = loaded(file)
     if raw is not None:
         (tmp_path / "arm" / "urdf" / mesh).resolve().write_bytes(raw)
-    with pytest.raises(UsageError, match=said):
+    with pytest.raises(UsageError, match=message):
         meshes_json(arm, str(file))
 
 
@@ -159,6 +159,6 @@ def test_the_urdf_of_another_arm_is_refused(tmp_path: Path) -> None:
     file = written(tmp_path)
     with pytest.raises(UsageError, match="at joint values 0 the axis of its joint q2 is not that of q2"):
         meshes_json(armkin.load("three_dof"), str(file))
-    out = run("export", "three_dof", "--js", "--meshes", file)
-    assert out.code == 2
-    assert "--meshes goes with --html alone" in out.err
+    completed = run("export", "three_dof", "--js", "--meshes", file)
+    assert completed.code == 2
+    assert "--meshes goes with --html alone" in completed.err

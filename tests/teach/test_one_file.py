@@ -84,8 +84,8 @@ def test_the_branches_are_those_of_python(ur5e: Page) -> None:
     assert len(answer["branches"]) == int(s.valid.sum())
     radios.nth(3).click()
     settled(page)
-    other = [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()]
-    assert np.abs(armkin.fk(arm, np.deg2rad(other)) - armkin.fk(arm, np.deg2rad(shown))).max() < 1e-2
+    chosen = [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()]
+    assert np.abs(armkin.fk(arm, np.deg2rad(chosen)) - armkin.fk(arm, np.deg2rad(shown))).max() < 1e-2
     for absent in ("#send", "#board", "#record", "#save", "#stop", "#follow", "#take"):
         assert page.locator(absent).count() == 0, absent
     at_once = """() => {
@@ -156,8 +156,12 @@ def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser, tm
         plan = path(arm, path_file.validate_path(ends)) if name == "three_dof" else None
         with opened(browser, written(tmp_path, name, plan), color_scheme=colours) as page:
             page.get_by_role("button", name="Copy as Python").click()
-            found = Axe().run(page).response["violations"]
-            bad = [(one["id"], one["nodes"][0]["html"]) for one in found if one["impact"] in ("serious", "critical")]
+            violations = Axe().run(page).response["violations"]
+            bad = [
+                (violation["id"], violation["nodes"][0]["html"])
+                for violation in violations
+                if violation["impact"] in ("serious", "critical")
+            ]
             assert bad == []
 
 
@@ -181,14 +185,14 @@ def test_hostile_words_are_shown_and_run_nothing(browser: Browser, tmp_path: Pat
         "__proto__",
         "\x00\x07\\",
     )
-    for some in (words[:8], words[8:]):
+    for eight in (words[:8], words[8:]):
         arm = copy.copy(armkin.load("ur5e"))
-        for field, value in (("name", some[6]), ("path", f"/tmp/{some[7]}.yaml"), ("joint_names", some[:6])):
+        for field, value in (("name", eight[6]), ("path", f"/tmp/{eight[7]}.yaml"), ("joint_names", eight[:6])):
             object.__setattr__(arm, field, value)  # what no robot file may say
         file = tmp_path / "arm.html"
         file.write_text(arm_html(arm), encoding="utf-8")
         with opened(browser, file.as_uri()) as page:
-            assert page.locator("#robot").inner_text() == some[6]
+            assert page.locator("#robot").inner_text() == eight[6]
             for fragment in (
                 *words,
                 "q=" + ",".join(words[:6]),
@@ -206,20 +210,20 @@ def test_hostile_words_are_shown_and_run_nothing(browser: Browser, tmp_path: Pat
 
 def test_a_fragment_that_is_no_posture_is_home(browser: Browser, tmp_path: Path) -> None:
     """Of a page that opens, and of one that is open."""
-    home, other = ["0.0000", "90.0000", "-90.0000"], ["10.0000", "60.0000", "-60.0000"]
+    home, named_posture = ["0.0000", "90.0000", "-90.0000"], ["10.0000", "60.0000", "-60.0000"]
     numbers = "[...document.querySelectorAll('#sliders input[type=number]')].map((box) => box.value)"
     bad = ("#q=<img src=x onerror=bad=1>", "#q=1,2", "#q=1e999,0,0", "#q=,,", "#%00")
     with opened(browser, written(tmp_path, "three_dof") + bad[0]) as page:
         assert page.evaluate(numbers) == home
         until(page, "location.hash === '#q=0,90,-90'")
         for fragment in bad:
-            for named, shown in (("#q=10,60,-60", other), (fragment, home)):
+            for named, shown in (("#q=10,60,-60", named_posture), (fragment, home)):
                 page.evaluate("text => { location.hash = text; }", named)
                 until(page, f"{numbers}.join() === argument", ",".join(shown))
             until(page, "location.hash === '#q=0,90,-90'")  # the address says so, too, 0.1 s later at most
         # the page writes what it showed before into the address, just before it hears of another one
         page.evaluate("location.hash = '#q=10,60,-60'; history.replaceState(null, '', '#q=0,90,-90');")
-        until(page, f"{numbers}.join() === argument", ",".join(other), seconds=10.0)
+        until(page, f"{numbers}.join() === argument", ",".join(named_posture), seconds=10.0)
         assert page.evaluate("window.bad") is None
         assert page.locator("img:not(#printed)").count() == 0
 

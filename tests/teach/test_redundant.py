@@ -30,13 +30,13 @@ def test_the_interval_is_that_of_the_family(tmp_path: Path) -> None:
     assert node, "node runs the module; scripts/test installs it"
     shutil.copy(STATIC / "js" / "redundant.js", tmp_path / "redundant.mjs")
     (tmp_path / "ask.mjs").write_text(_ASK)
-    asked = [scene_json(arm), units.joints_out(arm, np.concatenate([q, outside[None]])).tolist()]
-    (tmp_path / "asked.json").write_text(json.dumps(asked))
+    question = [scene_json(arm), units.joints_out(arm, np.concatenate([q, outside[None]])).tolist()]
+    (tmp_path / "asked.json").write_text(json.dumps(question))
     completed = subprocess.run([node, "ask.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300)
-    *found, none = json.loads(completed.stdout)
+    *intervals, none = json.loads(completed.stdout)
     assert none is None
     s = armkin.ik(arm, armkin.fk(arm, q), near=q)
     assert s.interval is not None
     rows = np.arange(len(q))
     assert np.abs(s.q[rows, s.best] - q).max() < 1e-6
-    assert np.abs(np.rad2deg(s.interval[rows, s.best]) - found).max() < 1e-3
+    assert np.abs(np.rad2deg(s.interval[rows, s.best]) - intervals).max() < 1e-3

@@ -20,12 +20,12 @@ HOME = [0, 90, -90]
 
 def test_a_pose_is_sent_as_by_the_command_line(sim: Page) -> None:
     assert sim.act("send", q=POSE, speed=100) == (200, {})
-    seen = sim.hear("board", lambda state: state["doing"] == "send" and state["joints"][1] < 80)
-    assert 5 < seen["joints"][1] < 80  # where the pins are, on the way
+    on_the_way = sim.hear("board", lambda state: state["doing"] == "send" and state["joints"][1] < 80)
+    assert 5 < on_the_way["joints"][1] < 80  # where the pins are, on the way
     state = sim.idle()
-    said = run("send", "robots/three_dof.yaml", *POSE, "--port", "sim", "--json").json
-    assert state["pulses"] == said["pulses"] == COUNTS
-    assert state["joints"] == said["joints"]
+    sent = run("send", "robots/three_dof.yaml", *POSE, "--port", "sim", "--json").json
+    assert state["pulses"] == sent["pulses"] == COUNTS
+    assert state["joints"] == sent["joints"]
     assert state["error"] == ""
     look = sim.act("look", q=HOME)[1]
     assert look["motors"]["from"] == "arm"

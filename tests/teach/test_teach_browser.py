@@ -26,8 +26,8 @@ from command_line import ROOT, run
 @pytest.fixture
 def server() -> Iterator[Server]:
     """One of its own for each test: a page that has just been closed still holds control for a moment."""
-    with served() as one:
-        yield one
+    with served() as running:
+        yield running
 
 
 # At least so many stops of Tab lie before the next element of a selector.
@@ -146,12 +146,12 @@ def test_the_handle_is_dragged_and_the_arm_follows_it(tab: Page) -> None:
 def test_what_cannot_be_reached_is_said(tab: Page) -> None:
     aim(tab, 2000, 0, 300)
     text = tab.inner_text("#answer")
-    said = run("ik", "robots/three_dof.yaml", 2000, 0, 300, "--json").json
+    answer = run("ik", "robots/three_dof.yaml", 2000, 0, 300, "--json").json
     assert text.startswith("unreachable: 0 branches")
-    assert f"{said['closest']['distance_mm']:.4f} mm away" in text
+    assert f"{answer['closest']['distance_mm']:.4f} mm away" in text
     tab.click("#nearest")
     settled(tab)
-    assert values(tab, "#sliders input[type=number]") == pytest.approx(said["closest"]["joints"], abs=1e-4)
+    assert values(tab, "#sliders input[type=number]") == pytest.approx(answer["closest"]["joints"], abs=1e-4)
     tab.fill("#box-1", "130")
     settled(tab)
     assert tab.inner_text("#outside") == "q2 = 130 deg is outside -20 to 120 deg"
@@ -197,11 +197,11 @@ def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser) ->
         page.wait_for_selector("#player:not([hidden])")
         for colours in ("dark", "light"):
             assert page.get_attribute("html", "data-theme") == colours
-            found = Axe().run(page).response["violations"]
+            violations = Axe().run(page).response["violations"]
             bad = {
-                one["id"]: [node["html"] for node in one["nodes"]]
-                for one in found
-                if one["impact"] in ("serious", "critical")
+                violation["id"]: [node["html"] for node in violation["nodes"]]
+                for violation in violations
+                if violation["impact"] in ("serious", "critical")
             }
             assert bad == {}
             page.click("#theme")
@@ -209,7 +209,7 @@ def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser) ->
 
 def test_the_manual_s_picture_is_the_page(drawing_browser: Browser, tmp_path: Path) -> None:
     """ARMKIN_UPDATE_SNAPSHOTS=1 takes it anew."""
-    picture, now = ROOT / "docs/teach.png", tmp_path / "teach.png"
+    picture, drawn_now = ROOT / "docs/teach.png", tmp_path / "teach.png"
     with (
         served("ur5e") as server,
         opened(drawing_browser, server.address, viewport={"width": 1280, "height": 800}) as page,
@@ -223,10 +223,10 @@ def test_the_manual_s_picture_is_the_page(drawing_browser: Browser, tmp_path: Pa
         page.mouse.move(5, 500)
         repainted(page)
         until(page, "document.querySelector('#canvas').dataset.coarse === 'false'")
-        page.screenshot(path=now)
+        page.screenshot(path=drawn_now)
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
-        picture.write_bytes(now.read_bytes())
-    shown, drawn = (image.imread(path)[..., :3] for path in (picture, now))
+        picture.write_bytes(drawn_now.read_bytes())
+    shown, drawn = (image.imread(path)[..., :3] for path in (picture, drawn_now))
     assert shown.shape == drawn.shape
     assert np.abs(shown - drawn).mean() < 0.015  # another machine's fonts; a joint turned by 20 degrees: 0.02
     assert "(teach.png)" in (ROOT / "docs/teach.md").read_text()[:1000]
@@ -340,9 +340,9 @@ def test_other_arms_have_their_page(browser: Browser, robot: str, monkeypatch: p
             assert "no task fits" in settled_text
             assert count == 0
         else:
-            found = re.search(r"(\d+) branch", settled_text)
-            assert found is not None
-            assert int(found[1]) == count >= 1
+            match = re.search(r"(\d+) branch", settled_text)
+            assert match is not None
+            assert int(match[1]) == count >= 1
         if robot == "panda":
             assert page.get_attribute("button[aria-label^='hold J7']", "aria-pressed") == "true"
             page.click("button[aria-label^='hold J7']")

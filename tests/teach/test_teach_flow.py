@@ -13,18 +13,18 @@ from served import teaching
 from command_line import run
 
 
-def carried_out(page: Page, button: str, what: str) -> None:
+def carried_out(page: Page, button: str, job: str) -> None:
     """Press a button until the board has done what it says.
 
     A computer that gives armkin no time for half a second has the firmware hold the arm: one presses again.
     """
     for _ in range(3):
         page.click(button)
-        said = "document.querySelector('#arrived').textContent.includes(argument)"
-        until(page, f"{said} || document.querySelector('#trouble').textContent", f"{what}: done")
+        has_arrived = "document.querySelector('#arrived').textContent.includes(argument)"
+        until(page, f"{has_arrived} || document.querySelector('#trouble').textContent", f"{job}: done")
         if "half a second" not in page.inner_text("#trouble"):
             break
-    idle(page, f"{what}: done")
+    idle(page, f"{job}: done")
 
 
 def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
@@ -34,8 +34,8 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
         aim(page, 390, 80, 300)
         page.get_by_role("radio", name="left, elbow down").click()
         settled(page)
-        said = run("ik", "robots/three_dof.yaml", 390, 80, 300, "--branch", "left, elbow down", "--json").json
-        assert values(page, "#sliders input[type=number]") == [round(q, 4) for q in said["branches"][0]["joints"]]
+        answer = run("ik", "robots/three_dof.yaml", 390, 80, 300, "--branch", "left, elbow down", "--json").json
+        assert values(page, "#sliders input[type=number]") == [round(q, 4) for q in answer["branches"][0]["joints"]]
         page.get_by_role("radio", name="left, elbow up").click()
         settled(page)
         assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
@@ -61,9 +61,9 @@ def test_the_whole_flow_by_mouse_on_the_firmware(browser: Browser) -> None:
             page.wait_for_timeout(20)
         page.click("#stop")
         idle(page, "stopped")
-        at = net(board)
+        counts = net(board)
         assert "position known" in page.inner_text("#standing")
-        assert at != COUNTS
+        assert counts != COUNTS
         # Jog as long as the button is held.
         before = net(board)
         page.select_option("#jog-joint", label="q1")

@@ -122,13 +122,13 @@ def test_a_lost_position_is_not_followed_from(sim: Page, monkeypatch: pytest.Mon
 
 def test_the_page_s_follow(browser: Browser) -> None:
     with served(board="sim") as server, opened(browser, server.address) as page:
-        other = Page(server)
+        second_page = Page(server)
         stands = "document.querySelector('#position').textContent.includes(argument)"
 
         def follow() -> None:
             page.click("#follow")
             until(page, "document.querySelector('#follow').checked && document.documentElement.dataset.asking === 'no'")
-            assert other.hear("board", lambda state: state["follows"])
+            assert second_page.hear("board", lambda state: state["follows"])
 
         def drag(slider: int, value: float) -> None:
             page.locator("#sliders input[type=range]").nth(slider).fill(str(value))
@@ -187,9 +187,9 @@ def test_the_page_s_follow(browser: Browser) -> None:
         assert still(server.actions.standing_pulses())
         # A page that takes over has it off, and its own drag moves nothing.
         follow()
-        assert other.act("take")[0] == 200
+        assert second_page.act("take")[0] == 200
         unfollowed()
-        other.close()
+        second_page.close()
         page.click("#take")
         until(page, "!document.querySelector('#panels').inert")
         at = server.actions.standing_pulses()

@@ -52,11 +52,11 @@ def test_a_page_that_is_gone_holds_the_arm(browser: Browser, how: str) -> None:
 
 def process_with(word: str) -> int:
     """Number of the process that was started with a word; of a child that is just being made it has the words, too."""
-    found = {}
+    parent_of = {}
     for folder in Path("/proc").iterdir():
         with suppress(OSError):  # it has ended meanwhile
             if folder.name.isdigit() and word.encode() in (folder / "cmdline").read_bytes().split(b"\0"):
-                found[folder.name] = (folder / "stat").read_text().rpartition(")")[2].split()[1]
-    first = [number for number, parent in found.items() if parent not in found]
-    assert len(first) == 1, found
+                parent_of[folder.name] = (folder / "stat").read_text().rpartition(")")[2].split()[1]
+    first = [number for number, parent in parent_of.items() if parent not in parent_of]
+    assert len(first) == 1, parent_of
     return int(first[0])

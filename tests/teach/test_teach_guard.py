@@ -17,8 +17,8 @@ from quick import least
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    with served() as one:
-        yield one
+    with served() as running:
+        yield running
 
 
 @pytest.fixture
@@ -72,8 +72,8 @@ def test_an_attack_does_nothing(server: Server, acted: list[str], name: str) -> 
 
 
 def test_the_key_of_another_run_does_nothing(server: Server, acted: list[str]) -> None:
-    with served() as other:
-        headers = {**good(server), "X-Armkin-Key": other.guard.key}
+    with served() as second_server:
+        headers = {**good(server), "X-Armkin-Key": second_server.guard.key}
         assert ask(server, "POST", "/api/stop", b"{}", headers)[0] == 403
     assert acted == []
 
@@ -186,9 +186,9 @@ def test_a_thousand_connections_do_not_keep_the_page_out(server: Server, capfd: 
     page = Page(server)
     idle = []
     for k in range(1000):
-        one = socket.create_connection(("127.0.0.1", port(server)), timeout=60)
-        one.sendall(b"POST /api/stop HTTP/1.1\r\nHost: x\r\n" if k % 2 else b"")
-        idle.append(one)
+        connection = socket.create_connection(("127.0.0.1", port(server)), timeout=60)
+        connection.sendall(b"POST /api/stop HTTP/1.1\r\nHost: x\r\n" if k % 2 else b"")
+        idle.append(connection)
         if len(idle) > 500:  # as many as a process may hold here; the server has closed most of them
             idle.pop(0).close()
 
@@ -197,8 +197,8 @@ def test_a_thousand_connections_do_not_keep_the_page_out(server: Server, capfd: 
         assert ask(server, "GET", "/")[0] == 200
 
     assert least(take, 1.0, time.monotonic) < 1.0
-    for one in idle:
-        one.close()
+    for connection in idle:
+        connection.close()
     page.close()
     assert capfd.readouterr().err == ""
 

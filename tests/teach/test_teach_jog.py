@@ -22,23 +22,23 @@ BENT = [0.0, 60.0, -60.0]  # three_dof, far from its edges
 SCENES = Path(__file__).parents[2] / "examples" / "scenes"
 
 
-def held(page: Page, there: Callable[[dict[str, Any]], bool], **jog: Any) -> list[np.ndarray]:
+def held(page: Page, has_arrived: Callable[[dict[str, Any]], bool], **jog: Any) -> list[np.ndarray]:
     """Joint values on the way, while a jog is asked for until the board is there."""
-    seen = []
+    joints = []
 
     def look(state: dict[str, Any]) -> bool:
         if state["joints"] is not None:
-            seen.append(np.array(state["joints"]))
-        return there(state)
+            joints.append(np.array(state["joints"]))
+        return has_arrived(state)
 
     page.jog(look, **jog)
-    return seen
+    return joints
 
 
-def tips(seen: list[np.ndarray]) -> np.ndarray:
+def tips(joints: list[np.ndarray]) -> np.ndarray:
     """Where three_dof's tip was, in mm."""
     arm = armkin.load("three_dof")
-    return np.array([armkin.fk(arm, units.joints_in(arm, q))[:3, 3] for q in seen])
+    return np.array([armkin.fk(arm, units.joints_in(arm, q))[:3, 3] for q in joints])
 
 
 def stand(page: Page, q: list[float]) -> np.ndarray:
@@ -50,13 +50,13 @@ def stand(page: Page, q: list[float]) -> np.ndarray:
 
 def test_the_tip_keeps_its_line_and_stops_when_nobody_asks(sim: Page) -> None:
     begin = stand(sim, BENT)
-    seen = held(sim, lambda now: abs(tips([now["joints"]])[0][1] - begin[1]) > 40, axis="y", frame="base", percent=40)
+    joints = held(sim, lambda now: abs(tips([now["joints"]])[0][1] - begin[1]) > 40, axis="y", frame="base", percent=40)
     assert sim.state()["doing"] == "jog"
     began = sim.clock()  # the page falls silent
     state = sim.idle()
     assert sim.clock() - began < 1.5  # 0.3 s after the last sign of life it brakes
     assert (state["position"], state["error"]) == ("known", "")
-    way = tips([*seen, np.array(state["joints"])]) - begin
+    way = tips([*joints, np.array(state["joints"])]) - begin
     assert 40 < way[-1][1] < 200  # the line would have gone on to the edge of the reach
     assert np.abs(way[:, [0, 2]]).max() < 0.05 + 0.15  # the tolerance, and half a step of each joint at the tip
     assert (np.diff(way[:, 1]) > -0.2).all()

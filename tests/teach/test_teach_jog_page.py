@@ -81,7 +81,7 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         assert page.locator("#pad b").count() == 0  # its name is text
         looked(6)
         assert joints() == stands
-        pull, let_go = (f"() => {{ pad.buttons[5].pressed = {on}; }}" for on in ("true", "false"))
+        pull, let_go = (f"() => {{ pad.buttons[5].pressed = {pressed}; }}" for pressed in ("true", "false"))
 
         def release() -> None:
             page.evaluate(let_go)

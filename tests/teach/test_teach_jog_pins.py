@@ -19,9 +19,9 @@ def tips_from(board: EmulatedBoard, arm: armkin.Arm, counts: list[int]) -> np.nd
     trace = board.trace()
     steps = [trace.positions(axis) for axis in AXES]
     when = np.sort(np.concatenate([cycle for cycle, _ in steps]))
-    at = np.stack([np.append(0, sums)[np.searchsorted(cycle, when, "right")] for cycle, sums in steps], axis=1)
-    since = np.flatnonzero((at == counts).all(axis=1)).max()
-    way: np.ndarray = armkin.fk(arm, armkin.joints(arm, at[since:]))[:, :3, 3]
+    counts_at = np.stack([np.append(0, sums)[np.searchsorted(cycle, when, "right")] for cycle, sums in steps], axis=1)
+    since = np.flatnonzero((counts_at == counts).all(axis=1)).max()
+    way: np.ndarray = armkin.fk(arm, armkin.joints(arm, counts_at[since:]))[:, :3, 3]
     return way
 
 

@@ -46,12 +46,12 @@ def test_a_hit_is_red_and_send_says_why_not(arm: armkin.Arm, browser: Browser) -
 
 def test_a_program_that_hits_something_tells_where(arm: armkin.Arm) -> None:
     actions = Actions(arm)
-    told = actions.program_actions
-    told.program.edit({"do": "record", "kind": "joint", "q": [80.0, 10.0, -45.0]})
-    told.program.edit({"do": "record", "kind": "joint", "q": [-80.0, 10.0, -45.0]})
-    answer = told.plan(None, {})  # type: ignore[arg-type]
+    program_actions = actions.program_actions
+    program_actions.program.edit({"do": "record", "kind": "joint", "q": [80.0, 10.0, -45.0]})
+    program_actions.program.edit({"do": "record", "kind": "joint", "q": [-80.0, 10.0, -45.0]})
+    answer = program_actions.plan(None, {})  # type: ignore[arg-type]
     assert "would hit table" in answer["refused"]
     assert len(answer["tips"]) > 10  # the way is shown, the place on it
-    tip = min(sum((a - b) ** 2 for a, b in zip(answer["hit"], one, strict=True)) for one in answer["tips"])
+    tip = min(sum((a - b) ** 2 for a, b in zip(answer["hit"], shown_tip, strict=True)) for shown_tip in answer["tips"])
     assert tip**0.5 < 20
     assert actions._open()["scene"]["obstacles"]

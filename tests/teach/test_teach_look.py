@@ -55,30 +55,30 @@ def test_every_robot_has_a_scene_and_a_first_picture(robot: str) -> None:
 )
 def test_branches_are_those_of_ik(robot: str, target: list[float]) -> None:
     file = f"robots/{robot}.yaml"
-    said = run("ik", file, *target, "--all-branches", "--json").json
+    by_command = run("ik", file, *target, "--all-branches", "--json").json
     answer = asked(robot, units.home_out(arm(robot)), target=target)
-    assert answer["status"] == said["status"]
-    assert answer["complete"] == said["complete"]
+    assert answer["status"] == by_command["status"]
+    assert answer["complete"] == by_command["complete"]
     assert [(b["name"], b["joints"], b["within_limits"]) for b in answer["branches"]] == [
-        (b["name"], b["joints"], b["within_limits"]) for b in said["branches"]
+        (b["name"], b["joints"], b["within_limits"]) for b in by_command["branches"]
     ]
-    if said["best"] is None:
-        assert answer["closest"]["distance_mm"] == said["closest"]["distance_mm"]
-        assert answer["closest"]["joints"] == said["closest"]["joints"]
+    if by_command["best"] is None:
+        assert answer["closest"]["distance_mm"] == by_command["closest"]["distance_mm"]
+        assert answer["closest"]["joints"] == by_command["closest"]["joints"]
     else:
-        assert answer["q"] == said["branches"][said["best"]]["joints"]
+        assert answer["q"] == by_command["branches"][by_command["best"]]["joints"]
 
 
 @pytest.mark.parametrize("best", [False, True])
 def test_pulses_and_tip_are_those_of_the_command_line(best: bool) -> None:
     pose = [-30, 5, -5]
-    said = run("pulses", "robots/three_dof.yaml", *pose, "--json", *(["--best"] if best else [])).json
-    where = run("fk", "robots/three_dof.yaml", *pose, "--json").json
+    by_command = run("pulses", "robots/three_dof.yaml", *pose, "--json", *(["--best"] if best else [])).json
+    pose_answer = run("fk", "robots/three_dof.yaml", *pose, "--json").json
     answer = asked("three_dof", pose, best=best)
-    assert answer["motors"]["pulses"] == said["pulses"]
-    assert answer["motors"]["moves"] == said["moves"]
-    assert answer["motors"]["error_mm"] == said["error_mm"]
-    assert answer["tip"] == {"position_mm": where["position_mm"], "rpy_deg": where["rpy_deg"]}
+    assert answer["motors"]["pulses"] == by_command["pulses"]
+    assert answer["motors"]["moves"] == by_command["moves"]
+    assert answer["motors"]["error_mm"] == by_command["error_mm"]
+    assert answer["tip"] == {"position_mm": pose_answer["position_mm"], "rpy_deg": pose_answer["rpy_deg"]}
 
 
 def test_a_pose_is_on_one_of_its_branches() -> None:

@@ -55,8 +55,8 @@ def test_keys_and_what_was_refused(browser: Browser, tmp_path: Path) -> None:
         # A program that starts elsewhere than the arm stands says, before it is sent, by which move it is reached.
         file.write_text("start: {joints: [30, 60, -60]}\nmoves:\n  - joint: [0, 90, -90]\n")
         page.set_input_files("#load", str(file))
-        said = "first a joint move to its start, 1.000 s; then 1.000 s"
-        until(page, f"document.querySelector('#planned').textContent.startsWith('{said}')")
+        summary = "first a joint move to its start, 1.000 s; then 1.000 s"
+        until(page, f"document.querySelector('#planned').textContent.startsWith('{summary}')")
         # While a long program is planned, none that it has been edited from can be played.
         page.route("**/api/plan", lambda route: None)
         page.click("#undo")
@@ -123,10 +123,10 @@ def test_what_one_needs_is_in_sight_and_stays_there(browser: Browser) -> None:
             send = page.locator("#send").bounding_box()
             assert send is not None
             assert send["y"] + send["height"] <= size[1]
-            at = page.locator("#target").bounding_box()
+            place = page.locator("#target").bounding_box()
             page.evaluate("document.querySelector('#home').click()")  # it has no switches
             until(page, "document.querySelector('#trouble').textContent.includes('homing')")
-            assert page.locator("#target").bounding_box() == at  # the error has pushed nothing away
+            assert page.locator("#target").bounding_box() == place  # the error has pushed nothing away
             slider = page.locator("#sliders input[type=range]").first
             assert slider.evaluate("slider => getComputedStyle(slider).touchAction") == "pan-y"
             assert float(slider.get_attribute("step") or "") == pytest.approx(360 / 12800)  # a pulse

@@ -12,18 +12,18 @@ from served import served
 def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: Path) -> None:
     with served(board="sim") as server, opened(browser, server.address) as page:
         base = server.address.split("/#")[0]
-        asked: list[str] = []
+        acts: list[str] = []
         before = server.actions.act
-        server.actions.act = lambda name, tab, fields: asked.append(name) or before(name, tab, fields)  # type: ignore[func-returns-value, method-assign, assignment]
-        other = page.context.browser.new_context().new_page()  # type: ignore[union-attr]
+        server.actions.act = lambda name, tab, fields: acts.append(name) or before(name, tab, fields)  # type: ignore[func-returns-value, method-assign, assignment]
+        evil_page = page.context.browser.new_context().new_page()  # type: ignore[union-attr]
         evil = tmp_path / "evil.html"
         evil.write_text(
             f"""<body><iframe id=frame src="{base}/"></iframe>
             <form id=form method=post enctype="text/plain" action="{base}/api/stop" target=hidden>
             <input name='{{"q": "' value='"}}'></form><iframe name=hidden></iframe></body>"""
         )
-        other.goto(f"file://{evil}")
-        tried = other.evaluate(
+        evil_page.goto(f"file://{evil}")
+        tried = evil_page.evaluate(
             """async base => {
               const send = async (options) => {
                 try { return (await fetch(base + "/api/stop", { method: "POST", body: "{}", ...options })).status; }
@@ -39,11 +39,11 @@ def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: P
         )
         assert tried[0] == "refused"
         assert tried[2] == 2  # closed
-        other.wait_for_timeout(300)
-        frame = other.frames[1]
+        evil_page.wait_for_timeout(300)
+        frame = evil_page.frames[1]
         assert "three_dof" not in (frame.evaluate("document.body ? document.body.innerText : ''") or "")
-        assert asked == []
-        other.context.close()
+        assert acts == []
+        evil_page.context.close()
 
 
 def test_two_pages_and_a_take_over_on_purpose(browser: Browser) -> None:

@@ -28,7 +28,7 @@ def arm() -> armkin.Arm:
 @pytest.fixture
 def program(arm: armkin.Arm) -> Program:
     """A joint move, a line with a blend and a name, an arc, a wait, the gripper."""
-    one = Program(arm)
+    recorded = Program(arm)
     for edit in (
         {"do": "record", "kind": "joint", "q": POSES[0]},
         {"do": "record", "kind": "line", "q": POSES[1]},
@@ -40,8 +40,8 @@ def program(arm: armkin.Arm) -> Program:
         {"do": "blend", "index": 1, "blend": 10},
         {"do": "settings", "tool_speed": 100, "speed": 80},
     ):
-        one.edit(edit)
-    return one
+        recorded.edit(edit)
+    return recorded
 
 
 def test_what_is_recorded_is_a_path_file(program: Program, tmp_path: Path) -> None:
@@ -61,8 +61,8 @@ def test_the_file_gives_the_plan_of_the_page(program: Program, arm: armkin.Arm, 
     assert page.duration == alone.duration
     t = np.linspace(0, page.duration, 50)
     assert np.array_equal(page.q(t), alone.q(t))
-    said = run("path", "robots/three_dof.yaml", file, "--json").json
-    assert said["duration_s"] == page.duration
+    by_command = run("path", "robots/three_dof.yaml", file, "--json").json
+    assert by_command["duration_s"] == page.duration
     shown = playback_json(arm, page)
     assert shown["duration_s"] == alone.duration
     assert np.max(shown["shares"]) <= 1 + 1e-9
@@ -176,8 +176,8 @@ def test_pages_share_one_program() -> None:
 def test_the_pose_where_a_move_ends(program: Program, arm: armkin.Arm) -> None:
     assert np.rad2deg(program.end_of(0, None)) == pytest.approx(POSES[0])
     for index, pose in ((1, POSES[1]), (2, POSES[2]), (4, POSES[2])):
-        there = armkin.fk(arm, np.deg2rad(pose))[:3, 3]
-        assert armkin.fk(arm, program.end_of(index, None))[:3, 3] == pytest.approx(there, abs=1e-5)
+        tip = armkin.fk(arm, np.deg2rad(pose))[:3, 3]
+        assert armkin.fk(arm, program.end_of(index, None))[:3, 3] == pytest.approx(tip, abs=1e-5)
 
 
 def test_a_file_with_too_few_numbers_names_the_move(program: Program) -> None:
@@ -196,20 +196,20 @@ def test_a_name_is_saved_as_a_path_file_may_have_it(program: Program, tmp_path: 
 
 def test_what_is_played_is_where_the_tip_is_however_long_it_takes(arm: armkin.Arm) -> None:
     """Eleven minutes: with 1,500 samples the tip was shown 36 mm off."""
-    one = Program(arm)
-    one.edit({"do": "record", "kind": "joint", "q": POSES[0]})
-    one.edit({"do": "settings", "tool_speed": 30})
+    recorded = Program(arm)
+    recorded.edit({"do": "record", "kind": "joint", "q": POSES[0]})
+    recorded.edit({"do": "settings", "tool_speed": 30})
     ring = "  - point: [390, 0, 300]\n  - circle: {centre: [340, 0, 300], normal: [0, 0, 1], turns: 62}\n"
-    one.load(one.text() + ring, "long.yaml")
-    plan = one.plan(None)
+    recorded.load(recorded.text() + ring, "long.yaml")
+    plan = recorded.plan(None)
     assert plan.duration > 600
     shown = playback_json(arm, plan)
     t = np.sort(np.random.default_rng(3).uniform(0, plan.duration, 4000))
     time, joints = np.array(shown["time"]), np.array(shown["joints"])
     seen = np.stack([np.interp(t, time, joints[:, i]) for i in range(arm.n)], axis=-1)
     tips = armkin.fk(arm, np.deg2rad(seen))[:, :3, 3]
-    off = np.linalg.norm(tips - armkin.fk(arm, plan.q(t))[:, :3, 3], axis=1)
-    assert off.max() < 0.5
+    distance = np.linalg.norm(tips - armkin.fk(arm, plan.q(t))[:, :3, 3], axis=1)
+    assert distance.max() < 0.5
     assert shown["shown_mm"] < 0.5
     assert len(time) < 30_000
 
@@ -222,19 +222,19 @@ def test_an_edit_does_not_wait_for_a_plan(monkeypatch: pytest.MonkeyPatch) -> No
         assert page.act("program", do="record", kind="joint", q=POSES[0])[0] == 200
         begun, go_on, plan = threading.Event(), threading.Event(), armkin.motion.path.path
 
-        def slow(*asked: Any, **how: Any) -> Any:
+        def slow(*arguments: Any, **how: Any) -> Any:
             begun.set()
             assert go_on.wait(60)
-            return plan(*asked, **how)
+            return plan(*arguments, **how)
 
         monkeypatch.setattr(armkin.motion.path, "path", slow)
-        told: list[tuple[int, Any]] = []
-        planning = threading.Thread(target=lambda: told.append(page.act("plan")))
+        answers: list[tuple[int, Any]] = []
+        planning = threading.Thread(target=lambda: answers.append(page.act("plan")))
         planning.start()
         assert begun.wait(60)
         assert page.act("program", do="record", kind="joint", q=POSES[1])[0] == 200
-        assert not told
+        assert not answers
         go_on.set()
         planning.join()
-        assert told[0][0] == 200  # of the program as it was
+        assert answers[0][0] == 200  # of the program as it was
         page.close()

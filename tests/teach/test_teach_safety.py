@@ -82,12 +82,12 @@ def test_stop_is_on_the_line_within_a_tenth_of_a_second_while_requests_are_under
 
     monkeypatch.setattr(Session, "hold", hold)
     # The page asks for poses that take long (the nearest of an unreachable target), one after another.
-    end, asked = threading.Event(), threading.Event()
+    end, is_asked = threading.Event(), threading.Event()
 
     def ask() -> None:
         while not end.is_set():
             page.act("look", q=HOME, target=[2000, 500, 300], nearest=True)
-            asked.set()
+            is_asked.set()
 
     took: list[float] = []
     while not took or (min(took) >= 0.1 and len(took) < 8):  # a machine that is busy itself is late now and then
@@ -96,8 +96,8 @@ def test_stop_is_on_the_line_within_a_tenth_of_a_second_while_requests_are_under
         busy = threading.Thread(target=ask)
         busy.start()
         try:
-            asked.clear()
-            assert asked.wait(60)
+            is_asked.clear()
+            assert is_asked.wait(60)
             held.clear()
             began = time.monotonic()
             assert page.act("stop")[0] == 200

@@ -29,13 +29,13 @@ def test_voxels_are_shown_and_hidden_again(browser: Browser) -> None:
 
 def test_a_voxel_says_what_ik_says_of_its_centre() -> None:
     arm = armkin.load("puma560")
-    found = reach_slice(arm)
-    centres = np.reshape(found["centres"], (-1, 3))
-    assert found["size"] == pytest.approx(arm.reach / ACROSS)
-    assert found["of"] == DIRECTIONS
-    assert len(centres) == len(found["shares"]) > 20
+    answer = reach_slice(arm)
+    centres = np.reshape(answer["centres"], (-1, 3))
+    assert answer["size"] == pytest.approx(arm.reach / ACROSS)
+    assert answer["of"] == DIRECTIONS
+    assert len(centres) == len(answer["shares"]) > 20
     assert (centres[:, 1] == 0).all()
-    F = np.array(found["frame"])
+    F = np.array(answer["frame"])
     for i in (0, len(centres) // 2, len(centres) - 1):
         back = centres[i, 0] < 0
         turned = np.diag([-1.0, -1.0, 1.0]) if back else np.eye(3)  # the cell's own frame: x outwards
@@ -43,34 +43,34 @@ def test_a_voxel_says_what_ik_says_of_its_centre() -> None:
         z = 1 - (2 * n + 1) / DIRECTIONS
         away = np.stack([np.sqrt(1 - z**2) * f(n * np.pi * (3 - np.sqrt(5))) for f in (np.cos, np.sin)] + [z], axis=1)
         T = np.tile(np.eye(4), (DIRECTIONS, 1, 1))
-        for one, direction in zip(T, away, strict=True):
+        for goal, direction in zip(T, away, strict=True):
             x = np.cross(direction, [0.3, 0.5, 0.1])  # the roll is free: joint 6 turns all round
             x /= np.linalg.norm(x)
-            one[:3, :3] = F[:3, :3] @ turned @ np.stack([x, np.cross(direction, x), direction], axis=1)
-            one[:3, 3] = F[:3, 3] + F[:3, :3] @ centres[i]
-        assert armkin.ik(arm, T).within_limits.any(axis=1).mean() == pytest.approx(found["shares"][i], abs=1e-4)
+            goal[:3, :3] = F[:3, :3] @ turned @ np.stack([x, np.cross(direction, x), direction], axis=1)
+            goal[:3, 3] = F[:3, 3] + F[:3, :3] @ centres[i]
+        assert armkin.ik(arm, T).within_limits.any(axis=1).mean() == pytest.approx(answer["shares"][i], abs=1e-4)
 
 
 def test_of_seven_joints_one_of_some_values_must_reach_and_no_task_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """With J7 at home alone every target of an iiwa7 was singular, and the slice took 25 s."""
     monkeypatch.setattr("armkin.teach.reach_slice.ACROSS", 4)
     arm = armkin.load("iiwa7")
-    found = reach_slice(arm)
-    assert (found["held"], found["values"]) == ("J7", VALUES)
+    answer = reach_slice(arm)
+    assert (answer["held"], answer["values"]) == ("J7", VALUES)
     grid = Grid(arm, arm.reach / 4, 2, DIRECTIONS, 1, False)
     row = voxels.section_layer(grid).row
-    asked = 0.0
+    total = 0.0
     for k in row[:: len(row) // 4].tolist():
         rings = np.repeat(grid.rings[[k // 2]], DIRECTIONS, axis=0)
         away = np.full(DIRECTIONS, k % 2 * np.pi)
         T = grid.targets(rings, away, np.arange(DIRECTIONS), np.zeros(DIRECTIONS))
         exact = (armkin.ik(arm, T).best >= 0).mean()  # at any value
         centre = np.linalg.inv(grid.frame)[:3] @ T[0, :, 3]
-        apart = np.linalg.norm(np.reshape(found["centres"], (-1, 3)) - centre, axis=1)
-        share = found["shares"][apart.argmin()] if apart.min() < 1.0 else 0.0
+        apart = np.linalg.norm(np.reshape(answer["centres"], (-1, 3)) - centre, axis=1)
+        share = answer["shares"][apart.argmin()] if apart.min() < 1.0 else 0.0
         assert exact - 0.3 <= share <= exact + 1e-4
-        asked += share
-    assert asked > 0.5
+        total += share
+    assert total > 0.5
     assert reach_slice(armkin.load("kinova_gen3"))["values"] == 1
     with pytest.raises(UsageError, match="no task fits"):
         reach_slice(armkin.load("pan_tilt"))

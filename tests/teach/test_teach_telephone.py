@@ -52,8 +52,8 @@ def test_a_telephone_s_window(browser: Browser) -> None:
             x, y = rect["x"] + 0.3 * rect["width"], rect["y"] + rect["height"] / 2
             before, scrolled = value(page, "#box-1"), page.evaluate("scrollY")
             for k in range(10):
-                kind, at = ("touchMove" if k else "touchStart"), {"x": x + across * k, "y": y + down * k}
-                line.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [at]})
+                kind, point = ("touchMove" if k else "touchStart"), {"x": x + across * k, "y": y + down * k}
+                line.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [point]})
             line.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
             if not turns:
                 until(page, "scrollY > argument", scrolled)

@@ -18,8 +18,8 @@ VENDOR = STATIC / "vendor" / "three"
 
 
 def test_every_vendored_byte_is_the_package_s() -> None:
-    found = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in VENDOR.iterdir()}
-    assert found == FILES
+    hash_of = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in VENDOR.iterdir()}
+    assert hash_of == FILES
 
 
 def test_the_version_is_the_one_that_is_named() -> None:

@@ -23,8 +23,8 @@ def test_bodies_meet_at_every_joint_and_end_at_the_tip(robot: str) -> None:
     assert end == pytest.approx(arm.link[0][:3, 3], abs=1e-9)
     for i, value in enumerate(q * arm.ratio):
         # The body before ends where the joint sits; a slide carries the next one along its axis.
-        at = T[:3, :3] @ [0, 0, form.joint_offsets[i]] + T[:3, 3]
-        assert end == pytest.approx(at, abs=1e-6)
+        corner = T[:3, :3] @ [0, 0, form.joint_offsets[i]] + T[:3, 3]
+        assert end == pytest.approx(corner, abs=1e-6)
         move = np.eye(4)
         if arm.prismatic[i]:
             move[2, 3] = value
@@ -54,8 +54,8 @@ def test_between_axes_that_are_not_parallel_lies_the_common_normal(robot: str) -
 
 
 def test_the_same_arm_in_two_conventions_looks_the_same() -> None:
-    one, other = (armkin.load(str(ROOT / f"robots/{name}.yaml")) for name in ("ra02", "ra02_screws"))
-    a, b = (skeleton(arm, arm.home).path for arm in (one, other))
+    by_dh, by_screws = (armkin.load(str(ROOT / f"robots/{name}.yaml")) for name in ("ra02", "ra02_screws"))
+    a, b = (skeleton(arm, arm.home).path for arm in (by_dh, by_screws))
     for point in a:  # every corner of the one lies on the other
         ends, starts = b[1:], b[:-1]
         along = np.clip(((point - starts) * (ends - starts)).sum(1) / ((ends - starts) ** 2).sum(1), 0, 1)
