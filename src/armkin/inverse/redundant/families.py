@@ -61,20 +61,20 @@ def families(
     goal, lead, defect = read_targets(task, values)
     close = read_near(arm, near, lead)
     nears = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
-    of = arm_angle(arm) if free.joint else None
+    angle_class = arm_angle(arm) if free.joint else None
     numbers = (shaped(task, values)[0], defect)
     roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
     stands = (newton.missing(arm, task, nears, goal) <= most) & ~outside(arm, nears).any(axis=1)
     rows = _Rows(arm, free.joint, nears, stands)
-    chunk = CIRCLES if of else AT_ONCE // SAMPLES if free.by_formula else TRACED
+    chunk = CIRCLES if angle_class else AT_ONCE // SAMPLES if free.by_formula else TRACED
     for k in range(0, len(goal), chunk):
-        if of:
-            rows.add(k, Turning.along(of, goal[k : k + chunk], nears[k : k + chunk]))
-        else:
-            find = Follower(ik, arm, free, goal[k : k + chunk], nears[k : k + chunk])
-            for curves in [Followed.along(find)] if free.by_formula else traced(find):
-                rows.add(k, curves)
-                k += len(curves.short)
+        some = goal[k : k + chunk], nears[k : k + chunk]
+        if angle_class:
+            rows.add(Turning.along(angle_class, *some))
+            continue
+        follower = Follower(ik, arm, free, *some)
+        for curves in [Followed.along(follower)] if free.by_formula else traced(follower):
+            rows.add(curves)
     rows.add_points(task, goal, not free.by_formula)
     q, interval, legal, branch = rows.stacked()
     valid = branch >= 0
@@ -144,11 +144,13 @@ class _Rows:
         self.arm, self.joint, self.near, self.stands = arm, joint, near, stands
         self.complete, self.short = (np.zeros(len(near), bool) for _ in range(2))
         self.parts: list[tuple[Int, Array, Array, Bool, Int]] = []
+        self.added = 0  # targets
 
-    def add(self, begin: int, curves: Curves) -> None:
-        """Those of targets from begin on."""
-        count, pieces = len(curves.complete), curves.pieces
-        rows = slice(begin, begin + count)
+    def add(self, curves: Curves) -> None:
+        """Those of the targets that follow."""
+        pieces, begin = curves.pieces, self.added
+        self.added += len(curves.complete)
+        rows = slice(begin, self.added)
         self.complete[rows], self.short[rows] = curves.complete, curves.short
         near = self.near[begin + pieces.row]
         q = _nearest_postures(self.arm, curves, near)

@@ -193,47 +193,64 @@ class _Nodes(NamedTuple):
     alive: Bool  # (K,) whether the curve goes on behind it
 
     def of_curves(self, curves: Traced, row: Int, branch: Int) -> Pieces:
-        """The pieces of curves (C,): in a table with a row each, whose last node is repeated at the parameter where the
-        curve closes."""
-        arm, near, cuts = curves.find.arm, curves.find.near, np.searchsorted(self.at, curves.begin)
-        count = np.diff(cuts, append=len(self.at))
-        C, K = len(row), int(count.max())
-        k = np.arange(K)
-        last = cuts + count - 1
-        index = np.minimum(cuts[:, None] + k, last[:, None])
-        good, up, alive = self.legal[index], self.up[index], self.alive[index]
-        turn = curves.counts
-        padded = (k >= count[:, None]) & self.alive[last][:, None]
-        values = np.where(padded, turn[:, None], self.at[index] - curves.begin[:, None])
-        index = np.where(padded, cuts[:, None], index)
-        q, fits = nearest_row(arm, self.q, near[curves.row[self.at.astype(np.intp)]])
-        cost = motion(arm, q, near[curves.row[self.at.astype(np.intp)]])
-        costs = np.concatenate([cost[index], np.where(fits, cost, np.inf)[index]])
-        turns = up != np.roll(up, 1, axis=1)
-        of, first, length = runs(good, turns)
-        curve, begin, run = runs(alive, turns)
-        empty = holding_none(good, curve, begin, run)
-        legal = np.repeat([True, False], [len(of), int(empty.sum())])
-        of, first = np.append(of, curve[empty]), np.append(first, begin[empty])
-        length = np.append(length, run[empty])
-        best = best_samples(costs, of + C * legal, first, length + 1)
-        t = self.q[index, curves.find.free.joint]
-        way = np.cumsum(np.tile(wrap_angle(np.roll(t, -1, axis=1) - t), 2), axis=1)
-        way = np.concatenate([np.zeros((C, 1)), way], axis=1)
-        start = t[of, first]
-        end = start + way[of, first + length] - way[of, first]
+        """The pieces of curves (C,), which begin with the posture of their best node."""
+        node, value = self._table(curves)
+        near, K = curves.find.near[curves.row[self.at.astype(np.intp)]], node.shape[1]
+        curve, first, length, legal = self._runs(node)
+        q, fits = nearest_row(curves.find.arm, self.q, near)
+        cost = motion(curves.find.arm, q, near)
+        costs = np.concatenate([cost[node], np.where(fits, cost, np.inf)[node]])
+        best = best_samples(costs, curve + len(row) * legal, first, length + 1)
+        a, b = _ends(self.q[node, curves.find.free.joint], curve, first, length)
 
-        def parameter(node: Int) -> Array:
-            return np.asarray(values[of, node % K] + turn[of] * (node // K))
+        def parameter(sample: Int) -> Array:
+            return np.asarray(value[curve, sample % K] + curves.counts[curve] * (sample // K))
 
-        mid = first + best
-        low = np.minimum(start, end)
+        best_at, last = first + best, first + length
         pieces = Pieces(
-            row[of], branch[of], legal, low, np.where(length == K, low + 2 * np.pi, np.maximum(start, end)),
-            parameter(first), parameter(first + length),
-            parameter(np.maximum(mid - 1, first)), parameter(mid), parameter(np.minimum(mid + 1, first + length)),
-            q[index[of, mid % K]],
-        )  # fmt: skip
+            row=row[curve],
+            branch=branch[curve],
+            legal=legal,
+            a=a,
+            b=b,
+            first=parameter(first),
+            last=parameter(last),
+            low=parameter(np.maximum(best_at - 1, first)),
+            at=parameter(best_at),
+            high=parameter(np.minimum(best_at + 1, last)),
+            start=q[node[curve, best_at % K]],
+        )
         exact, allowed = curves.at(pieces, pieces.at)
         inside = (best > 0) & (best < length) & (allowed | ~legal)
         return pieces._replace(start=np.where(inside[:, None], exact, pieces.start))
+
+    def _table(self, curves: Traced) -> tuple[Int, Array]:
+        """The nodes of curves C, a row each (C, K), and their parameters; the last one is repeated, at the parameter
+        where the curve closes."""
+        begin = np.searchsorted(self.at, curves.begin)
+        count = np.diff(begin, append=len(self.at))
+        k, last = np.arange(int(count.max())), begin + count - 1
+        node = np.minimum(begin[:, None] + k, last[:, None])
+        closing = (k >= count[:, None]) & self.alive[last][:, None]
+        value = np.where(closing, curves.counts[:, None], self.at[node] - curves.begin[:, None])
+        return np.where(closing, begin[:, None], node), value
+
+    def _runs(self, node: Int) -> tuple[Int, Int, Int, Bool]:
+        """Runs of nodes (C, K) along which the joint does not turn back, legal ones and those that hold no legal node:
+        their curves, first nodes, lengths, and whether legal."""
+        legal, up = self.legal[node], self.up[node]
+        turns = up != np.roll(up, 1, axis=1)
+        of_legal, others = runs(legal, turns), runs(self.alive[node], turns)
+        empty = holding_none(legal, *others)
+        curve, first, length = (np.append(x, y[empty]) for x, y in zip(of_legal, others, strict=True))
+        return curve, first, length, np.arange(len(curve)) < len(of_legal[0])
+
+
+def _ends(value: Array, curve: Int, first: Int, length: Int) -> tuple[Array, Array]:
+    """The least and the largest value of a joint along runs (R,) of curves' nodes, at which it has values (C, K)."""
+    change = np.cumsum(np.tile(wrap_angle(np.roll(value, -1, axis=1) - value), 2), axis=1)
+    change = np.concatenate([np.zeros((len(value), 1)), change], axis=1)
+    start = value[curve, first]
+    end = start + change[curve, first + length] - change[curve, first]
+    low = np.minimum(start, end)
+    return low, np.where(length == value.shape[1], low + 2 * np.pi, np.maximum(start, end))
