@@ -1,12 +1,12 @@
 """Every branch of every class of arms, by the thousand: hit rates, branch counts and accuracy as a table.
 
     python tests/bench/check_ik.py [--robots] [--classes] [--near] [--oracle] [--poses 10000] [--arms 50] [--only TEXT]
-    python tests/bench/check_ik.py [--postures] [--surfaces] [--rounded] [--share 1.0] [--seed 0] [--only TEXT]
+    python tests/bench/check_ik.py [--postures] [--surfaces] [--leaving] [--rounded] [--share 1.0] [--seed 0]
 
-Without a choice all tables are made. The second line asks what people ask: round postures, singular surfaces,
-rounded targets; `--share 0.1` a tenth of them, `--seed` other arms of the classes and of right angles. The oracle is
-a multi-start Newton iteration on screws that shares no code with armkin; EAIK and ssik are compared as well where they
-are installed and fit the arm.
+Without a choice all tables are made; `--only TEXT` are robots or classes whose name holds it. The second line asks what
+people ask: round postures, singular surfaces, what is beside them, rounded targets; `--share 0.1` a tenth of them,
+`--seed` other arms of the classes and of right angles. The oracle is a multi-start Newton iteration on screws that
+shares no code with armkin; EAIK and ssik are compared as well where they are installed and fit the arm.
 """
 
 from __future__ import annotations
@@ -237,6 +237,22 @@ def surfaces(share: float, seed: int, only: str) -> None:
             asked(name, label, arm, screw, task, q, oracle.goal(definition, screw, q).array(), 5)
 
 
+def leaving(share: float, seed: int, only: str) -> None:
+    """Postures beside singular surfaces, and on them, but their poses rounded."""
+    print(f"\n{ASKED}")
+    for name, arm, screw, task, _, count in asked_arms(only, seed):
+        definition, _ = solver(arm, task)
+        surfaces = truth.singular_postures(arm, screw, task, max(int(count * share), 1), seed)
+        q, rng = np.concatenate([np.zeros((0, arm.n)), *surfaces.values()]), np.random.default_rng(seed)
+        way = rng.uniform(0.3, 1.0, q.shape) * rng.choice([-1.0, 1.0], q.shape)
+        way *= 10.0 ** rng.uniform(-12, -2, (len(q), 1)) * np.where(arm.prismatic, arm.reach, 1.0)
+        beside = oracle.goal(definition, screw, q + way).array()
+        asked(name, "off by 1e-12 to 1e-2", arm, screw, task, q + way, beside, 5)
+        target = oracle.goal(definition, screw, q).array()
+        for digits in (7, 8) if definition.orientation == "full" else ():
+            asked(name, f"{digits} digits, matrices", arm, screw, task, q, truth.printed(target, digits), 5)
+
+
 def rounded(share: float, seed: int, only: str) -> None:
     print(f"\n{ASKED}")
     for name, arm, screw, task, _, count in asked_arms(only, seed):
@@ -252,7 +268,8 @@ def rounded(share: float, seed: int, only: str) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for choice in ("robots", "classes", "near", "oracle", "postures", "surfaces", "rounded"):
+    choices = ("robots", "classes", "near", "oracle", "postures", "surfaces", "leaving", "rounded")
+    for choice in choices:
         parser.add_argument(f"--{choice}", action="store_true")
     parser.add_argument(
         "--poses", type=int, default=10_000, help="for each robot or class; a tenth for --near and --oracle"
@@ -262,9 +279,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the arms that are asked round postures and surfaces")
     parser.add_argument("--only", default="", help="robots or classes whose name holds this")
     args = parser.parse_args()
-    everything = not (
-        args.robots or args.classes or args.near or args.oracle or args.postures or args.surfaces or args.rounded
-    )
+    everything = not any(getattr(args, choice) for choice in choices)
     if args.robots or everything:
         robots(args.poses, args.only)
     if args.classes or everything:
@@ -273,7 +288,7 @@ def main() -> None:
         near(args.poses // 10, args.only)
     if args.oracle or everything:
         against_oracle(args.poses // 10, args.arms, args.only)
-    for table in (postures, surfaces, rounded):
+    for table in (postures, surfaces, leaving, rounded):
         if getattr(args, table.__name__) or everything:
             table(args.share, args.seed, args.only)
 

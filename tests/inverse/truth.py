@@ -246,6 +246,10 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
         close, straight = apart(a, b).max(axis=1) < CLOSE, alike > 0
         close[close] = _joined(arm, screw, goals.take(k[close]), a[close], b[close])
         straight[straight] = _straight(arm, screw, goals.take(k[straight]), a[straight], b[straight])
+        # `near` that misses by what is rounded may be between two manifolds, and stands for one: it must add no row
+        added = (stands & (miss > SOLVES))[k, i] | (stands & (miss > SOLVES))[k, j]
+        for p in np.flatnonzero(added & (close | straight)):
+            close[p] = straight[p] = armkin.ik(arm, target[k[p]], task).valid.sum() < s.valid[k[p]].sum()
         verdict.twice = np.unique(k[close | straight]).tolist()
     if near is not None:
         standing = np.broadcast_to(near, q.shape)
@@ -380,5 +384,8 @@ def ask_oracle(
             continue
         row_goals = goal_of(s.task, target[row : row + 1]).take(np.zeros(len(branches), int))
         strong = oracle.weakness(screw, row_goals, branches) > 1e-6
-        d = oracle.distance(screw, branches[:, None], s.q[row][None]).min(axis=1, initial=np.inf)
-        verdict.missed += [(int(row), q) for q in branches[strong & (d > 1e-4)]]
+        d = oracle.distance(screw, branches[:, None], s.q[row][None])
+        strong &= d.min(axis=1, initial=np.inf) > 1e-4
+        if strong.any() and s.valid[row].any():  # the other root of a branch is that branch
+            strong &= ~_in_one_component(arm, screw, row_goals, branches, s.q[row, d.argmin(axis=1)])
+        verdict.missed += [(int(row), q) for q in branches[strong]]
