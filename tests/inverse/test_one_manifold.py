@@ -24,6 +24,8 @@ CIRCUIT = [-1.3775657173733071, -0.21475437132500894, -1.3524585503614908, 0.234
            0.7830329160780761]  # fmt: skip
 FLAT = [0.8487981197583796, -1.5834526887369684, 1.617782823941284, 0.3378108023961631, -2.473330274111655,
         -2.4097472431493117]  # fmt: skip
+BENDS = [-0.25593536604020745, -1.74843120996385, 1.6179598106092539, 2.394289170403917, 0.004527652638556409,
+         2.2178298192062207]  # fmt: skip
 
 
 @pytest.mark.parametrize("neighbours", [0, 60])
@@ -111,3 +113,13 @@ def test_an_edge_s_candidate_that_leads_to_another_branch_is_no_second_row() -> 
     arm = armkin.load("ur5e")
     solutions = armkin.ik(arm, targets_in(LABELS["pose"], [[-213.531, 53.1393, 1047.8, -105.174, 28.9358, 48.3678]])[0])
     assert solutions.valid.sum() == 2
+
+
+def test_what_bends_within_a_shortened_span_is_followed_to_its_ends() -> None:
+    """A boundary along which joint 2 moves by 0.098 rad, no self-motion, was two rows on each side of the wrist."""
+    arm = armkin.load("puma560")
+    solutions = armkin.ik(arm, armkin.fk(arm, BENDS))
+    rows = solutions.q[solutions.valid]
+    assert solutions.status == armkin.Status.SINGULAR
+    assert len(rows) == 4
+    np.testing.assert_allclose(np.sort(rows[:, 2]), [1.6175887, 1.6175887, 1.6179598, 1.6179598], atol=1e-6)

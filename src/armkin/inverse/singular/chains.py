@@ -21,14 +21,17 @@ LINKS = 12  # curves on each side of a posture, each as long as the last one let
 def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
     """Which postures others (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
 
-    Those on which the residual grows are followed both ways until they end, or close. Also on which of these (M,) no
-    other curve crosses, and the joints (M, n) that move.
+    Those on which the residual grows, and those that leave a shortened span, are followed both ways until they end, or
+    close: then `at` tells of the latter, too. Also on which of these (M,) no other curve crosses, and the joints (M, n)
+    that move.
     """
     rows = np.arange(len(q))
-    inside = members(at, rows, newton.difference(arm, others, q[:, None]))
+    open_ = ~at.known & at.followed
+    inside = members(at._replace(known=at.known | open_), rows, newton.difference(arm, others, q[:, None]))
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
     grown = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
-    left = np.flatnonzero(at.known & at.manifold & ~ended & (grown > tol.CLOSED) & (at.second > tol.HIGH))
+    open_ |= at.known & at.manifold & ~ended & (grown > tol.CLOSED)
+    left = np.flatnonzero(open_ & (at.second > tol.HIGH))
     if not len(left):
         return inside, ended, ended & at.alone, at.joints
     joints, least, most, alone = at.joints.copy(), at.least.copy(), at.most.copy(), at.alone.copy()
@@ -52,11 +55,13 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
         np.minimum.at(least, own[good], (off + link.least)[good])
         np.maximum.at(most, own[good], (off + link.most)[good])
         np.logical_and.at(alone, own[good], link.alone[good])
+        np.logical_or.at(at.boundary, own[good], link.boundary[good])
         there, onwards = leaves(arm, link, rows, last, way)
         start[going[good]], ahead[going[good]] = there[good], onwards[good]
         done[going] = good & (home | np.isnan(there[:, 0]))
         going = going[~done[going] & (link.second > tol.HIGH)]
-    ended[left] = done.reshape(2, -1).all(axis=0)
-    extent = (most - least)[left]
-    joints[left] = extent > tol.MOVED * extent.max(axis=1)[:, None]
+    extent, ended[left] = (most - least)[left], done.reshape(2, -1).all(axis=0)
+    at.manifold[left] = extent.max(axis=1) >= tol.REACH
+    at.known[left], at.boundary[left] = at.manifold[left] | ended[left], at.boundary[left] & ~at.manifold[left]
+    joints[left] = at.manifold[left, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
     return inside, ended, ended & alone, joints

@@ -170,12 +170,10 @@ class _Groups:
         if one.any():
             i, c = k[one], b[one]
             at = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
-            self.known[i, c], self.moves[i, c] = at.known, at.manifold
+            on, self.ended[i, c], self.alone[i, c], joints = chains.whole(arm, task, at, q[i, c], q[i], target[i])
+            self.known[i, c], self.moves[i, c], self.which[i, c] = at.known, at.manifold, joints
             self.edge[i, c] = at.boundary
             self.place[i, c] = np.where(at.known, len(self.component) + np.arange(len(i)), 0)
-            on, self.ended[i, c], self.alone[i, c], self.which[i, c] = chains.whole(
-                arm, task, at, q[i, c], q[i], target[i]
-            )
             self.component = np.concatenate([self.component, on])
         self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < tol.MOVING)
         self.rank[k, b] += np.where(self.pushed[k, b] | (b == 0), 0.0, 1.0)  # it may be on a component that is known

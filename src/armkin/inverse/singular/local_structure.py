@@ -44,9 +44,10 @@ class Structure(NamedTuple):
     known: (M,) whether the curve was followed far enough to tell. manifold, boundary: (M,) what the component is, if
     neither, an isolated root. joints: (M, n) those that move along a manifold. low, high: (M,) ends of the component
     along v, at most `span` (M,) away, as far as the polynomials hold. least, most: (M, n) how far the joints' ways go
-    between these. longer: (M,) how many times as long a span is likely to hold. alone: (M,) no other curve crosses
-    within the span. v: (M, n). second: (M,) the second smallest singular value. x: (NODES, M, n) coefficients of the
-    joints' ways [rad, reaches] in powers of t / span, g: (NODES, M, k) of the residual.
+    between these. followed: (M,) whether that is on all of the span. longer: (M,) how many times as long a span is
+    likely to hold. alone: (M,) no other curve crosses within the span. v: (M, n). second: (M,) the second smallest
+    singular value. x: (NODES, M, n) coefficients of the joints' ways [rad, reaches] in powers of t / span, g: (NODES,
+    M, k) of the residual.
     """
 
     known: Bool
@@ -58,6 +59,7 @@ class Structure(NamedTuple):
     span: Array
     least: Array
     most: Array
+    followed: Bool
     longer: Array
     alone: Bool
     v: Array
@@ -109,12 +111,12 @@ def _undecided(at: newton.Linear) -> Structure:
     """What Jacobians alone tell of their M postures."""
     r, _, S, V = at
     M, n = len(r), V.shape[2]
-    known, manifold, boundary, alone = np.zeros((4, M), bool)
+    known, manifold, boundary, followed, alone = np.zeros((5, M), bool)
     joints, (low, high), (least, most) = np.zeros((M, n), bool), np.zeros((2, M)), np.zeros((2, M, n))
     v, second, longer = V[:, -1], S[:, n - 2] if n > 1 else np.ones(M), np.ones(M)
     span, lost = 1.2 * tol.REACH / np.abs(v).max(axis=1), r.shape[1] - n + 1  # of fewer joints more are out of reach
     x, g = np.zeros((NODES, M, n)), np.zeros((NODES, M, max(lost, 1)))
-    ends = low, high, span, least, most, longer
+    ends = low, high, span, least, most, followed, longer
     return Structure(known, manifold, boundary, joints, *ends, alone, v, second, x, g)
 
 
@@ -139,7 +141,7 @@ def _follow(
     on, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
     # where another curve is near, that may be the one which Newton's method found
     on &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH * span + tol.SOLUTION / np.maximum(out.second[rows], tol.TINY))
-    some, out.longer[rows] = rows[on], longer
+    some, out.longer[rows], out.followed[rows] = rows[on], longer, on
     if len(some):
         out.x[:, some], out.g[:, some], out.alone[some] = x[:, on], g[:, on], alone[on]
         _decide(out, some)
