@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from itertools import repeat
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
 import typer
 
@@ -16,9 +17,10 @@ from armkin.cli.row_chunks import Chunk, one_row
 from armkin.model import units
 
 if TYPE_CHECKING:
-    from armkin.cli.answers import Pulses
+    from armkin.cli.answers import Pulses, Violation
     from armkin.columns.table import Table
     from armkin.model.arm import Arm
+    from armkin.motors import Best
 
 
 def pulses(
@@ -90,6 +92,37 @@ class Questions:
         return _answers(self.arm, chunk, self.origin, self.best)
 
 
+class _Row(NamedTuple):
+    """What the counts of one target come to; tips [mm]: exact, as the counts have it, and their difference."""
+
+    joints: list[float]
+    pulses: list[int]
+    moves: list[int]
+    actual_joints: list[float]
+    exact_tip: list[float]
+    actual_tip: list[float]
+    tip_error: list[float]
+    error_mm: float
+    violations: list[Violation]
+    beyond_travel: list[bool]  # of each motor, whether its servo cannot turn that far
+
+    def answer(self, of_all: dict[str, Any]) -> Pulses:
+        """The row's object; of_all: what all rows begin with."""
+        tips = {"theoretical": self.exact_tip, "actual": self.actual_tip, "difference": self.tip_error}
+        answer = of_all | {
+            "joints": self.joints,
+            "pulses": self.pulses,
+            "moves": self.moves,
+            "actual_joints": self.actual_joints,
+            "position_mm": tips,
+            "error_mm": self.error_mm,
+            "within_limits": not self.violations,
+            "violations": self.violations,
+            "outside_travel": [m for m, beyond in zip(of_all["motors"], self.beyond_travel, strict=True) if beyond],
+        }
+        return cast("Pulses", answer)
+
+
 def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[Pulses]:
     from armkin.motors import motor_names, outside_travel, pulse_units, resolution
 
@@ -97,59 +130,38 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     best_vectors = armkin.best_pulses(arm, q) if best else None
     rounded = armkin.rounding(arm, q) if best_vectors is None else best_vectors.rounded
     r = rounded if best_vectors is None else best_vectors.chosen
-    moves = (r.pulses - armkin.pulses(arm, units.joints_in(arm, origin))).tolist()
-    actual = units.joints_out(arm, r.actual_joints).tolist()
-    violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
-    in_scene = render.scene_and_tool(arm)
-    too_far = outside_travel(arm, r.pulses)
-    names = motor_names(arm)
-    head, kinds, joint_units = render.head(arm), pulse_units(arm), units.names(arm)
-    steps = units.joints_out(arm, resolution(arm)).tolist()
+    of_all = {
+        "robot": arm.name,
+        "robot_file": arm.path,
+        "robot_sha256": arm.sha256,
+        "motors": motor_names(arm),
+        "pulse_units": pulse_units(arm),
+        "joint_units": units.names(arm),
+        "resolution": units.joints_out(arm, resolution(arm)).tolist(),
+        "from": origin,
+    }
     # Columns of the whole chunk, then plain Python: numpy is slow at single numbers.
-    columns = zip(
-        chunk.values.tolist(),
-        r.pulses.tolist(),
-        moves,
-        actual,
-        (r.theoretical + 0.0).tolist(),
-        (r.actual + 0.0).tolist(),
-        r.difference.tolist(),
-        r.error.tolist(),
-        violations,
-        too_far.tolist(),
-        strict=True,
-    )
-    plain = None if best_vectors is None else list(zip(rounded.pulses.tolist(), rounded.error.tolist(), strict=True))
-    gains = [] if best_vectors is None else best_vectors.gain.tolist()
-    for i, (joints, counts, move, actual_joints, exact, actual_tip, tip_error, error, outside, far) in enumerate(
-        columns
-    ):
-        answer: Pulses = {
-            "robot": head["robot"],
-            "robot_file": head["robot_file"],
-            "robot_sha256": head["robot_sha256"],
-            "motors": names,
-            "pulse_units": kinds,
-            "joint_units": joint_units,
-            "resolution": steps,
-            "from": origin,
-            "joints": joints,
-            "pulses": counts,
-            "moves": move,
-            "actual_joints": actual_joints,
-            "position_mm": {"theoretical": exact, "actual": actual_tip, "difference": tip_error},
-            "error_mm": error,
-            "within_limits": not outside,
-            "violations": outside,
-            "outside_travel": [name for name, beyond in zip(names, far, strict=True) if beyond] if any(far) else [],
-        }
+    moves = r.pulses - armkin.pulses(arm, units.joints_in(arm, origin))
+    tips = r.theoretical + 0.0, r.actual + 0.0, r.difference
+    columns = chunk.values, r.pulses, moves, units.joints_out(arm, r.actual_joints), *tips, r.error
+    violations, beyond_travel = render.violations(arm, chunk.values, q), outside_travel(arm, r.pulses).tolist()
+    rows = map(_Row, *(column.tolist() for column in columns), violations, beyond_travel)
+    beside_best = repeat({}) if best_vectors is None else _rounded(best_vectors)
+    in_scene = render.scene_and_tool(arm)
+    for row, near, plain in zip(rows, render.near_by(arm, q), beside_best, strict=False):
+        answer = row.answer(of_all)
         answer.update(in_scene)
-        answer.update(near[i])
-        if best_vectors is not None and plain is not None:
-            answer["rounded"] = {"pulses": plain[i][0], "error_mm": plain[i][1]}
-            answer["gain_mm"] = gains[i]
-            answer["tried"] = best_vectors.tried
+        answer.update(near)
+        answer.update(plain)
         yield answer
+
+
+def _rounded(best: Best) -> Iterator[Any]:
+    """What plain rounding comes to, beside the best vectors: keys of each row."""
+    for pulses, error, gain in zip(
+        *(x.tolist() for x in (best.rounded.pulses, best.rounded.error, best.gain)), strict=True
+    ):
+        yield {"rounded": {"pulses": pulses, "error_mm": error}, "gain_mm": gain, "tried": best.tried}
 
 
 def _text(arm: Arm, answer: Pulses) -> str:
