@@ -107,59 +107,67 @@ class Cutter:
         it, so that the short form will do.
         """
         aims = [round(c * STEP) + HALF for c in counts]
-        owed = [before - place for before, place in zip(self._aims, self.places, strict=True)]
-        if make_up is not None:
-            least = seconds * self.clock / self.min_interval  # one unit a tick: less cannot be said
-            most_owed = [least + make_up * abs(aim - before) for aim, before in zip(aims, self._aims, strict=True)]
-            owed = [round(max(-most, min(most, x))) for x, most in zip(owed, most_owed, strict=True)]
-        left = [aim - before + x for aim, before, x in zip(aims, self._aims, owed, strict=True)]
+        owed = self._owed(aims, seconds, make_up)
+        ways = [aim - before + x for aim, before, x in zip(aims, self._aims, owed, strict=True)]
         self._aims = aims
-        most = max(map(abs, left), default=0) / STEP  # steps of the fastest motor
+        steps = max(map(abs, ways), default=0) / STEP  # of the fastest motor
         exact = seconds * self.clock + self.late
         if unheard:
-            ticks = self._tick_count(exact, most)
-            segment = Segment(ticks, round(exact / ticks), 0, tuple(round(x / ticks / COARSE) * COARSE for x in left))
+            ticks = self._tick_count(exact, steps)
+            segment = Segment(ticks, round(exact / ticks), 0, tuple(round(x / ticks / COARSE) * COARSE for x in ways))
         elif abs(change) < _STEADY:
-            segment = self._steady_segment(exact, left, most, drift)
+            segment = self._steady_segment(exact, ways, steps, drift)
         else:
-            segment = self._ramp_segment(exact, left, most, change)
-        least = self.min_interval + (self.min_interval // 4 if segment.quick else 0)  # as the board wants it
-        short = least - min(segment.interval, segment.last_interval)
-        if short > 0:
-            segment = replace(segment, interval=segment.interval + short)
+            segment = self._ramp_segment(exact, ways, steps, change)
+        segment = self._no_shorter(segment)
         self.places = [p + segment.ticks * r for p, r in zip(self.places, segment.rates, strict=True)]
         # What the shortest interval costs is not made up for.
         self.late = min(exact - cycles_of(segment), float(segment.ticks))
         return segment
 
-    def _steady_segment(self, exact: float, remainders: Sequence[int], most: float, drift: float) -> Segment:
-        """One speed for `exact` cycles; remainders: (motors,) 2^-23 step, most: the fastest's steps."""
-        ticks = self._tick_count(exact, most)
-        if ticks > _SLOW * most or _rounding_drift(ticks, remainders) > drift:
+    def _owed(self, aims: list[int], seconds: float, make_up: float | None) -> list[int]:
+        """How far the motors are behind the pieces before, as much as this one makes up for: see `piece`."""
+        owed = [before - place for before, place in zip(self._aims, self.places, strict=True)]
+        if make_up is None:
+            return owed
+        finest = seconds * self.clock / self.min_interval  # one unit a tick: less cannot be said
+        most = [finest + make_up * abs(aim - before) for aim, before in zip(aims, self._aims, strict=True)]
+        return [round(max(-limit, min(limit, x))) for x, limit in zip(owed, most, strict=True)]
+
+    def _no_shorter(self, segment: Segment) -> Segment:
+        """The segment with no interval shorter than the board makes."""
+        shortest = self.min_interval + (self.min_interval // 4 if segment.quick else 0)
+        lacking = shortest - min(segment.interval, segment.last_interval)
+        return replace(segment, interval=segment.interval + lacking) if lacking > 0 else segment
+
+    def _steady_segment(self, exact: float, remainders: Sequence[int], steps: float, drift: float) -> Segment:
+        """One speed for `exact` cycles; remainders: (motors,) 2^-23 step, steps: of the fastest."""
+        ticks = self._tick_count(exact, steps)
+        if ticks > _SLOW * steps or _rounding_drift(ticks, remainders) > drift:
             ticks = _exact_ticks(ticks, remainders)
         interval, add = round(exact / ticks), 0
         if ticks > 1 and exact > _EVEN * self.clock:
             interval, add = _evenly_spread(exact, ticks)
         return Segment(ticks, interval, add, _rounded_rates(remainders, ticks))
 
-    def _ramp_segment(self, exact: float, remainders: Sequence[int], most: float, change: float) -> Segment:
+    def _ramp_segment(self, exact: float, remainders: Sequence[int], steps: float, change: float) -> Segment:
         """A piece whose speed changes evenly, see `piece`: as many ticks as the board makes, as `bend` has 16 bits."""
         fast = (1 + abs(change) / 2) * self.min_interval
         shortest = exact / (16 * change**2 * exact) ** (1 / 3)  # [cycles] of a tick, for the quick bend to have 16 bits
         ticks = int(exact / max(_TICK_QUICK * fast, min(_TICK_S * self.clock, shortest)))
         quick = (
-            most <= ticks <= _QUICK[0] and ticks > 1 and abs(_fit_parabola(exact, ticks, change, True)[2]) >= _QUICK[1]
+            steps <= ticks <= _QUICK[0] and ticks > 1 and abs(_fit_parabola(exact, ticks, change, True)[2]) >= _QUICK[1]
         )
         if not quick:
             fewer, ticks = ticks, int(exact / max(_TICK * fast, _TICK_S * self.clock, exact / _MOST))
-            if ticks > 1 and most <= _QUICK[0] < fewer and abs(_fit_parabola(exact, ticks, change, False)[2]) == _BEND:
+            if ticks > 1 and steps <= _QUICK[0] < fewer and abs(_fit_parabola(exact, ticks, change, False)[2]) == _BEND:
                 quick, ticks = True, _QUICK[0]  # else it would end faster than the board loads the next one
-        ticks = max(1, ticks, math.ceil(most), math.ceil(exact / _LONGEST))
+        ticks = max(1, ticks, math.ceil(steps), math.ceil(exact / _LONGEST))
         ratio = (2 + abs(change)) / (2 - abs(change))
         above = 0.53 * (ratio - 1) ** 2 + (0 if quick else 1.5 * BLOCK / ticks * abs(change))
         change *= max(_LESS, min(1.0, _ACCEL / (1 + above)))
-        if most >= 4 and (over := int(ticks / most)) <= _WHOLE:
-            ticks = max(round(over * most), math.ceil(most))
+        if steps >= 4 and (over := int(ticks / steps)) <= _WHOLE:
+            ticks = max(round(over * steps), math.ceil(steps))
         elif ticks > _CHOICE:
             spread = range(ticks - min(ticks // _CHOICE, _CHOICES), ticks + 1)
             ticks = min(spread, key=lambda t: _fit_parabola(exact, t, change, quick)[3])
