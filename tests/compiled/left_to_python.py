@@ -14,7 +14,7 @@ from armkin.inverse import solve
 def left_to_python(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many targets Python is asked, call by call, from now on."""
     counts: list[int] = []
-    answered = solve.answered
+    answered = solve.solve_by
 
     def counted(
         arm: armkin.Arm, task: Any, geometry: Any, targets: np.ndarray, *others_given: Any, **named: Any
@@ -22,5 +22,5 @@ def left_to_python(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         counts.append(len(targets))
         return answered(arm, task, geometry, targets, *others_given, **named)
 
-    monkeypatch.setattr(solve, "answered", counted)
+    monkeypatch.setattr(solve, "solve_by", counted)
     return counts

@@ -313,6 +313,6 @@ def test_where_joint_3_has_no_real_root_no_joint_is_free(monkeypatch: pytest.Mon
     beside, angle = rng.uniform(10.0, 150.0, 500), rng.uniform(-3.0, 3.0, 500)
     wrist = np.column_stack([beside * np.cos(angle), beside * np.sin(angle), rng.uniform(300.0, 500.0, 500)])
     T[:, :3, 3] = wrist + 263.0 * T[:, :3, 2]
-    monkeypatch.setattr(edges, "examined", None)  # takes 50 ms a target
+    monkeypatch.setattr(edges, "examine_targets", None)  # takes 50 ms a target
     s = armkin.ik(arm, T)
     assert (s.status == Status.UNREACHABLE).all()

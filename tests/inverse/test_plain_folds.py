@@ -64,7 +64,7 @@ def test_branches_that_are_not_examined_are_what_examining_finds(name: str, monk
     rng = np.random.default_rng(9)
     q = np.concatenate([beside_folds(arm), rng.integers(-4, 4, (24, arm.n)) * np.pi / 4])
     target = np.asarray(targets_of(task_for(arm), armkin.fk(arm, q), q))
-    short, doubts, count = armkin.ik(arm, target), edges._doubts, 0
+    short, doubts, count = armkin.ik(arm, target), edges._doubted_targets, 0
 
     def all_examined(*arguments: Any) -> Any:
         nonlocal count
@@ -72,7 +72,7 @@ def test_branches_that_are_not_examined_are_what_examining_finds(name: str, monk
         count += doubted.simple.sum()
         return doubted._replace(simple=np.zeros_like(doubted.simple))
 
-    monkeypatch.setattr(edges, "_doubts", all_examined)
+    monkeypatch.setattr(edges, "_doubted_targets", all_examined)
     long = armkin.ik(arm, target)
     assert count > 0
     for field in ("status", "valid", "free", "complete", "branch"):
@@ -88,7 +88,7 @@ def test_what_two_jacobians_tell_is_what_examining_finds(
     name: str, task: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arm = armkin.load(name)
-    chosen_task, tell, told_count = task_for(arm, task), folds.tell, 0
+    chosen_task, tell, told_count = task_for(arm, task), folds.decide_folds, 0
     rng = np.random.default_rng(12)
     q = np.concatenate([beside_folds(arm, 80), rng.uniform(-np.pi, np.pi, (40, arm.n))])
     q[80:110, arm.n - 2] = rng.choice([-1.0, 1.0], 30) * np.geomspace(1e-6, 1e-3, 30)
@@ -101,9 +101,9 @@ def test_what_two_jacobians_tell_is_what_examining_finds(
         told_count += len(arguments[3].rows) - len(left)
         return left
 
-    monkeypatch.setattr(chunks, "tell", counted)
+    monkeypatch.setattr(chunks, "decide_folds", counted)
     short = armkin.ik(arm, target, task)
-    monkeypatch.setattr(chunks, "tell", lambda goals, runner, out, at: at.rows)
+    monkeypatch.setattr(chunks, "decide_folds", lambda goals, runner, out, at: at.rows)
     long = armkin.ik(arm, target, task)
     assert told_count > 20
     assert {0, 1} <= set(short.status.tolist())

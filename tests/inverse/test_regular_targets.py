@@ -17,7 +17,7 @@ from armkin.inverse.closed.candidates import recorded
 from armkin.inverse.numeric import newton
 from armkin.inverse.singular import components
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.tasks.task import moved, targets_of
+from armkin.inverse.tasks.task import shifted_targets, targets_of
 from armkin.model.arm import Arm
 
 NAMES = ["three_dof", "planar_3dof", "cobra600", "ra02", "labvolt_5150", "puma560", "ur5e", "irb2400", "stanford"]
@@ -112,7 +112,7 @@ def test_a_little_beyond_a_stretched_arm_is_proved_unreachable(name: str, monkey
         assert S[-1] < 1e-9 < 1e-3 < S[-2]
         for size in (1e-6, 1e-5, 1e-4):
             shift = np.resize(U[:, -1], 6) * (np.arange(6) < len(U)) * size
-            two_sides = [armkin.ik(arm, moved(arm, task, target, sign * shift)) for sign in (1.0, -1.0)]
+            two_sides = [armkin.ik(arm, shifted_targets(arm, task, target, sign * shift)) for sign in (1.0, -1.0)]
             assert sorted(bool(solutions.valid.any()) for solutions in two_sides) == [False, True]
             beyond = next(solutions for solutions in two_sides if not solutions.valid.any())
             assert beyond.status[0] == Status.UNREACHABLE

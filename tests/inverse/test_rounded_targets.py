@@ -10,7 +10,7 @@ import armkin
 import right_angles
 from armkin import Status
 from armkin.errors import UsageError
-from armkin.inverse.answers.rounding import of_targets, printed
+from armkin.inverse.answers.rounding import of_targets, printed_rounding
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LABELS
 from armkin.model.target_numbers import targets_out
@@ -155,7 +155,7 @@ def test_a_rounding_that_is_none_is_refused(wrong: float | list[float]) -> None:
 
 def test_printed_decimals_are_counted_from_the_third_on() -> None:
     rows = np.array([[390.0, 400.5, 12.25], [390.125, 0.0, 0.0], [0.123456, -2.5, 1.0 / 3.0]])
-    rounding = printed(["mm", "mm", "deg"], rows, 1000.0)
+    rounding = printed_rounding(["mm", "mm", "deg"], rows, 1000.0)
     np.testing.assert_allclose(
         rounding,
         [
@@ -168,7 +168,9 @@ def test_printed_decimals_are_counted_from_the_third_on() -> None:
 
 
 def test_zeros_that_are_printed_count_and_the_halves_of_angles_add() -> None:
-    rounding = printed(["mm", "mm", "deg", "deg"], np.array([[345.04, 400.0, 28.675, 0.0]]), 1000.0, [[3, 1, 4, 4]])
+    rounding = printed_rounding(
+        ["mm", "mm", "deg", "deg"], np.array([[345.04, 400.0, 28.675, 0.0]]), 1000.0, [[3, 1, 4, 4]]
+    )
     np.testing.assert_allclose(rounding, np.hypot(0.5e-6, np.radians(1e-4)))
 
 

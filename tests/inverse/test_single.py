@@ -26,7 +26,7 @@ FIELDS = [f.name for f in fields(armkin.Solutions)]
 
 def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutions | None:
     """One target by the short way, and a check that it is as in a batch."""
-    single = one_target.prepared(arm, None)
+    single = one_target.short_way(arm, None)
     assert single is not None
     alone = single.solve(target, near)
     batch = armkin.ik(arm, target[None], near=None if near is None else near[None])
@@ -83,7 +83,7 @@ def test_what_is_not_plain_is_left_to_the_batch() -> None:
     arm = shipped("puma560")[0]
     T = armkin.fk(arm, np.full(6, 0.3))
     rounded = T.round(8)
-    single = one_target.prepared(arm, None)
+    single = one_target.short_way(arm, None)
     assert single is not None
     assert single.solve(T, None) is not None
     assert single.solve(rounded, None) is None  # made a rotation first

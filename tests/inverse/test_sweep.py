@@ -49,13 +49,13 @@ def test_each_value_is_prepared_once_for_all_rows() -> None:
 
 def test_branches_kept_do_not_grow_with_the_values(monkeypatch: pytest.MonkeyPatch) -> None:
     counts: list[int] = []
-    add = choose_branch._Found.add
+    add = choose_branch._SweptTarget.add
 
-    def noted(collected: choose_branch._Found, *arguments: Any) -> None:
+    def noted(collected: choose_branch._SweptTarget, *arguments: Any) -> None:
         add(collected, *arguments)
         counts.append(len(collected.branches))
 
-    monkeypatch.setattr(choose_branch._Found, "add", noted)
+    monkeypatch.setattr(choose_branch._SweptTarget, "add", noted)
     request = replace(SWEPT, swept={"q1": [0.0, 10.0, 20.0, 30.0, 40.0] * 40})
     [*_, most] = sorted(answer.total for answer in choose_branch.solve(request, TARGETS[:6]))
     assert most > 60

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.inverse.branches.tracking import follow
+from armkin.inverse.branches.tracking import follow_branches
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 
@@ -98,7 +98,7 @@ def test_the_order_of_the_answers_does_not_matter() -> None:
     order = np.argsort(rng.random((50, 5)), axis=1)
     shuffled = np.take_along_axis(q, order[:, :, None], axis=1)
     target = armkin.fk(arm, q[:, 0])
-    number = follow(arm, task, shuffled, target)
+    number = follow_branches(arm, task, shuffled, target)
     unshuffled = np.take_along_axis(number, np.argsort(order, axis=1), axis=1)
     assert (unshuffled == unshuffled[0]).all()
 

@@ -11,7 +11,7 @@ from test_every_branch import shipped
 import armkin
 from armkin.errors import UsageError
 from armkin.formula import arrays
-from armkin.inverse.run.workers import shared
+from armkin.inverse.run.workers import share_rows
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 
@@ -49,7 +49,7 @@ def test_a_chunk_gives_what_a_longer_one_gives(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize(("workers", "least", "step"), [(1, 10, 1), (2, 10, 1), (3, 256, 256), (16, 1, 1)])
 def test_every_row_is_given_once_and_in_order(workers: int, least: int, step: int) -> None:
-    rows = shared(lambda rows: list(range(rows.start, rows.stop)), 1000, workers, least, step)
+    rows = share_rows(lambda rows: list(range(rows.start, rows.stop)), 1000, workers, least, step)
     assert [row for part in rows for row in part] == list(range(1000))
     assert all(part[0] % step == 0 for part in rows)
 

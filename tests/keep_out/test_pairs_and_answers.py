@@ -183,7 +183,7 @@ def test_the_refusal_has_fields() -> None:
     arm = armkin.load("three_dof", scene=BENCH)
     request = choose_branch.Request(arm=arm)
     [answer] = choose_branch.solve(request, np.array([[300.0, 0.0, -100.0]]))
-    error = choose_branch.refusal(request, answer, 0.0)
+    error = choose_branch.refusal_error(request, answer, 0.0)
     assert isinstance(error, NoBranchError)
     assert [hit["with"] for hit in error.fields["hits"]] == ["floor", "table"]
     ignoring = choose_branch.Request(arm=arm, ignore=True)

@@ -19,7 +19,7 @@ EXIT_CODES: dict[type[errors.ArmkinError], int] = {
     errors.FileError: RUNTIME,
     errors.RobotFileError: ROBOT_FILE,
     errors.UsageError: USAGE,
-    errors.NoSolutionError: NO_SOLUTION,  # no pose, or none within the limits: `inverse.choose_branch.refusal`
+    errors.NoSolutionError: NO_SOLUTION,  # no pose, or none within the limits: `inverse.choose_branch.refusal_error`
     errors.MissingExtraError: RUNTIME,
     errors.ClusterError: RUNTIME,
     errors.LinkError: LINK,

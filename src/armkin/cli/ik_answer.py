@@ -129,7 +129,7 @@ def _branch_json(request: choose_branch.Request, branch: choose_branch.Branch, t
 
     if branch.interval is not None:
         row["family"] = {
-            "joint": redundant_joint(choose_branch.locked(request), request.task),
+            "joint": redundant_joint(choose_branch.locked_arm(request), request.task),
             "interval": [*branch.interval],
         }
     if turns:

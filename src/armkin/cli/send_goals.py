@@ -63,14 +63,14 @@ def _of_target(arm: Arm, target: str, target_options: TargetOptions) -> Goals:
     """`--target`, which is solved when it is known where the arm stands."""
     import numpy as np
 
-    from armkin.inverse.answers.rounding import printed
+    from armkin.inverse.answers.rounding import printed_rounding
     from armkin.inverse.tasks.choose_task import task_for
 
     chosen_task = task_for(arm, target_options.task)
     values = np.array([arguments.target_list(arm, chosen_task, target)])
     close = None if target_options.near is None else arguments.joint_list(arm, target_options.near, "--near")
     shown = [[decimal_count(word) for word in target.split(",")]]
-    rounding = printed(label_units(chosen_task.labels), values, arm.reach, shown)
+    rounding = printed_rounding(label_units(chosen_task.labels), values, arm.reach, shown)
     held = lock_and_sweep.locked_values(arm, target_options.lock)
     return Goals(
         None,
@@ -126,10 +126,10 @@ class Goals:
         )
         [answer] = choose_branch.solve(request, self.target, self.rounding)  # type: ignore[arg-type]
         if answer.best is None and answer.within_limits and answer.refused is None:
-            raise choose_branch.blocked(request, answer)
+            raise choose_branch.blocked_error(request, answer)
         if answer.best is None:
             [nearest] = choose_branch.closest(request, self.target)  # type: ignore[arg-type]
-            raise choose_branch.refusal(request, answer, nearest.distance)
+            raise choose_branch.refusal_error(request, answer, nearest.distance)
         return answer.branches[answer.best].q[None]
 
 

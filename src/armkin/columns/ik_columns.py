@@ -16,7 +16,7 @@ from armkin.columns.table import Table, Words, joined
 from armkin.formula.arrays import numbers_within
 from armkin.inverse import choose_branch
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.branches.names import find
+from armkin.inverse.branches.names import find_branches
 from armkin.inverse.numeric.tolerances import EQUAL
 from armkin.inverse.tasks.residuals import residual
 from armkin.model import limits, units
@@ -50,14 +50,14 @@ def columns(
     """
     arm, near = request.arm, units.joints_in(request.arm, request.near_out)
     kept = [i for i, name in enumerate(arm.joint_names) if name not in request.held]
-    s = request.ik(choose_branch.locked(request), targets, request.task, near=near[kept], **more)
+    s = request.ik(choose_branch.locked_arm(request), targets, request.task, near=near[kept], **more)
     q, within = s.q, s.within_limits
     if request.held:
         values = units.joints_in(arm, [request.held.get(name, 0.0) for name in arm.joint_names])
         q = unlock(arm, {name: values[arm.joint_names.index(name)] for name in request.held}, s.q)
         within = within & ~limits.outside(arm, q).any(axis=-1)
     free = within & s.clear if arm.keep_out else within
-    names = () if request.branch is None else find(s.names, request.branch)
+    names = () if request.branch is None else find_branches(s.names, request.branch)
     parts = [
         _listed(request, _Answers(s, slice(i, i + BLOCK), q, within, free, near, names), rows, all_branches, quick)
         for i in range(0, max(len(q), 1), BLOCK)

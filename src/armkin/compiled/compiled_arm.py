@@ -22,10 +22,10 @@ from armkin.inverse import solve
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.branches.tracking import follow
+from armkin.inverse.branches.tracking import follow_branches
 from armkin.inverse.numeric.tolerances import FAR, SOLUTION
 from armkin.inverse.redundant.families import families
-from armkin.inverse.run.workers import check, shared
+from armkin.inverse.run.workers import check_workers, share_rows
 from armkin.inverse.singular import near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
@@ -150,7 +150,7 @@ class CompiledArm:
             The branches, as `armkin.ik` returns them.
         """
         if workers != 1:
-            check(workers)
+            check_workers(workers)
         return (self._tasks.get(task) or self._library_for(task)).ik(targets, near, workers, rounding)
 
     def _any_library(self) -> _CompiledTask:
@@ -271,7 +271,7 @@ class _CompiledTask:
         if self.arm.prismatic.any():
             batch.complete[distance(self.arm, self.task, target) > FAR] = False
         if not self.geometry.ordered:
-            batch.branch[...] = follow(self.arm, self.task, batch.q, target)
+            batch.branch[...] = follow_branches(self.arm, self.task, batch.q, target)
 
     def _without_a_form(self, targets: ArrayLike, near: ArrayLike | None, stated: ArrayLike | None) -> Solutions:
         """As `armkin.ik`; of an arm with a redundant joint the others by machine code."""
@@ -319,7 +319,7 @@ class _CompiledTask:
             return int(self._batch(count, target[rows].ctypes.data, close.ctypes.data, step, read, *pointers))
 
         least = WORTH if self.geometry.pairs is not None else WORTH // 64
-        left = sum(shared(part, len(target), workers, least))
+        left = sum(share_rows(part, len(target), workers, least))
         if left and not read and (batch.state == UNREAD).any():
             return None
         batch.complete[...] = self.geometry.complete
@@ -340,7 +340,7 @@ class _CompiledTask:
         for part, geometry in ((rows[sure], self._in_c and self._in_c.geometry), (rows[~sure], self.geometry)):
             if len(part) and geometry:
                 close, of_rows = near[part] if len(near) > 1 else near[0], None if rounding is None else rounding[part]
-                batch.write(part, solve.answered(self.arm, self.task, geometry, target[part], close, rounding=of_rows))
+                batch.write(part, solve.solve_by(self.arm, self.task, geometry, target[part], close, rounding=of_rows))
 
     def _place_branches(self, batch: Results, target: Array) -> None:
         """Branches that C has found in the order and with the indices of the class that they are named after."""
@@ -375,7 +375,7 @@ class _CompiledTask:
         """A calibrated arm, by way of its actual joint values."""
         inner = compile(self.turned, self.name)
         close = solve._actual_near(self.arm, near)
-        return solve._commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=stated))
+        return solve._as_commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=stated))
 
 
 def _of_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = True, **options: Any) -> Solutions:

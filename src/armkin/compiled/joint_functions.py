@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from armkin import forward
 from armkin.formula.arrays import Array
-from armkin.inverse.run.workers import shared
+from armkin.inverse.run.workers import share_rows
 from armkin.keep_out.clearance import Clearance, clearance, least_clearances, named_clearance
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class JointFunctions:
             pointers = (a[rows].ctypes.data for a in (flat, results, wild))
             return int(call(rows.stop - rows.start, *pointers))
 
-        if sum(shared(part, len(flat), workers, WORTH)):
+        if sum(share_rows(part, len(flat), workers, WORTH)):
             far = np.flatnonzero(wild)
             results[far] = python(self.arm, flat[far])
         return results.reshape(*values.shape[:-1], *shape)

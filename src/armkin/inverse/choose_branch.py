@@ -22,7 +22,7 @@ from armkin.forward import fk
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.closest import closest_each as nearest_poses
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.branches.names import find
+from armkin.inverse.branches.names import find_branches
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.branches.whole_turns import turns as copies_of
 from armkin.inverse.numeric import tolerances as tol
@@ -113,15 +113,15 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
         raise UsageError(message, combinations=count, most=MOST_SWEEPS)
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
-    collected = [_Found() for _ in targets]
+    collected = [_SweptTarget() for _ in targets]
     more: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
     for held in _held_combinations(request):
         one, goals = without_held(arm, request.task, held, targets)
         s = request.ik(one, goals, request.task, near=near[_kept_joints(arm, held)], **more)
         wanted_names = set(s.names)
         if request.branch is not None:
-            wanted_names = {s.names[i] for i in find(s.names, request.branch)}
-        for i, answer in enumerate(_answers(request, held, s, near)):
+            wanted_names = {s.names[i] for i in find_branches(s.names, request.branch)}
+        for i, answer in enumerate(_answers_of_call(request, held, s, near)):
             collected[i].add(int(s.status[i]), answer, wanted_names)
             if not request.every and len(collected[i].branches) > _THIN:
                 collected[i].thin_out(request)
@@ -138,19 +138,19 @@ def most_targets(request: Request) -> int:
     return max(_MOST_ANSWERS // combinations(request), 1) if request.every else _MOST_ANSWERS
 
 
-def locked(request: Request) -> Arm:
+def locked_arm(request: Request) -> Arm:
     """The arm that is solved: the joints that are neither held nor swept."""
     held = {**request.held, **{name: values[0] for name, values in request.swept.items()}}
     return arm_without(request.arm, tuple(_held_values(request.arm, held).items()))
 
 
-def prepared(request: Request) -> Arm:
-    """As `locked`, or one arm for all values that a redundant joint is held at: its targets are others."""
+def prepared_arm(request: Request) -> Arm:
+    """As `locked_arm`, or one arm for all values that a redundant joint is held at: its targets are others."""
     free = redundant_alone(request.arm, request.task, request.held)
-    return locked(request) if free is None else free.rest
+    return locked_arm(request) if free is None else free.rest
 
 
-def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Request, Answer]]:
+def follow_targets(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Request, Answer]]:
     """Answers of targets along a path, each compared with the one before instead of one pose for all.
 
     Yields the request that holds for each target (its `near` is the best branch of the target before) and the
@@ -159,21 +159,21 @@ def continued(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Req
     held = [request.arm.joint_names.index(name) for name in (*request.held, *request.swept)]
     for answer in answers:
         near = units.joints_in(request.arm, request.near_out)
-        nearer = (_nearer(request.arm, branch, near, held) for branch in answer.branches)
+        nearer = (_nearest_copy(request.arm, branch, near, held) for branch in answer.branches)
         branches = sorted(nearer, key=partial(_rank, request))
         names = tuple(dict.fromkeys(branch.name for branch in branches))
         wanted_names = set(names)
         if request.branch is not None:
             with suppress(UsageError):  # none of that name reaches this target
-                wanted_names = {names[i] for i in find(names, request.branch)}
+                wanted_names = {names[i] for i in find_branches(names, request.branch)}
             wanted_names = wanted_names if answer.best is not None else set()
-        best = _best(request, [(branch, branch.name in wanted_names) for branch in branches])
+        best = _best_branch(request, [(branch, branch.name in wanted_names) for branch in branches])
         yield request, answer._replace(branches=branches, best=best)
         if best is not None:
             request = replace(request, near=branches[best].joints)
 
 
-def _nearer(arm: Arm, branch: Branch, near: Array, held: Sequence[int]) -> Branch:
+def _nearest_copy(arm: Arm, branch: Branch, near: Array, held: Sequence[int]) -> Branch:
     """The copy of a branch nearest to a pose (n,); held joints stay."""
     rows, _ = nearest_row(arm, branch.q[None], near[None])
     q = rows[0]
@@ -204,7 +204,7 @@ def turns(request: Request, branch: Branch) -> list[list[float]]:
     return [list(row) for row in units.joints_out(arm, copies[same]).tolist()]
 
 
-def refusal(request: Request, answer: Answer, distance: float) -> NoSolutionError:
+def refusal_error(request: Request, answer: Answer, distance: float) -> NoSolutionError:
     """Why an answer has no best branch; distance: how far away the nearest pose within limits is [mm]."""
     arm = request.arm
     away = f"the nearest pose within limits is {distance:.4f} mm away"
@@ -216,11 +216,11 @@ def refusal(request: Request, answer: Answer, distance: float) -> NoSolutionErro
     if answer.refused is not None:
         return NoBranchError(answer.refused if legal else f"{answer.refused}; {away}", **fields)
     if legal:
-        return blocked(request, answer)
+        return blocked_error(request, answer)
     return NoBranchError(f"no branch is within limits; {away}", **fields)
 
 
-def blocked(request: Request, answer: Answer) -> NoBranchError:
+def blocked_error(request: Request, answer: Answer) -> NoBranchError:
     """That every branch within limits hits something, and what."""
     words = {f"{b.name or 'it'} {hits_text(list(b.hits))}": b.hits for b in answer.branches if b.within_limits}
     return NoBranchError(
@@ -232,7 +232,7 @@ def blocked(request: Request, answer: Answer) -> NoBranchError:
     )
 
 
-def _best(request: Request, branches: Sequence[tuple[Branch, bool]]) -> int | None:
+def _best_branch(request: Request, branches: Sequence[tuple[Branch, bool]]) -> int | None:
     """Of branches, each with whether it is wanted, the first one within limits and free; where hits are ignored and
     none is, with hits."""
     free = (i for i, (branch, named) in enumerate(branches) if named and branch.may_be_taken)
@@ -256,7 +256,7 @@ def _kept_joints(arm: Arm, held: Mapping[str, float]) -> list[int]:
     return [i for i, name in enumerate(arm.joint_names) if name not in held]
 
 
-def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array) -> Iterator[Answer]:
+def _answers_of_call(request: Request, held: dict[str, float], s: Solutions, near: Array) -> Iterator[Answer]:
     """The answers of one solver call, for the whole arm."""
     arm = request.arm
     q = unlock(arm, held, s.q) if held else s.q
@@ -295,7 +295,7 @@ def _answers(request: Request, held: dict[str, float], s: Solutions, near: Array
 
 
 @dataclass
-class _Found:
+class _SweptTarget:
     """What the swept values of one target have come to so far."""
 
     best: tuple[int, Answer] | None = None  # the best status, and the first answer with it
@@ -332,10 +332,10 @@ class _Found:
         assert self.best is not None
         first = self.best[1]
         ranked = sorted(self.branches, key=lambda item: _rank(request, item[0]))
-        best = _best(request, ranked)
+        best = _best_branch(request, ranked)
         refused = None
         if request.branch is not None and best is None:
-            refused = _refused(request, [branch for branch, named in ranked if named])
+            refused = _refusal_reasons(request, [branch for branch, named in ranked if named])
         status = first.status
         if request.position_first and best is not None:
             row = ranked[best][0]
@@ -360,7 +360,7 @@ def _rank(request: Request, branch: Branch) -> tuple[bool, bool, float, float]:
     return not branch.within_limits, hit, turned, round(branch.motion, tol.EQUAL)
 
 
-def _refused(request: Request, named: Sequence[Branch]) -> str:
+def _refusal_reasons(request: Request, named: Sequence[Branch]) -> str:
     """What keeps the branches of the name asked for from being taken: they are outside limits, or hit something."""
     if not named:
         return f"no branch called '{request.branch}' reaches this target"

@@ -18,10 +18,10 @@ from armkin.formula.array_tuples import replace_rows, rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
 from armkin.inverse.answers import rounding as target_rounding
-from armkin.inverse.answers.batch import Batch, Goals, Seeds, as_solutions, empty, pack
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, as_solutions, empty_batch, pack_branches
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.branches.tracking import follow
+from armkin.inverse.branches.tracking import follow_branches
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.elimination.merge import projection
@@ -30,13 +30,13 @@ from armkin.inverse.redundant.families import families
 from armkin.inverse.redundant.position_first import position_first as minima
 from armkin.inverse.run import chunks
 from armkin.inverse.run import single as one_target
-from armkin.inverse.run.edges import examined
-from armkin.inverse.run.workers import check, shared
+from armkin.inverse.run.edges import examine_targets
+from armkin.inverse.run.workers import check_workers, share_rows
 from armkin.inverse.singular import legal_postures, near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.inverse.tasks.task import Task, around, distance, read_near, read_targets, shaped
+from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets, targets_around
 from armkin.model.arm import Arm, actual
 
 WORTH = 256  # poses of an elimination that are worth a thread, and of which its own chunks are
@@ -81,7 +81,7 @@ def ik(
     ('left, elbow up', [10.1529, 44.656, -46.5354])
     """
     if workers != 1:
-        check(workers)
+        check_workers(workers)
     free = redundancy(arm, task)
     values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
     if (
@@ -90,22 +90,22 @@ def ik(
         and examine
         and free is None
         and (values.ndim == 1 or values.shape == (4, 4))  # a batch prepares nothing for one
-        and (short_way := one_target.prepared(arm, task)) is not None
-        and (alone := short_way.solve(values, near)) is not None
+        and (way := one_target.short_way(arm, task)) is not None
+        and (alone := way.solve(values, near)) is not None
     ):
         return alone
     if (turned := actual(arm)) is not arm:
         more: dict[str, Any] = {"examine": examine, "workers": workers, "position_first": position_first}
         s = ik(turned, targets, task, near=_actual_near(arm, near), rounding=rounding, **more)
-        return _commanded(arm, s)
+        return _as_commanded(arm, s)
     if position_first:
         return minima(ik, arm, task, targets, near)
     if free is not None:
         return families(ik, arm, free, targets, near, rounding)
-    return answered(arm, *solver(arm, task), values, near, single, examine, workers, rounding)
+    return solve_by(arm, *solver(arm, task), values, near, single, examine, workers, rounding)
 
 
-def answered(  # noqa: C901 - what is looked at after the closed form, in its order
+def solve_by(  # noqa: C901 - what is looked at after the closed form, in its order
     arm: Arm,
     task: Task,
     geometry: Geometry,
@@ -118,7 +118,7 @@ def answered(  # noqa: C901 - what is looked at after the closed form, in its or
 ) -> Solutions:
     """`ik` by a solver, of an arm whose joints move as they are commanded; single: whether the targets were given in
     float32."""
-    targets, lead = shaped(task, values)
+    targets, lead = flat_targets(task, values)
     close = read_near(arm, near, lead)
     is_shared = close.ndim == 1 and len(targets) != 1
     nears = np.broadcast_to(close, (len(targets), arm.n)) if is_shared else close.reshape(-1, arm.n)
@@ -144,7 +144,7 @@ def answered(  # noqa: C901 - what is looked at after the closed form, in its or
     if arm.prismatic.any():
         batch.complete[distance(arm, task, target) > tol.FAR] = False
     if not geometry.ordered:
-        batch.branch[...] = follow(arm, task, batch.q, target)
+        batch.branch[...] = follow_branches(arm, task, batch.q, target)
     names = branch_names(arm, task, geometry, count)
     names += tuple(f"branch {i + 1}" for i in range(count, batch.q.shape[1]))
     return as_solutions(goals, close, lead, batch, shown, (names, geometry.name, geometry.why))
@@ -164,7 +164,7 @@ def columns(
     return chunks.columns(arm, definition, geometry, targets, kept)
 
 
-def isolated(arm: Arm, targets: ArrayLike, task: str | None = None, **more: Any) -> Solutions:
+def isolated_branches(arm: Arm, targets: ArrayLike, task: str | None = None, **more: Any) -> Solutions:
     """`ik` for those who follow single branches: raises RedundantArmError where the answers of a target are curves."""
     solver(actual(arm), task)
     return ik(arm, targets, task, **more)
@@ -176,7 +176,7 @@ def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
     return close * arm.ratio if close is not None and close.shape[-1:] == (arm.n,) else close
 
 
-def _commanded(arm: Arm, solved: Solutions) -> Solutions:
+def _as_commanded(arm: Arm, solved: Solutions) -> Solutions:
     """Solutions in actual joint values as those in commanded ones."""
     q, near, interval, task = solved.q / arm.ratio, solved.near / arm.ratio, solved.interval, solved.task.name
     if interval is not None and (free := redundancy(arm, task)) is not None:
@@ -203,10 +203,10 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     assert geometry.rows is not None
     arm, task, target, near = goals
     solve = (geometry.unmoved if examine else None) or geometry.rows
-    parts = shared(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
+    parts = share_rows(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
     q, doubt, complete, lost, guesses = stack_rows(parts)
     B = q.shape[1]
-    batch = empty(len(target), B, arm.n)
+    batch = empty_batch(len(target), B, arm.n)
     batch.q[...], inside = nearest_row(arm, q, near[:, None, :])
     batch.valid[...] = ~np.isnan(q).any(axis=2)
     batch.within[...] = inside & batch.valid
@@ -215,7 +215,7 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     count = batch.valid.sum(axis=1)
     batch.status[count == 0] = Status.UNREACHABLE
     for rows in arrays.slices(len(count), arrays.CHUNK):
-        pack(rows_of(batch, rows), count[rows])
+        pack_branches(rows_of(batch, rows), count[rows])
     if examine:
         doubt[near_itself.take(goals, batch, near_itself.reached(arm, task, target, position(arm, near)))] = True
     doubted = np.flatnonzero(doubt)
@@ -228,12 +228,12 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
 
             They say nothing of an end of the workspace, beside which no target is reached, and of self-motions.
             """
-            candidates = solve(around(arm, task, target).reshape(-1, *target.shape[1:])).q
+            candidates = solve(targets_around(arm, task, target).reshape(-1, *target.shape[1:])).q
             candidates = candidates.reshape(len(target), -1, arm.n)
             return candidates, np.arange(candidates.shape[1]) % max(B, 1), lost
 
         unsettled = np.zeros(len(target), bool) if lost is None else lost
-        batch = examined(goals, batch, doubted, seeds, others, unsettled)
+        batch = examine_targets(goals, batch, doubted, seeds, others, unsettled)
         order = projection(arm.prismatic, batch.q[doubted]).argsort(axis=1)  # one order, whatever was found first
         for array in (batch.q, batch.valid, batch.within, batch.branch):
             table = array[doubted]

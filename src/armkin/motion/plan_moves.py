@@ -15,8 +15,8 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.branches.names import find
-from armkin.inverse.solve import isolated as ik
+from armkin.inverse.branches.names import find_branches
+from armkin.inverse.solve import isolated_branches as ik
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside, outside_text
@@ -342,7 +342,7 @@ def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
     """Joint values of a target on all branches within limits, or on the named one, the nearest first."""
     target = path_pieces.line(walk.task, goal, goal).targets(np.zeros(1))[0]
     solutions = ik(walk.arm, target, walk.task.name, near=walk.q)
-    numbers = find(solutions.names, branches) if (branches := branch or walk.options.branch) else None
+    numbers = find_branches(solutions.names, branches) if (branches := branch or walk.options.branch) else None
     free = solutions.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
     good = solutions.valid & solutions.within_limits & (True if free is None else free)
     named = [b for b in solutions.order if numbers is None or solutions.branch[b] in numbers]

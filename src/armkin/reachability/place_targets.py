@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.solve import columns, ik, isolated
+from armkin.inverse.solve import columns, ik, isolated_branches
 from armkin.inverse.tasks.task import Task
 from armkin.model.lock_joints import lock, unlock
 from armkin.model.rotation import rotation_about
@@ -307,7 +307,7 @@ def _on_one_branch(question: Question, position: Array, yaws: NDArray[np.bool_])
     """At which of some yaws (K,) one branch carries all targets."""
     arm, K = question.arm, question.yaws
     if question.by_arcs:
-        s = isolated(arm, targets_from(question, position, 0.0), question.task.name)
+        s = isolated_branches(arm, targets_from(question, position, 0.0), question.task.name)
         carries, low, high = place_branches.branch_ranges(s, s.valid)
         allowed = carries & place_branches.some_copy_legal(arm, low, high, range(1, arm.n))
         first, length = place_branches.branch_arc(arm, low[:, 0], high[:, 0], K, question.sense)
@@ -331,7 +331,7 @@ def free_from(
 ) -> tuple[Solutions, NDArray[np.bool_]]:
     """The branches of all targets from one place, and which are free (N, B); legal_only: and within limits."""
     # of a family every posture is an answer, but what one branch carries is another
-    find = question.solve if legal_only else isolated
+    find = question.solve if legal_only else isolated_branches
     s = find(question.arm, targets_from(question, position, turn), question.task.name)
     legal = s.within_limits if legal_only else s.valid
     if question.arm.keep_out:

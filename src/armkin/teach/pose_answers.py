@@ -116,7 +116,7 @@ def _branches_json(arm: Arm, question: Question, quick: QuickIk | None) -> dict[
     shown = units.joints_out(arm, question.q).tolist()
     held = {name: shown[arm.joint_names.index(name)] for name in question.held}
     request = choose_branch.Request(arm=arm, near=shown, held=held, ik=quick.ik if quick else ik)
-    prepared = choose_branch.prepared(request)
+    prepared = choose_branch.prepared_arm(request)
     task, why = _solvable_task(prepared)
     if task is None:
         return {"task": None, "why": why, "branches": [], "status": None}

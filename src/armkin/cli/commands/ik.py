@@ -128,7 +128,7 @@ def _request_with_solver(request: choose_branch.Request, task: str, *, compiled:
     from armkin.inverse.redundant.position_first import check as position_first_is_for
 
     if request.position_first:
-        position_first_is_for(choose_branch.locked(request), task)
+        position_first_is_for(choose_branch.locked_arm(request), task)
     if not compiled:
         return request
     compiled_ik.build_library(request.arm, task)
@@ -164,9 +164,9 @@ def _single_target(
     with output.destination(out, "one answer is", output.TEXT) as write:
         write(f"{render.to_json(answer)}\n" if json else ik_text.text(request.arm, answer))
     if answer["best"] is None and answer["closest"] is None:
-        raise choose_branch.blocked(request, answer_set)
+        raise choose_branch.blocked_error(request, answer_set)
     if answer["best"] is None and answer["closest"] is not None:
-        raise choose_branch.refusal(request, answer_set, answer["closest"]["distance_mm"])
+        raise choose_branch.refusal_error(request, answer_set, answer["closest"]["distance_mm"])
 
 
 def _reached_targets(arm: Arm, task: Task, joints: list[list[float]]) -> list[list[float]]:
@@ -181,7 +181,7 @@ def _decimal_rounding(arm: Arm, task: Task, values: Array, decimals: list[list[i
     """How far targets (N, m) [mm, deg] may be off by the decimals that they are printed with; decimals: how many."""
     from armkin.inverse.answers import rounding as target_rounding
 
-    return target_rounding.printed(label_units(task.labels), values, arm.reach, decimals)
+    return target_rounding.printed_rounding(label_units(task.labels), values, arm.reach, decimals)
 
 
 @dataclass
@@ -263,7 +263,7 @@ class Questions:
             targets = targets_in(self.task.labels, part)
             answers = choose_branch.solve(self.request, targets, _decimal_rounding(self.request.arm, self.task, part))
             requests = (
-                choose_branch.continued(self.request, answers)
+                choose_branch.follow_targets(self.request, answers)
                 if self.continuous
                 else ((self.request, answer_set) for answer_set in answers)
             )

@@ -84,7 +84,7 @@ class Batch(NamedTuple):
     complete: Bool
 
 
-def empty(N: int, B: int, n: int) -> Batch:
+def empty_batch(N: int, B: int, n: int) -> Batch:
     """Room for N targets with B branches of n joints, written by whoever solves them."""
     valid, within = np.empty((2, N, B), bool)
     branch, status, free = np.empty((N, B), np.int8), np.zeros(N, np.int8), np.zeros((N, n), bool)
@@ -106,15 +106,15 @@ def as_solutions(
     return Solutions(arm, task, target, close, q, valid, within, branch, status, free, *text, complete, rounding)
 
 
-def write(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> Batch:
-    """Write branches (K, W, n) of some targets, with labels (K, W) as `named`, at their nearest legal copies, nan
-    behind; the same batch, or where they need more columns a wider one."""
+def write_branches(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> Batch:
+    """Write branches (K, W, n) of some targets, with labels (K, W) as `complete_labels`, at their nearest legal copies,
+    nan behind; the same batch, or where they need more columns a wider one."""
     if q.shape[1] > batch.q.shape[1]:
-        batch = stack_rows([batch, empty(0, q.shape[1], arm.n)])
+        batch = stack_rows([batch, empty_batch(0, q.shape[1], arm.n)])
     width, label = q.shape[1], np.where(valid, label, -1)
     ordered = np.sort(label, axis=1)
     if ((label < 0) & valid).any() or ((np.diff(ordered) == 0) & (ordered[:, 1:] >= 0)).any():
-        label = named(label, valid)
+        label = complete_labels(label, valid)
     copies, inside = nearest_row(arm, np.nan_to_num(q), near[:, None, :])
     batch.q[rows], batch.valid[rows], batch.within[rows], batch.branch[rows] = np.nan, False, False, -1
     batch.q[rows, :width] = np.where(valid[:, :, None], copies, np.nan)
@@ -124,7 +124,7 @@ def write(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, label: Int, 
     return batch
 
 
-def named(label: Int, valid: Bool) -> Int:
+def complete_labels(label: Int, valid: Bool) -> Int:
     """Labels (K, W) with the smallest free number for branches that have none, or one of another."""
     out = np.where(valid, label, -1)
     for row in np.flatnonzero(((label < 0) & valid).any(axis=1) | (np.diff(np.sort(out, axis=1)) == 0).any(axis=1)):
@@ -136,7 +136,7 @@ def named(label: Int, valid: Bool) -> Int:
     return out
 
 
-def pack(part: Batch, count: Int) -> None:
+def pack_branches(part: Batch, count: Int) -> None:
     """Move the branches of targets, count (N,) of them, to the front, nan behind."""
     B, most = part.valid.shape[1], int(count.max(initial=0))
     rows = np.flatnonzero(count < most)

@@ -21,7 +21,7 @@ from armkin.model.units import radian_or_reach
 
 POOL = 4000  # postures within limits of which each target starts from the nearest
 STARTS = 14  # of them
-STEPS = 10  # of `thorough`
+STEPS = 10  # of `closest_from_every_start`
 Rounds = tuple[tuple[int, int], ...]  # steps, and how many starts go on after them
 ROUNDS: Rounds = (3, 6), (7, 3)
 AT_ONCE = 256  # targets worked on together
@@ -91,7 +91,7 @@ def closest_each(
     return [nearest for part in parts for nearest in _of_chunk(arm, definition, goal[part], close[part])]
 
 
-def thorough(arm: Arm, task: Task, target: Array, near: Array) -> Closest:
+def closest_from_every_start(arm: Arm, task: Task, target: Array, near: Array) -> Closest:
     """The nearest pose of one target, (1, m) or (1, 4, 4), from every start; near: (1, n)."""
     return _of_chunk(arm, task, target, near, ((STEPS, STARTS // 3),))[0]
 
@@ -100,7 +100,7 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     """The nearest poses of targets (N, m) or (N, 4, 4); near: (N, n)."""
     N, n = near.shape
     pool, features = _pool(arm, task)
-    goal = _features(arm, task, target)
+    goal = _target_features(arm, task, target)
     apart = (features * features).sum(axis=1) - 2.0 * (goal @ features.T)  # and the goal's own square
     nearest = np.argpartition(apart, STARTS, axis=1)[:, :STARTS]
     nearest.sort(axis=1)
@@ -109,11 +109,11 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     for steps, going in rounds:
         every = starts.shape[1]
         goals = np.repeat(target, every, axis=0)
-        q = _descend(arm, task, starts.reshape(-1, n).copy(), goals, steps)
+        q = _descend_by_damped_steps(arm, task, starts.reshape(-1, n).copy(), goals, steps)
         order = np.argsort(_cost(arm, task, q, goals).reshape(N, every), axis=1, kind="stable")[:, :going]
         starts = np.take_along_axis(q.reshape(N, every, n), order[:, :, None], axis=1)
     goals = np.repeat(target, going, axis=0)
-    q, converged = _finish(arm, task, starts.reshape(-1, n), goals)
+    q, converged = _finish_by_newton(arm, task, starts.reshape(-1, n), goals)
     cost = _cost(arm, task, q, goals).reshape(N, going)
     moved = np.abs((q.reshape(N, going, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
     equal = cost <= cost.min(axis=1, keepdims=True) * (1 + tol.EQUAL_COST) + tol.NO_COST
@@ -132,7 +132,7 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     ]
 
 
-def spread(arm: Arm, rng: np.random.Generator, count: int) -> Array:
+def random_postures(arm: Arm, rng: np.random.Generator, count: int) -> Array:
     """Random postures (count, n) within limits; where a joint has none within half a turn, or a reach, of home."""
     span = np.where(arm.prismatic, arm.reach, np.pi)
     low = np.where(np.isfinite(arm.lower), arm.lower, np.minimum(-span, arm.home - span))
@@ -142,12 +142,12 @@ def spread(arm: Arm, rng: np.random.Generator, count: int) -> Array:
 
 @lru_cache(maxsize=16)
 def _pool(arm: Arm, task: Task) -> tuple[Array, Array]:
-    """Postures spread within limits (P, n), and what is compared of them with targets: see `_features`."""
-    q = spread(arm, np.random.default_rng(11), POOL)
-    return q, _features(arm, task, targets_of(task, fk(arm, q), q))
+    """Postures spread within limits (P, n), and what is compared of them with targets: see `_target_features`."""
+    q = random_postures(arm, np.random.default_rng(11), POOL)
+    return q, _target_features(arm, task, targets_of(task, fk(arm, q), q))
 
 
-def _features(arm: Arm, task: Task, target: Array) -> Array:
+def _target_features(arm: Arm, task: Task, target: Array) -> Array:
     """Numbers (N, f) of targets whose distance is about that of what is minimised."""
     full = task.orientation == "full"
     point = target[:, :3, 3] if full else target[:, : task.position]
@@ -160,7 +160,7 @@ def _features(arm: Arm, task: Task, target: Array) -> Array:
     return np.concatenate(parts, axis=1)
 
 
-def _weighted(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
+def _weighted_residual(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
     """Residual and Jacobian with lengths in units of the reach and angles weighing a quarter of it."""
     r, J = newton.scaled(arm, task, q, target)
     r[:, task.position :] *= 0.25
@@ -168,18 +168,18 @@ def _weighted(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Arr
     return r, J
 
 
-def _downhill(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+def _downhill_direction(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Half the negative gradient of the squared residual (M, n), joints in rad or reaches."""
-    r, J = _weighted(arm, task, q, target)
+    r, J = _weighted_residual(arm, task, q, target)
     return np.asarray((r[:, None] @ J)[:, 0])
 
 
-def _stopped(arm: Arm, q: Array, downhill: Array) -> Bool:
+def _stopped_joints(arm: Arm, q: Array, downhill: Array) -> Bool:
     """Joints that stand on a limit and would go beyond."""
     return ((q <= arm.lower) & (downhill < 0)) | ((q >= arm.upper) & (downhill > 0))
 
 
-def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]:
+def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]:
     """Newton's method with the full Hessian (differences of the gradient), and whether a minimum was reached.
 
     Far beyond the reach the residual is large and Levenberg-Marquardt alone creeps.
@@ -190,10 +190,10 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]
     active = np.arange(len(q))
     for _ in range(40):
         points, goal = q[active], target[active]
-        downhill = _downhill(arm, task, points, goal)
-        free = ~_stopped(arm, points, downhill)
+        downhill = _downhill_direction(arm, task, points, goal)
+        free = ~_stopped_joints(arm, points, downhill)
         around = (points[:, None, :] + shifts).reshape(-1, n)
-        slopes = _downhill(arm, task, around, np.repeat(goal, 2 * n, axis=0)).reshape(len(points), 2, n, n)
+        slopes = _downhill_direction(arm, task, around, np.repeat(goal, 2 * n, axis=0)).reshape(len(points), 2, n, n)
         H = -(slopes[:, 0] - slopes[:, 1]) / (2 * tol.GRADIENT_WAY)
         H = 0.5 * (H + np.swapaxes(H, 1, 2))
         free_pairs = free[:, :, None] & free[:, None, :]
@@ -223,16 +223,16 @@ def _finish(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]
     return q, converged
 
 
-def _descend(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> Array:
+def _descend_by_damped_steps(arm: Arm, task: Task, q: Array, target: Array, steps: int) -> Array:
     """Projected Levenberg-Marquardt on all starts at once."""
     unit = radian_or_reach(arm)
     damping = np.full(len(q), 1e-2)
     cost = _cost(arm, task, q, target)
     active = np.arange(len(q))
     for _ in range(steps):
-        r, J = _weighted(arm, task, q[active], target[active])
+        r, J = _weighted_residual(arm, task, q[active], target[active])
         downhill = (r[:, None] @ J)[:, 0]
-        held = _stopped(arm, q[active], downhill)
+        held = _stopped_joints(arm, q[active], downhill)
         J = np.where(held[:, None, :], 0.0, J)
         H = J.swapaxes(1, 2) @ J + damping[active][:, None, None] * np.eye(arm.n)
         step = np.linalg.solve(H, np.where(held, 0.0, downhill)[:, :, None])[:, :, 0]

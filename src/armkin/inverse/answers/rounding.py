@@ -82,10 +82,10 @@ def last_place_of_position(p: Array) -> Array:
     p = np.where(np.abs(p) < tol.SOLUTION, 0.0, p)  # what is that small is rounding
     size = np.floor(np.log10(np.maximum(np.abs(p), tol.SOLUTION)))
     half = np.zeros(len(p))
-    typed = _whole(p * 10.0 ** (FEWEST - 1)) & _whole(p * 10.0 ** (PRINTED - 2 - size))
+    typed = _are_whole(p * 10.0 ** (FEWEST - 1)) & _are_whole(p * 10.0 ** (PRINTED - 2 - size))
     left = np.flatnonzero(~typed.all(axis=1))
     for digits in range(PRINTED, MOST):
-        fits = _whole(p[left] * 10.0 ** (digits - 1 - size[left])).all(axis=1)
+        fits = _are_whole(p[left] * 10.0 ** (digits - 1 - size[left])).all(axis=1)
         half[left[fits]] = 0.5 * 10.0 ** (size[left[fits]].max(axis=1) + 1 - digits)
         left = left[~fits]
     single = left[(p[left] == p[left].astype(np.float32)).all(axis=1)]
@@ -105,7 +105,7 @@ def last_place(R: Array) -> Array:
     for digits in range(COARSEST, MOST):
         numbers = entries[left]
         size = np.floor(np.log10(np.maximum(np.abs(numbers), tol.FEW_DIGITS)))
-        fits = (_whole(numbers * 10.0 ** (digits - 1 - size)) | (np.abs(numbers) < tol.FEW_DIGITS)).all(axis=1)
+        fits = (_are_whole(numbers * 10.0 ** (digits - 1 - size)) | (np.abs(numbers) < tol.FEW_DIGITS)).all(axis=1)
         half[left[fits]] = 0.5 * 10.0**-digits
         left = left[~fits]
         if not len(left):
@@ -113,7 +113,7 @@ def last_place(R: Array) -> Array:
     return half
 
 
-def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLike | None = None) -> Array:
+def printed_rounding(units: Sequence[str], values: Array, reach: float, decimals: ArrayLike | None = None) -> Array:
     """The rounding (N,) [reaches, rad] of targets as they are printed, (N, m) in units ("mm", "deg", "").
 
     Half the last decimal of each number that has three or more; 390 and 400.0 are exact. decimals (N, m): how many are
@@ -122,8 +122,8 @@ def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLi
     """
     values = np.asarray(values, float).reshape(-1, len(units))
     if decimals is None:  # all numbers of a row have as many: there are no more sizes than decimals
-        sizes = printed(units, values[:0], reach, np.repeat(np.arange(MOST)[:, None], len(units), axis=1))
-        blocks = [_needed(values[start : start + BLOCK]).max(axis=1) for start in range(0, len(values), BLOCK)]
+        sizes = printed_rounding(units, values[:0], reach, np.repeat(np.arange(MOST)[:, None], len(units), axis=1))
+        blocks = [_needed_decimals(values[start : start + BLOCK]).max(axis=1) for start in range(0, len(values), BLOCK)]
         return np.asarray(sizes[np.concatenate([np.zeros(0, np.intp), *blocks])])
     halves = _HALF.take(np.asarray(decimals, int).reshape(-1, len(units)), mode="clip")
     angles = np.array([unit == "deg" for unit in units])
@@ -136,20 +136,20 @@ def printed(units: Sequence[str], values: Array, reach: float, decimals: ArrayLi
 _HALF = np.where(np.arange(300) < FEWEST, 0.0, 0.5 * 10.0 ** -np.arange(300.0))
 
 
-def _needed(values: Array) -> Int:
+def _needed_decimals(values: Array) -> Int:
     """How many decimals numbers (N, m) need: 0 below FEWEST, and for numbers that need MOST, which are not rounded."""
     needed = np.zeros(values.size, np.intp)
     number = values.ravel()
-    left = np.flatnonzero(~_whole(number * 10.0 ** (FEWEST - 1)))
+    left = np.flatnonzero(~_are_whole(number * 10.0 ** (FEWEST - 1)))
     for decimals in range(FEWEST, MOST):
         if not len(left):
             break
-        fits = _whole(number[left] * 10.0**decimals)
+        fits = _are_whole(number[left] * 10.0**decimals)
         needed[left[fits]] = decimals
         left = left[~fits]
     return needed.reshape(values.shape)
 
 
-def _whole(scaled: Array) -> Bool:
+def _are_whole(scaled: Array) -> Bool:
     """Which numbers are integers but for rounding."""
     return np.asarray(np.abs(scaled - np.rint(scaled)) <= tol.DECIMAL * np.maximum(np.abs(scaled), 1.0))

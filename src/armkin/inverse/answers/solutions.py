@@ -109,7 +109,7 @@ class Solutions:
     @cached_property
     def order(self) -> Int:
         """(..., B) branches by rank: within limits first, of them free ones, then by motion, missing ones last."""
-        key = _rounded(np.where(self.valid, self._rank, np.inf))
+        key = _rounded_motion(np.where(self.valid, self._rank, np.inf))
         by_motion = np.argsort(key, axis=-1, kind="stable")
         outside = ~np.take_along_axis(self.within_limits, by_motion, axis=-1)
         if self.arm.keep_out:
@@ -125,7 +125,7 @@ class Solutions:
         key = np.where(legal, self._rank, np.inf)
         if not key.shape[-1]:  # no target of the batch has a branch
             return np.full(self.status.shape, -1)
-        index = np.argmin(_rounded(key), axis=-1)
+        index = np.argmin(_rounded_motion(key), axis=-1)
         return np.where(np.isfinite(np.min(key, axis=-1)), index, -1)
 
     def residual(self) -> tuple[Array, Array]:
@@ -147,7 +147,7 @@ class Solutions:
         return mm, rad
 
 
-def _rounded(motion: Array) -> Array:
+def _rounded_motion(motion: Array) -> Array:
     """How much more than the least (..., B) of each target, inf where there is none: equal if rounding explains it."""
     least = motion.min(axis=-1, initial=np.inf, keepdims=True)
     return (motion - np.where(np.isfinite(least), least, 0.0)).round(tol.EQUAL)

@@ -35,7 +35,7 @@ from armkin.model.joint_chain import Chain, axes
 from armkin.model.rotation import joint_motion
 
 WORDS = {"shoulder": ("left", "right"), "elbow": ("elbow up", "elbow down"), "wrist": ("no flip", "flip")}
-# what people also say, for `find`
+# what people also say, for `find_branches`
 _SYNONYMS = {
     "left angle": "left", "right angle": "right", "front": "left", "back": "right", "lefty": "left", "righty": "right",
     "upper elbow": "elbow up", "lower elbow": "elbow down", "elbow upper": "elbow up", "elbow lower": "elbow down",
@@ -50,7 +50,7 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
     named = int(np.prod(sizes)) if geometry.labels else 0
     if not named or named != (geometry.branches or count) or named > count:
         return tuple(f"branch {i + 1}" for i in range(count))
-    swap = _swapped(arm, task, geometry, sizes)
+    swap = _swapped_names(arm, task, geometry, sizes)
     names = []
     for signs in itertools.product(*(range(s) for s in sizes)):
         words = (WORDS[k][i ^ int(swap[k][signs])] for k, i in zip(geometry.labels, signs, strict=True) if k)
@@ -58,7 +58,7 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
     return (*names, *(f"branch {i + 1}" for i in range(named, count)))
 
 
-def _swapped(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -> dict[str, Bool]:
+def _swapped_names(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -> dict[str, Bool]:
     """Of each word of the class on which branches (b0, b1, b2) the second of its two names is the first sign's."""
     postures, q, valid = _sample_postures(arm, task, geometry)
     shape = (len(q), *sizes)
@@ -91,25 +91,25 @@ def _elbow_swapped(arm: Arm, q: Array, valid: Bool, shape: tuple[int, ...]) -> B
     return swapped
 
 
-def find(names: tuple[str, ...], phrase: str) -> list[int]:
+def find_branches(names: tuple[str, ...], phrase: str) -> list[int]:
     """Indices of the branches that a name means; its words may come in any order, and not all of them.
 
     Raises UsageError, which lists the names, if there are none.
 
-    >>> find(("left, elbow up", "left, elbow down", "right, elbow up"), "upper elbow, left angle")
+    >>> find_branches(("left, elbow up", "left, elbow down", "right, elbow up"), "upper elbow, left angle")
     [0]
     """
     text = " ".join(phrase.lower().replace(",", " ").replace("/", " ").replace("-", " ").split())
     if text in (name.replace(",", "") for name in names):
         return [i for i, name in enumerate(names) if name.replace(",", "") == text]
-    parts, unknown = _parts(text)
+    parts, unknown = _branch_words(text)
     hits = [i for i, name in enumerate(names) if parts and all(p in name.split(", ") for p in parts)]
     if unknown or not hits:
         raise UsageError(f"no branch is called '{phrase}'; this arm's are: {'; '.join(names)}")
     return hits
 
 
-def _parts(text: str) -> tuple[list[str], list[str]]:
+def _branch_words(text: str) -> tuple[list[str], list[str]]:
     """The words of branch names that a text holds, or synonyms of them, and what it holds besides."""
     for synonym, meant in _SYNONYMS.items():
         text = f" {text} ".replace(f" {synonym} ", f" {meant} ").strip()
@@ -158,7 +158,7 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     """Height of the elbow in every branch, and a measure, low where the arm reaches far out and level: (M, B)."""
     shape = q.shape[:2]
     flat = np.nan_to_num(q.reshape(-1, arm.n))
-    points = _points(arm, flat)
+    points = _joint_origins(arm, flat)
     _, directions = axes(Chain(arm.link, arm.prismatic))
     if abs(directions[min(arm.n, 3) - 1, 2]) >= 0.9:  # the elbow's axis is along the base's z
         # in the base's plane: to the left of the way from the first joint to the tool
@@ -174,7 +174,7 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), tol.NO_LENGTH)).reshape(shape)
 
 
-def _points(arm: Arm, q: Array) -> Array:
+def _joint_origins(arm: Arm, q: Array) -> Array:
     """Origins of joints 1, 2, ... and of what follows joint 3: (M, up to 4, 3)."""
     P = np.broadcast_to(arm.link[0], (len(q), 4, 4))
     points = [P[:, :3, 3]]

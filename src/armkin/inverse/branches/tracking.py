@@ -20,7 +20,7 @@ CLOSE = 0.2  # [rad or reaches] a branch may move this far from one target to th
 CLEAR = 1.5  # and its second best partner must be this many times as far away
 
 
-def follow(arm: Arm, task: Task, q: Array, target: Array) -> Int:
+def follow_branches(arm: Arm, task: Task, q: Array, target: Array) -> Int:
     """A number for every branch, the same along a path.
 
     q: (N, B, n) [rad | mm] branches of N targets (N, m) or (N, 4, 4) in their order, nan past the
@@ -36,7 +36,7 @@ def follow(arm: Arm, task: Task, q: Array, target: Array) -> Int:
     rows = 1 + np.flatnonzero(_is_path(arm, task, target)) if N > 1 and B > 1 else np.zeros(0, np.intp)
     for start in range(0, len(rows), CHUNK):
         part = rows[start : start + CHUNK]
-        for k, before in zip(part.tolist(), _links(arm, q[part], q[part - 1]), strict=True):
+        for k, before in zip(part.tolist(), _linked_branches(arm, q[part], q[part - 1]), strict=True):
             linked = before >= 0
             numbers[k] = np.where(linked, numbers[k - 1][before], -1)
             if not linked.all():
@@ -60,7 +60,7 @@ def _is_path(arm: Arm, task: Task, target: Array) -> Bool:
     return np.asarray(np.abs(moved).max(axis=1) < CLOSE)
 
 
-def _links(arm: Arm, after: Array, before: Array) -> Int:
+def _linked_branches(arm: Arm, after: Array, before: Array) -> Int:
     """For every branch of targets (M, B, n) its partner at the target before, or -1: (M, B)."""
     apart = newton.distances(arm, after, before)
     apart[np.isnan(apart)] = np.inf

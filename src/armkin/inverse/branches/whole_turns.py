@@ -34,7 +34,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
         return value, (value >= lower - SLACK) & (value <= upper + SLACK)
     if lower >= -np.pi and upper <= np.pi:
         # the principal value is the only one that can be legal, but for half a turn, which has two
-        value, low, high = _principal(value), lower - SLACK, upper + SLACK
+        value, low, high = _principal_values(value), lower - SLACK, upper + SLACK
         if low <= -np.pi or high >= np.pi:
             value = _half_turned(value, near, low, high)
         if low <= -np.pi and high >= np.pi:
@@ -43,7 +43,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
     at_zero = isinstance(near, float) and near == 0.0
     original = value
     if at_zero:
-        value = _principal(value)
+        value = _principal_values(value)
     else:
         turned = np.asarray((near + HALF) - value)  # one array for all steps: it stays in the cache
         turned /= TURN
@@ -68,11 +68,11 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
         value, above = np.where(fits, moved, value), above & ~fits
     outside = below | above
     if not at_zero and outside.any():
-        value = np.where(outside, _principal(original), value)
+        value = np.where(outside, _principal_values(original), value)
     return value, ~outside
 
 
-def _principal(value: Array) -> Array:
+def _principal_values(value: Array) -> Array:
     """Values in [-pi, pi]; half a turn, which has two, as the positive one."""
     if value.min(initial=0.0) >= SLACK - np.pi:
         return value

@@ -18,7 +18,7 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2, spin
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.tasks.task import Task, moved
+from armkin.inverse.tasks.task import Task, shifted_targets
 from armkin.model.arm import Arm
 
 FEW = 8  # targets that plain Python does sooner than arrays
@@ -181,7 +181,7 @@ class Recorded:
         offsets = np.concatenate([rng.uniform(-1, 1, (FREED, n)) * unit, np.zeros((SHAKEN, n))])
         goals = np.repeat(target[:, None], len(offsets), axis=1)
         for k in range(FREED, len(offsets)):
-            goals[:, k] = moved(self.arm, self.task, target, tol.SHAKE * rng.uniform(-1, 1, 6))
+            goals[:, k] = shifted_targets(self.arm, self.task, target, tol.SHAKE * rng.uniform(-1, 1, 6))
         q, miss = self._at(goals, near[:, None] + offsets)
         return _each_once(np.where((miss < tol.HOPELESS**2)[..., None], q, np.nan))
 

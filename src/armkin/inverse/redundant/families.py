@@ -31,7 +31,7 @@ from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, mot
 from armkin.inverse.redundant.other_joints import Follower, Ik
 from armkin.inverse.redundant.traced_families import Traced, traced
 from armkin.inverse.solvers.redundant import Redundancy, moved, nearly_closed
-from armkin.inverse.tasks.task import Task, distance, read_near, read_targets, shaped
+from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets
 from armkin.keep_out.clearance import hits_nothing
 from armkin.model import units
 from armkin.model.arm import Arm, actual
@@ -62,7 +62,7 @@ def families(
     close = read_near(arm, near, lead)
     nears = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
     angle_class = arm_angle(arm) if free.joint else None
-    numbers = (shaped(task, values)[0], defect)
+    numbers = (flat_targets(task, values)[0], defect)
     roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
     stands = (newton.missing(arm, task, nears, goal) <= most) & ~outside(arm, nears).any(axis=1)
     rows = _Rows(arm, free.joint, nears, stands)
@@ -92,7 +92,7 @@ def _with_tool_turn(
 ) -> Solutions:
     """The branches of the others, which the redundant joint's motion leaves as they are: each is a family."""
     r = free.joint
-    lead = shaped(free.task, arrays.real_array(targets, "targets"))[1]
+    lead = flat_targets(free.task, arrays.real_array(targets, "targets"))[1]
     close = read_near(arm, near, lead)
     s = ik(free.rest, targets, free.task.name, near=np.delete(close, r, axis=-1), rounding=rounding)
     close = np.broadcast_to(close, (*lead, arm.n)).copy()

@@ -17,7 +17,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array, Int, slices
 from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
-from armkin.inverse.answers.batch import Goals, as_solutions, empty
+from armkin.inverse.answers.batch import Goals, as_solutions, empty_batch
 from armkin.inverse.answers.closest import Closest
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
@@ -70,7 +70,7 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
     if arm.keep_out:
         lists = [minima[np.argsort(~hits_nothing(arm, minima), kind="stable")] for minima in lists]
     B = max(map(len, lists), default=0)
-    batch = empty(len(goal), B, arm.n)
+    batch = empty_batch(len(goal), B, arm.n)
     batch.q[...], batch.branch[...], batch.status[...], batch.complete[...] = np.nan, -1, Status.UNREACHABLE, False
     for row, branch, minima in zip(batch.q, batch.branch, lists, strict=True):
         row[: len(minima)], branch[: len(minima)] = minima, np.arange(len(minima))
@@ -151,7 +151,7 @@ def _pool(arm: Arm) -> tuple[Array, Array]:
     A joint in four is on a limit: so are those of many minima.
     """
     rng = np.random.default_rng(12)
-    q = closest.spread(arm, rng, POOL)
+    q = closest.random_postures(arm, rng, POOL)
     limit = np.where(rng.random(q.shape) < 0.5, arm.lower, arm.upper)
     q = np.where((rng.random(q.shape) < ON_LIMIT) & np.isfinite(limit), limit, q)
     return q, position(arm, q)

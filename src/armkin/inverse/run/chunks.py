@@ -14,15 +14,15 @@ from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import position
-from armkin.inverse.answers.batch import Batch, Goals, empty, pack
+from armkin.inverse.answers.batch import Batch, Goals, empty_batch, pack_branches
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
 from armkin.inverse.closed.candidates import entries, recorded
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.run.edges import AT_ONCE, decided
-from armkin.inverse.run.folds import Doubted, tell
-from armkin.inverse.run.workers import shared
+from armkin.inverse.run.edges import AT_ONCE, decide_edges
+from armkin.inverse.run.folds import Doubted, decide_folds
+from armkin.inverse.run.workers import share_rows
 from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
 from armkin.model.arm import Arm
@@ -40,7 +40,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
     """
     runner, N = recorded(arm, task, geometry), len(raw)
     step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts: one set of buffers serves all
-    batch = empty(N, math.prod(runner.axes), arm.n)
+    batch = empty_batch(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(raw), np.zeros(N)
     tip = None if common is None else position(arm, common)
 
@@ -69,7 +69,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
                 left.append(edge._replace(rows=start + edge.rows))
         return left
 
-    parts = [part(slice(0, N))] if workers == 1 else shared(part, N, workers, step, step)
+    parts = [part(slice(0, N))] if workers == 1 else share_rows(part, N, workers, step, step)
     doubted = [chunk for one_part in parts for chunk in one_part]
     batch.complete[...] = geometry.complete
     edge = np.concatenate([np.empty(0, np.intp), *(chunk.rows for chunk in doubted)])
@@ -77,9 +77,9 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
         if examine and doubted:
             goals = Goals(arm, task, target, near)
             if any(chunk.plain.any() for chunk in doubted) and not geometry.ends:
-                edge = tell(goals, runner, batch, stack_rows(doubted))
+                edge = decide_folds(goals, runner, batch, stack_rows(doubted))
             for start in range(0, len(edge), AT_ONCE):
-                batch = decided(goals, runner, batch, edge[start : start + AT_ONCE])
+                batch = decide_edges(goals, runner, batch, edge[start : start + AT_ONCE])
         edge = edge[:0]
     return batch, math.prod(runner.axes), target, rounding, edge
 
@@ -122,7 +122,7 @@ def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Array]
     if not full:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
-        pack(part, count)
+        pack_branches(part, count)
     return doubted
 
 

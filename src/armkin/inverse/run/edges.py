@@ -9,7 +9,7 @@ import numpy as np
 from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.forward import position
-from armkin.inverse.answers.batch import Batch, Goals, Seeds, write
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, write_branches
 from armkin.inverse.closed.candidates import Recorded, as_rows
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import components, linkages, near_itself, surfaces
@@ -38,18 +38,18 @@ class _Doubts(NamedTuple):
     simple: Bool
 
 
-def decided(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Batch:
+def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Batch:
     """Decide what the targets `rows` are, which are on an edge: at most `AT_ONCE`.
 
     Where a joint is free, the candidates are not all.
     """
     _, _, target, near = goals
-    doubts = _doubts(goals, runner, rows)
+    doubts = _doubted_targets(goals, runner, rows)
     parts, left = _on_linkages(goals, runner, doubts), np.ones(len(rows), bool)
     for part_rows, seeds in parts:
         left[part_rows] = False
         if runner.geometry.ends:
-            batch = examined(goals, batch, rows[part_rows], seeds, runner.others)
+            batch = examine_targets(goals, batch, rows[part_rows], seeds, runner.others)
     unsettled = None
     if left.any():
         if len(part := np.flatnonzero(left & doubts.narrow)):  # there may be another part
@@ -73,7 +73,8 @@ def decided(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Batch:
     elif runner.geometry.ends:
         return batch
     seeds = stack_rows([seeds for _, seeds in parts])
-    return examined(goals, batch, rows[np.concatenate([part for part, _ in parts])], seeds, runner.others, unsettled)
+    rows = rows[np.concatenate([part for part, _ in parts])]
+    return examine_targets(goals, batch, rows, seeds, runner.others, unsettled)
 
 
 def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:
@@ -118,7 +119,7 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
     return settled
 
 
-def _doubts(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
+def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     """The targets `rows`, with preferred values for joints that are free; what is on no edge and misses is nan."""
     arm, task, target, near = goals.arm, goals.task, goals.target[rows], goals.near[rows]
     # what is singular hangs on the last digit
@@ -166,7 +167,7 @@ def _candidates_at_two(runner: Recorded, target: Array, values: Array, second: A
     return rows[: len(target), :, :-1], rows[len(target) :, :, :-1], solved
 
 
-def examined(
+def examine_targets(
     goals: Goals, batch: Batch, doubted: Int, seeds: Seeds, more: components.More, unsettled: Bool | None = None
 ) -> Batch:
     """Examine the doubted targets and write what is found: branches first, nan behind.
@@ -180,7 +181,7 @@ def examined(
         decision = components.examine(subset, rows_of(seeds, part), more, *lacking)
         if decision.surface.any():
             decision = surfaces.swept(subset, decision)
-        batch = write(goals.arm, batch, rows, decision.q, decision.valid, decision.label, subset.near)
+        batch = write_branches(goals.arm, batch, rows, decision.q, decision.valid, decision.label, subset.near)
         batch.status[rows], batch.free[rows] = decision.status, decision.free
         batch.complete[rows] &= ~decision.again
     return batch

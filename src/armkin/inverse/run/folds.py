@@ -14,7 +14,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import tip_and_jacobian
-from armkin.inverse.answers.batch import Batch, Goals, write
+from armkin.inverse.answers.batch import Batch, Goals, write_branches
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.closed.candidates import Recorded, as_rows
 from armkin.inverse.numeric import newton
@@ -41,7 +41,7 @@ class Doubted(NamedTuple):
     plain: Bool
 
 
-def tell(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Int:
+def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Int:
     """Write what the doubted targets are that can be told; returns the rows of those that are left.
 
     What stands alone is in the batch already, but for what misses a little; of two branches that meet the first is
@@ -57,7 +57,7 @@ def tell(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Int:
     if len(k):
         doubted.q[k, b], size = newton.correct(arm, task, doubted.q[k, b], target[doubted.rows[k]], steps=3)
         decided[k[size >= tol.CLOSED]] = False
-    second = _pairs(goals, doubted, solving & (doubted.edge | (doubted.miss > tol.ACCEPTED**2)), decided)
+    second = _second_of_pairs(goals, doubted, solving & (doubted.edge | (doubted.miss > tol.ACCEPTED**2)), decided)
     meets: Bool = np.asarray(second.any(axis=1))
     listed = np.flatnonzero(decided & (meets | (solving & (doubted.miss > tol.ACCEPTED**2)).any(axis=1)))
     if len(listed):
@@ -67,12 +67,12 @@ def tell(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Int:
         order = np.argsort(~solving, axis=1, kind="stable")
         valid = np.take_along_axis(solving, order, axis=1)
         q = np.where(valid[:, :, None], np.take_along_axis(doubted.q[listed], order[:, :, None], axis=1), np.nan)
-        write(arm, batch, rows, q, valid, order, near[rows])
+        write_branches(arm, batch, rows, q, valid, order, near[rows])
         batch.status[rows] = np.where(meets, Status.BOUNDARY, Status.EXACT)
     return doubted.rows[~decided]
 
 
-def _pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: Bool) -> Bool:
+def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: Bool) -> Bool:
     """Which of the near roots (K, B) are the second ones of two that meet; takes those targets from decided
     (K,) that the curvature does not tell."""
     second, near_roots = np.zeros(near_roots.shape, bool), near_roots & decided[:, None]
@@ -89,7 +89,7 @@ def _pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: Bool) -> B
     partners = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
     decided[k[partners > 1]] = decided[k[i[size < APART]]] = False
     if not decided[k].all():  # no Jacobians of those
-        return _pairs(goals, doubted, near_roots, decided)
+        return _second_of_pairs(goals, doubted, near_roots, decided)
     i, j, way = i[close], j[close], way[close]
     inverse, beside = _inverses(goals, q)
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0

@@ -31,7 +31,7 @@ from armkin.model.units import radian_or_reach
 
 
 @lru_cache(maxsize=64)
-def prepared(arm: Arm, task: str | None) -> OneTarget | None:
+def short_way(arm: Arm, task: str | None) -> OneTarget | None:
     """The short way of an arm and task, prepared at its first use; None if there is none."""
     if actual(arm) is not arm or solver(arm, task)[1].pairs is None:
         return None

@@ -11,13 +11,13 @@ from armkin.errors import UsageError
 Result = TypeVar("Result")
 
 
-def shared(part: Callable[[slice], Result], count: int, workers: int, least: int, step: int = 1) -> list[Result]:
+def share_rows(part: Callable[[slice], Result], count: int, workers: int, least: int, step: int = 1) -> list[Result]:
     """``part(rows)`` of all rows, in their order, by that many threads.
 
     least: rows that are worth a thread; step: of which shares are multiples. One worker gets all rows at once.
     Raises UsageError for less than one worker.
     """
-    check(workers)
+    check_workers(workers)
     share = max(least, -(-count // (4 * workers)))  # four each: one that is slow does not keep the others waiting
     share += -share % step
     rows = [slice(start, min(start + share, count)) for start in range(0, count, share)]
@@ -29,7 +29,7 @@ def shared(part: Callable[[slice], Result], count: int, workers: int, least: int
         return list(pool.map(part, rows))
 
 
-def check(workers: int) -> None:
+def check_workers(workers: int) -> None:
     """Raises UsageError for a number of threads below one, and for what is no whole number."""
     if not isinstance(workers, Integral):
         raise UsageError(f"workers: {workers!r}; a whole number of threads is needed")

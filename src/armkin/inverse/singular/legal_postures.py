@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.answers.batch import Batch, Goals, Seeds, write
-from armkin.inverse.answers.closest import thorough
+from armkin.inverse.answers.batch import Batch, Goals, Seeds, write_branches
+from armkin.inverse.answers.closest import closest_from_every_start
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
@@ -36,7 +36,7 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
     for k in rows[_may_be_legal(goals, batch, rows)]:
         q = batch.q[k, batch.valid[k]]
         at_limit = _at_limits(arm, q).all(axis=1).any()
-        legal = thorough(arm, task, target[k : k + 1], near[k : k + 1]).q
+        legal = closest_from_every_start(arm, task, target[k : k + 1], near[k : k + 1]).q
         exact, _ = newton.correct(arm, task, legal[None], target[k : k + 1])
         # the correction may take a double root beyond its limit
         if ((exact[0] >= arm.lower) & (exact[0] <= arm.upper)).all():
@@ -53,7 +53,7 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
         if not (inside & decision.valid[0]).any():
             continue
         row = np.array([k])
-        batch = write(arm, batch, row, decision.q, decision.valid, decision.label, near[row])
+        batch = write_branches(arm, batch, row, decision.q, decision.valid, decision.label, near[row])
         batch.status[k] = max(batch.status[k], decision.status[0])  # of two roots in one, one was listed
         batch.free[k] |= decision.free[0]
     return batch

@@ -11,7 +11,7 @@ import numpy as np
 from armkin.formula.array_tuples import stack_rows
 from armkin.formula.arrays import Array, Int
 from armkin.forward import position
-from armkin.inverse.answers.batch import Batch, Goals, empty, named
+from armkin.inverse.answers.batch import Batch, Goals, complete_labels, empty_batch
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -118,8 +118,8 @@ def stand(goals: Goals, batch: Batch, most: Array) -> Batch:
     place, stays = np.where(same, away, np.inf).argmin(axis=1), same.any(axis=1)
     count = batch.valid[rows].sum(axis=1)
     place = np.where(stays, place, count)
-    batch = stack_rows([batch, empty(0, int(place.max()) + 1, arm.n)])
+    batch = stack_rows([batch, empty_batch(0, int(place.max()) + 1, arm.n)])
     batch.q[rows, place], batch.valid[rows, place], batch.within[rows, place] = near[rows], True, True
-    batch.branch[rows] = named(batch.branch[rows].astype(np.int64), batch.valid[rows])
+    batch.branch[rows] = complete_labels(batch.branch[rows].astype(np.int64), batch.valid[rows])
     batch.status[rows[count == 0]] = Status.BOUNDARY
     return batch

@@ -14,7 +14,7 @@ from armkin.inverse.closed import anywhere, elbow, planar, spherical, three_join
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.solvers import general, nearly_special, tool_axis
-from armkin.inverse.tasks.choose_task import default_task, rank, redundant, task_for
+from armkin.inverse.tasks.choose_task import default_task, rank, redundant_error, task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm, actual
 
@@ -32,7 +32,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
         surplus = arm.n - task.constraints
         left = f"leave {surplus} degree{'s' if surplus > 1 else ''} of freedom"
         problem = f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} {left}"
-        raise redundant(arm, surplus, problem)
+        raise redundant_error(arm, surplus, problem)
     effective = rank(arm, task, tol.RANK)
     if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
         usual = default_task(arm)
@@ -41,7 +41,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
             f"{effective} at a time:\nthere would be infinitely many solutions or none"
         )
         if usual in (None, task.name):
-            raise redundant(arm, arm.n - effective, problem)
+            raise redundant_error(arm, arm.n - effective, problem)
         raise UsageError(f"{problem}; its usual task is {usual}", robot=arm.name, task=task.name, usual_task=usual)
     for recognise in _CLASSES:
         geometry = recognise(arm, task)

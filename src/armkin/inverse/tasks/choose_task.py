@@ -27,27 +27,28 @@ def task_for(arm: Arm, name: str | None = None) -> Task:
     """
     name = name or arm.task or default_task(arm)
     if name is None:
-        raise _taskless(arm)
+        raise _taskless_error(arm)
     if name not in LABELS:
         raise UsageError(f"unknown task '{name}'; tasks are {', '.join(LABELS)}")
     task = _BUILDERS[name](arm, name)
     if isinstance(task, str):
-        raise UsageError(f"{arm.name}: task {name} does not fit its {_joints(arm)}: {task}")
+        raise UsageError(f"{arm.name}: task {name} does not fit its {_joint_kinds(arm)}: {task}")
     return task
 
 
-def _taskless(arm: Arm) -> UsageError:
+def _taskless_error(arm: Arm) -> UsageError:
     """What to say of an arm whose structure suggests no task."""
-    problem = f"{arm.name}: no task fits its {_joints(arm)} by itself"
-    free = rank(arm, _free(arm, "pose"))
+    problem = f"{arm.name}: no task fits its {_joint_kinds(arm)} by itself"
+    free = rank(arm, _free_task(arm, "pose"))
     if free < 2:
         return UsageError(f"{problem}: fk, pulses and workspace work, ik does not")
     if free < arm.n:
-        return redundant(arm, arm.n - free, f"{problem}: together they move the tool in {free} of its six directions")
+        problem += f": together they move the tool in {free} of its six directions"
+        return redundant_error(arm, arm.n - free, problem)
     return UsageError(problem, advice="ask for task pose, whole poses of which it reaches some", needs="task")
 
 
-def redundant(arm: Arm, surplus: int, problem: str) -> RedundantArmError:
+def redundant_error(arm: Arm, surplus: int, problem: str) -> RedundantArmError:
     """The error of an arm so many of whose joints have to be held."""
     names = list(arm.joint_names)
     advice = f"hold {surplus} of {', '.join(names)} with armkin.lock(arm, {{joint: value}})"
@@ -79,65 +80,65 @@ def rank(arm: Arm, task: Task, tolerance: float = INDEPENDENT) -> int:
     return int(max(np.linalg.matrix_rank(Jt, tol=tolerance)))
 
 
-def _joints(arm: Arm) -> str:
+def _joint_kinds(arm: Arm) -> str:
     kinds = "".join("P" if p else "R" for p in arm.prismatic)
     return f"{arm.n} joint{'s' * (arm.n > 1)} ({kinds})"
 
 
-def _plain(arm: Arm, name: str, position: int, sums: ArrayLike, offsets: ArrayLike) -> Task:
+def _plain_task(arm: Arm, name: str, position: int, sums: ArrayLike, offsets: ArrayLike) -> Task:
     rows = np.asarray(sums, dtype=float).reshape(-1, arm.n)
     return Task(name, position, rows, np.asarray(offsets, dtype=float), "none")
 
 
-def _free(arm: Arm, name: str) -> Task:
+def _free_task(arm: Arm, name: str) -> Task:
     orientation: Literal["none", "axis", "full"] = {"xyz": "none", "xyz_axis": "axis", "pose": "full"}[name]  # type: ignore[assignment]
     return Task(name, 3, np.zeros((0, arm.n)), np.zeros(0), orientation)
 
 
-def _directions(arm: Arm) -> Array:
+def _axis_directions(arm: Arm) -> Array:
     return axes(Chain(arm.link, arm.prismatic))[1]
 
 
-def _along(directions: Array, reference: Array) -> NDArray[np.float64]:
+def _parallel_signs(directions: Array, reference: Array) -> NDArray[np.float64]:
     """+1 or -1 where a direction is parallel or antiparallel to the reference, else 0."""
     cosine = directions @ reference
     across = np.linalg.norm(np.cross(directions, reference), axis=1)
     return np.where(across < NEARLY_PARALLEL, np.sign(cosine), 0.0)
 
 
-def _planar(arm: Arm, name: str) -> Task | str:
-    w = _directions(arm)
-    turns = np.where(arm.prismatic, 0.0, _along(w, Z))
+def _planar_task(arm: Arm, name: str) -> Task | str:
+    w = _axis_directions(arm)
+    turns = np.where(arm.prismatic, 0.0, _parallel_signs(w, Z))
     if (turns[~arm.prismatic] == 0).any() or (np.abs(w[arm.prismatic] @ Z) > NEARLY_PARALLEL).any():
         return "its joints do not all move in the base's x-y plane"
     if name == "xy":
-        return _plain(arm, name, 2, np.zeros((0, arm.n)), np.zeros(0))
+        return _plain_task(arm, name, 2, np.zeros((0, arm.n)), np.zeros(0))
     if not turns.any():
         return "it has no joint that turns"
     # DH angles about the base's z axis: theta is the direction of the last link
     offset = float((turns * arm.dh_sign * arm.dh_theta).sum())
-    return _plain(arm, name, 2, turns * arm.ratio, [offset])
+    return _plain_task(arm, name, 2, turns * arm.ratio, [offset])
 
 
-def _yaw(arm: Arm, name: str) -> Task | str:
+def _yaw_task(arm: Arm, name: str) -> Task | str:
     from armkin.forward import fk
 
-    upright = _along(_directions(arm), Z)
+    upright = _parallel_signs(_axis_directions(arm), Z)
     turns, lifts = np.where(arm.prismatic, 0.0, upright), np.where(arm.prismatic, upright, 0.0)
     if (turns[~arm.prismatic] == 0).any() or not lifts.any() or not turns.any():
         return "it needs joints that turn about the base's z axis and one that slides along it"
     T0 = fk(arm, np.zeros(arm.n))
-    return _plain(arm, name, 3, turns * arm.ratio, [np.arctan2(T0[1, 0], T0[0, 0])])
+    return _plain_task(arm, name, 3, turns * arm.ratio, [np.arctan2(T0[1, 0], T0[0, 0])])
 
 
-def _pitch(arm: Arm, name: str) -> Task | str:
-    w = _directions(arm)
+def _pitch_task(arm: Arm, name: str) -> Task | str:
+    w = _axis_directions(arm)
     last = 3 if name == "xyz_pitch" else 4
     if arm.n != last + 1:
         return f"it needs {last + 1} joints"
     if arm.prismatic[1:].any():
         return "joints 2 and after must turn"
-    parallel = _along(w, w[1])
+    parallel = _parallel_signs(w, w[1])
     parallel[[0, *range(4, arm.n)]] = 0.0
     if (parallel[1:4] == 0).any():
         return "joints 2, 3 and 4 must be parallel"
@@ -145,35 +146,35 @@ def _pitch(arm: Arm, name: str) -> Task | str:
     weights = parallel * arm.dh_sign[1]
     offset = float((weights * arm.dh_sign * arm.dh_theta).sum()) + arm.pitch_offset
     if name == "xyz_pitch":
-        return _plain(arm, name, 3, weights * arm.ratio, [offset])
+        return _plain_task(arm, name, 3, weights * arm.ratio, [offset])
     roll = np.zeros(arm.n)
     roll[4] = arm.dh_sign[4]
-    return _plain(arm, name, 3, [weights * arm.ratio, roll * arm.ratio], [offset, arm.dh_theta[4]])
+    return _plain_task(arm, name, 3, [weights * arm.ratio, roll * arm.ratio], [offset, arm.dh_theta[4]])
 
 
-def _roll(arm: Arm, name: str) -> Task | str:
-    w = _directions(arm)
+def _roll_task(arm: Arm, name: str) -> Task | str:
+    w = _axis_directions(arm)
     if arm.n != 4:
         return "it needs 4 joints"
     if arm.prismatic[1:].any():
         return "joints 2 and after must turn"
-    parallel = _along(w, w[1])
+    parallel = _parallel_signs(w, w[1])
     if parallel[2] == 0 or parallel[3] != 0:
         return "joints 2 and 3 must be parallel, and joint 4 must turn about another direction"
     roll = np.zeros(4)
     roll[3] = arm.dh_sign[3]
-    return _plain(arm, name, 3, roll * arm.ratio, [arm.dh_theta[3]])
+    return _plain_task(arm, name, 3, roll * arm.ratio, [arm.dh_theta[3]])
 
 
 # Each gives the task for an arm, or says why it does not fit.
 _BUILDERS = {
-    "xy": _planar,
-    "xy_theta": _planar,
-    "xyz": _free,
-    "xyz_pitch": _pitch,
-    "xyz_pitch_roll": _pitch,
-    "xyz_roll": _roll,
-    "xyz_yaw": _yaw,
-    "xyz_axis": _free,
-    "pose": _free,
+    "xy": _planar_task,
+    "xy_theta": _planar_task,
+    "xyz": _free_task,
+    "xyz_pitch": _pitch_task,
+    "xyz_pitch_roll": _pitch_task,
+    "xyz_roll": _roll_task,
+    "xyz_yaw": _yaw_task,
+    "xyz_axis": _free_task,
+    "pose": _free_task,
 }

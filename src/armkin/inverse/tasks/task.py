@@ -80,7 +80,7 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
     it. Raises UsageError for a wrong shape, numbers that are not finite or too large, an axis of no
     length or a matrix that is no rotation to 5e-6.
     """
-    flat, lead = shaped(task, targets)
+    flat, lead = flat_targets(task, targets)
     rounding = np.zeros(len(flat))
     if task.orientation == "full":
         unread = flat
@@ -93,7 +93,7 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
     return flat, lead, rounding
 
 
-def shaped(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+def flat_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     """Targets as a flat batch (N, m), or (N, 4, 4) for poses, which are not read yet; and the batch's shape."""
     values = arrays.real_array(targets, "targets")
     shape = (4, 4) if task.orientation == "full" else (len(task.labels),)
@@ -184,7 +184,7 @@ def targets_of(task: Task, T: Array, q: Array) -> Array:
     return np.concatenate(parts, axis=1)
 
 
-def moved(arm: Arm, task: Task, target: Array, way: Array) -> Array:
+def shifted_targets(arm: Arm, task: Task, target: Array, way: Array) -> Array:
     """Targets (M, m) or (M, 4, 4) moved a little; way: (6,) three [reaches], three [rad]."""
     targets = target.copy()
     if task.orientation == "full":
@@ -201,10 +201,10 @@ def moved(arm: Arm, task: Task, target: Array, way: Array) -> Array:
     return targets
 
 
-def around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = AROUND) -> Array:
+def targets_around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = AROUND) -> Array:
     """Targets (M, m) or (M, 4, 4) moved by up to size [reaches, rad], each way also backwards: (M, 2 pairs, ...)."""
     ways = np.random.default_rng(3).uniform(-size, size, (pairs, 6))
-    return np.stack([moved(arm, task, target, sign * way) for way in ways for sign in (1.0, -1.0)], axis=1)
+    return np.stack([shifted_targets(arm, task, target, sign * way) for way in ways for sign in (1.0, -1.0)], axis=1)
 
 
 def distance(arm: Arm, task: Task, target: Array) -> Array:

@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.numeric.newton import correct
 from armkin.inverse.numeric.tolerances import CONVERGING
-from armkin.inverse.solve import isolated as ik
+from armkin.inverse.solve import isolated_branches as ik
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model.arm import actual
 from armkin.model.limits import outside

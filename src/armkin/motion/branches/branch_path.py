@@ -14,7 +14,7 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
-from armkin.inverse.branches.names import find
+from armkin.inverse.branches.names import find_branches
 from armkin.motion.branches.boundary_chains import through_boundaries
 from armkin.motion.branches.branch_chains import Chain, Run, chains_of_columns, fewest_runs
 from armkin.motion.branches.branch_columns import Columns
@@ -116,7 +116,7 @@ def carry_route(
         every_chain = through_wrists(arm, route, columns, every_chain, pace.turn, aside)
     starts = _start_chains(arm, every_chain, fixed)
     if branch is not None:
-        labels = find(columns.names, branch)
+        labels = find_branches(columns.names, branch)
         starts = [c for c in starts if c.labels[0] in labels]
     end = len(columns.s) - 1
     complete = [Run(c, 0, end) for c in starts if c.carries(0) == end]
