@@ -43,35 +43,49 @@ def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Ans
     missed = ~good & ((seed.tilt < tol.UPRIGHT) | near | seed.torn)
     touch = good & (seed.tilt > 0) & (seed.tilt < tol.UPRIGHT)
     unsure = good & (seed.tilt > 0) & maybe
-    # A real root that was far from the answer it led to may have stood for another one.
-    strayed = good & (seed.tilt == 0) & (moved.guess > tol.STRAY + 30 * shake)
-    # It has not if it has the root's own value of the hidden joint: around a value there are no more solutions than
-    # roots, and no two roots may have led to one answer. Near singularities roots are too far off to say so.
-    weakest = np.zeros(goal.shape[0])
-    np.maximum.at(weakest, seed.pose[good], moved.weakness[good])
-    away = difference(closed.prismatic, moved.q, seed.q)[:, pencil.hidden_joint]
-    own_root = (np.abs(away) < tol.OWN_ROOT) & (weakest < REGULAR)[seed.pose] & (shake == 0)
-    # unless several solutions share the middle joints: these are one root
-    strays = np.flatnonzero(strayed & own_root)
-    if strays.size:
-        own_root[strays] = roots.end_joints_follow(pencil, inverse(target[strays]), moved.q[strays])
-    strayed &= ~own_root
+    own_root = good & (shake == 0)
+    if shake == 0:
+        own_root = _own_roots(closed, pencil, target, seed, moved, good)
+    # A real root that was far from the answer it led to may have stood for another one, if it is not the answer's own.
+    strayed = good & (seed.tilt == 0) & (moved.guess > tol.STRAY + 30 * shake) & ~own_root
     unsettled[seed.pose[missed | unsure | strayed]] = True
     touching[seed.pose[touch | (moved.residual > tol.ELIMINATED) & (moved.residual < 10 * tol.GRAZING)]] = True
-    # Two roots that share the hidden joint: their vectors are good if both were near an answer at once,
-    # and if the two answers are not the same.
     answers = answers_of(closed, seed.pose, moved, good)
     # Of complex roots damped steps bring many to an answer that has its own: they tell nothing here.
-    stands = good & maybe
-    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], moved.guess[stands] > tol.BLURRED_ROOT + 10 * shake
+    unsettled[_blurred_pairs(seed, moved, own_root, good & maybe, tol.BLURRED_ROOT + 10 * shake)] = True
+    unsettled[_met_twice(closed, rows_of(answers, seed.tilt[good] == 0))] = True
+    guesses = answers_of(closed, seed.pose, moved, ~good & (moved.residual < tol.SEED))
+    return answers, unsettled, touching, guesses
+
+
+def _own_roots(closed: Loop, pencil: Pencil, target: Array, seed: roots.Seeds, moved: Polished, good: Bool) -> Bool:
+    """Which seeds led to an answer that has their own value of the hidden joint.
+
+    Around a value there are no more solutions than roots, and no two roots may have led to one answer. Near
+    singularities roots are too far off to say so.
+    """
+    weakest = np.zeros(int(seed.pose.max(initial=-1)) + 1)
+    np.maximum.at(weakest, seed.pose[good], moved.weakness[good])
+    away = difference(closed.prismatic, moved.q, seed.q)[:, pencil.hidden_joint]
+    own_root = (np.abs(away) < tol.OWN_ROOT) & (weakest < REGULAR)[seed.pose]
+    # unless several solutions share the middle joints: these are one root
+    strays = np.flatnonzero(good & (seed.tilt == 0) & (moved.guess > tol.STRAY) & own_root)
+    if strays.size:
+        own_root[strays] = roots.end_joints_follow(pencil, inverse(target[strays]), moved.q[strays])
+    return own_root
+
+
+def _blurred_pairs(seed: roots.Seeds, moved: Polished, own_root: Bool, stands: Bool, most: float) -> Int:
+    """Poses with two roots that share the hidden joint, of those that stand for answers.
+
+    Their vectors are good if both were near an answer at once, by at most `most`, and if the answers are not the same.
+    """
+    pose, hidden, blurred = seed.pose[stands], seed.hidden[stands], moved.guess[stands] > most
     order = np.lexsort((hidden, pose))
     close = (np.diff(pose[order]) == 0) & (np.diff(hidden[order]) < tol.SAME_ROOT)
     close &= blurred[order][1:] | blurred[order][:-1]
     close &= ~(own_root[stands][order][1:] & own_root[stands][order][:-1])
-    unsettled[pose[order][1:][close]] = True
-    unsettled[_met_twice(closed, rows_of(answers, seed.tilt[good] == 0))] = True
-    guesses = answers_of(closed, seed.pose, moved, ~good & (moved.residual < tol.SEED))
-    return answers, unsettled, touching, guesses
+    return np.asarray(pose[order][1:][close])
 
 
 def _met_twice(closed: Loop, real: Answers) -> Int:
