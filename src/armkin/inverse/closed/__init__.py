@@ -6,7 +6,6 @@ subproblems.py     the equations of the closed forms
 candidates.py      a class's candidates with their residuals, from recorded code
 quadratics.py      quadratic expressions of a cosine and a sine
 wrist.py           three axes that meet
-three_link.py      three parallel axes
 crossings.py       where a self-motion of a class meets another one
 four_bars.py       which circuit of a planar or spherical four-bar linkage a posture is on
 

@@ -29,21 +29,11 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
 from armkin.inverse.closed import quadratics
+from armkin.inverse.closed import subproblems as sub
 from armkin.inverse.closed.candidates import is_sound
+from armkin.inverse.closed.elbow import ThreeLink
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import (
-    Candidates,
-    Doubt,
-    Pair,
-    Prefer,
-    linear,
-    normalised,
-    one_root,
-    rotation_between,
-    spin,
-    walked_back,
-)
-from armkin.inverse.closed.three_link import ThreeLink
+from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer
 from armkin.inverse.closed.wrist import Wrist, meeting_point
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
@@ -62,7 +52,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
         if loop is not None and not loop.ends.close:
             geometry = _class_of(loop, range(5, -1, -1) if backward else range(6))
             if backward:  # from the tool to the base
-                geometry = replace(geometry, pairs=walked_back(loop.solve))
+                geometry = replace(geometry, pairs=sub.walked_back(loop.solve))
             if is_sound(arm, task, geometry):
                 return geometry
     return None
@@ -116,13 +106,13 @@ class _Ends:
             sine = arrays.sub(arrays.mul(gy, d[0]), arrays.mul(gx, d[1]))
             sides.append([constant, arrays.mul(-1.0, cosine), arrays.mul(-1.0, sine)])
         first, last, doubt = (self._quartic if self.regular else self._rank_one)(sides, e, prefer)
-        u = pose.turn_direction(Lb, spin(*last, d))
-        v = spin(first.c, arrays.mul(-1.0, first.s), e)
+        u = pose.turn_direction(Lb, sub.spin(*last, d))
+        v = sub.spin(first.c, arrays.mul(-1.0, first.s), e)
         if self.points:
             u = arrays.combine(1.0, u, 1.0, tb)
             v = arrays.combine(1.0, v, -1.0, ta)
         v = pose.turn_back(self.La, v)
-        second, _ = rotation_between(u[0], u[1], v[0], v[1], 1.0, None)
+        second, _ = sub.rotation_between(u[0], u[1], v[0], v[1], 1.0, None)
         across = arrays.dot(u[:2], u[:2]) + arrays.dot(v[:2], v[:2])
         free = (across < tol.LOOSE) | (doubt.edge & (across < tol.LOOSE_DOUBLE))
         if prefer[1] is not None and np.any(free):
@@ -135,19 +125,19 @@ class _Ends:
         start: list[Entry] = [arrays.mul(-1.0, across), 0.0, 0.0, 0.0, 0.0, 0.0]
         last, doubt = quadratics.turn(quadratics.total(start, *(quadratics.product(k, k) for k in f)), 1.0, prefer[2])
         fx, fy = (_affine_at(k, last) for k in f)
-        first, doubt_a = rotation_between(fx, fy, e[0], e[1], 1.0, prefer[0])
+        first, doubt_a = sub.rotation_between(fx, fy, e[0], e[1], 1.0, prefer[0])
         return first, last, doubt | doubt_a
 
     def _rank_one(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         constant, cosine, sine = _combination(self.alone, sides)
         right = arrays.mul(-1.0, constant)
-        last, doubt = linear(cosine, sine, right, 0, 1.0, prefer[2], one_root(cosine, sine, right))
-        last = normalised(last)
+        last, doubt = sub.linear(cosine, sine, right, 0, 1.0, prefer[2], sub.one_root(cosine, sine, right))
+        last = sub.normalised(last)
         fx, fy = (self.main @ self.A).tolist()
         a = arrays.add(arrays.mul(fx, e[0]), arrays.mul(fy, e[1]))
         b = arrays.sub(arrays.mul(fx, e[1]), arrays.mul(fy, e[0]))
-        first, doubt_a = linear(a, b, _affine_at(_combination(self.main, sides), last), 1, 1.0, prefer[0])
-        return normalised(first), last, doubt | doubt_a
+        first, doubt_a = sub.linear(a, b, _affine_at(_combination(self.main, sides), last), 1, 1.0, prefer[0])
+        return sub.normalised(first), last, doubt | doubt_a
 
 
 class _Loop:

@@ -23,21 +23,9 @@ from armkin.errors import UsageError
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry, Truth
 from armkin.inverse.closed import quadratics
+from armkin.inverse.closed import subproblems as sub
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import (
-    Candidates,
-    Doubt,
-    Pair,
-    Prefer,
-    half_tangent,
-    linear,
-    normalised,
-    one_root,
-    quadratic,
-    rotation_between,
-    spin,
-    trig_quadratic,
-)
+from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.choose_task import rank
 from armkin.inverse.tasks.task import Task
@@ -124,12 +112,12 @@ class Position:
         else:
             third, second, doubt = self._rank_one(sides, size, prefer)
         g = self._tip(third)
-        g = spin(*second, g) if second.s is not None else [g[0], g[1], g[2] + second.c]
+        g = sub.spin(*second, g) if second.s is not None else [g[0], g[1], g[2] + second.c]
         tip = pose.apply(self.L1, g)
         if self.prismatic[0]:
             first = Pair(z - tip[2], None)
         else:
-            first, doubt1 = rotation_between(tip[0], tip[1], x, y, size, prefer[0])
+            first, doubt1 = sub.rotation_between(tip[0], tip[1], x, y, size, prefer[0])
             doubt = doubt | doubt1
         return [first, second, third], doubt
 
@@ -166,7 +154,7 @@ class Position:
                     for j in range(3):
                         k[i + j] = arrays.add(k[i + j], arrays.mul(quad[i], quad[j]))
             if self.prismatic[0]:  # nothing beyond d^2
-                d, doubt = quadratic(k[2], k[1], k[0], 0, size, tol.NO_SIZE * size * size, prefer[2])
+                d, doubt = sub.quadratic(k[2], k[1], k[0], 0, size, tol.NO_SIZE * size * size, prefer[2])
                 third = Pair(d, None)
             else:
                 power: Entry = 1.0
@@ -176,36 +164,36 @@ class Position:
                 k0, k1, k2, k3, k4 = k
                 ecc = 0.25 * (k4 + k0 - k2)
                 form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
-                turn, doubt = trig_quadratic(form, size * size)
-                d = size * half_tangent(turn)
+                turn, doubt = sub.trig_quadratic(form, size * size)
+                d = size * sub.half_tangent(turn)
                 if prefer[2] is not None and np.any(doubt.free):
                     d = arrays.where(doubt.free, prefer[2].c, d)
                 third = Pair(d, None)
         gx, gy = (_at_joint(six, third) for six in g)
         y = self._tip(third)
-        second, doubt2 = rotation_between(y[0], y[1], gx, gy, size, prefer[1])
+        second, doubt2 = sub.rotation_between(y[0], y[1], gx, gy, size, prefer[1])
         return third, second, doubt | doubt2
 
     def _rank_one(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         alone = self._affine(self.alone, sides)
         if self.prismatic[2]:
-            d, doubt = quadratic(alone[3], alone[1], alone[0], 0, size, tol.NO_SIZE * size, prefer[2])
+            d, doubt = sub.quadratic(alone[3], alone[1], alone[0], 0, size, tol.NO_SIZE * size, prefer[2])
             third = Pair(d, None)
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
             a, b, c = alone[1], alone[2], arrays.mul(-1.0, alone[0])
             # rounding parts a double root by 1e-8; where the tip is then on axis 2, joint 2 must be seen to be free
-            third, doubt = linear(a, b, c, 0, size, prefer[2], one_root(a, b, c))
-            third = normalised(third)
+            third, doubt = sub.linear(a, b, c, 0, size, prefer[2], sub.one_root(a, b, c))
+            third = sub.normalised(third)
         y = self._tip(third)
         main = self._affine(self.main, sides)
         right = _at_joint(main, third)
         ax, ay = (self.main @ self.A).tolist()
         a = arrays.add(arrays.mul(ax, y[0]), arrays.mul(ay, y[1]))
         b = arrays.sub(arrays.mul(ay, y[0]), arrays.mul(ax, y[1]))
-        second, doubt2 = linear(a, b, right, 1, size, prefer[1])
+        second, doubt2 = sub.linear(a, b, right, 1, size, prefer[1])
         # without a real third joint, the nearest one may well bring the tip onto axis 2: nothing is free there
-        return third, normalised(second), doubt | doubt2.where(_solves(alone, third, size))
+        return third, sub.normalised(second), doubt | doubt2.where(_solves(alone, third, size))
 
     def _slide(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         """Joint 2 prismatic: g = y + d2 z."""
@@ -233,7 +221,7 @@ class Position:
             if third.s is None:
                 remainder = arrays.sub(remainder, arrays.mul(curved, third.c * third.c))
             # d^2 / 2 + (y_z + rows_z) d - rest = 0
-            d, doubt2 = quadratic(0.5, arrays.add(self._tip(third)[2], z1), -remainder, 1, size, tol.TINY, None)
+            d, doubt2 = sub.quadratic(0.5, arrays.add(self._tip(third)[2], z1), -remainder, 1, size, tol.TINY, None)
             return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
         d2 = [arrays.mul(1.0 / z0, v) for v in across[0]]
@@ -243,7 +231,7 @@ class Position:
         factor = [arrays.add(arrays.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
         six = quadratics.total([*constant, curved, 0.0, 0.0], quadratics.product(d2, factor))
         if self.prismatic[2]:
-            d, doubt = quadratic(six[3], six[1], six[0], 0, size, tol.NO_SIZE * size * size, prefer[2])
+            d, doubt = sub.quadratic(six[3], six[1], six[0], 0, size, tol.NO_SIZE * size * size, prefer[2])
             third = Pair(d, None)
         else:
             third, doubt = quadratics.turn(six, size, prefer[2])
@@ -256,8 +244,8 @@ class Position:
             if abs(slope) < tol.NO_SIZE:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
             return Pair(arrays.mul(-1.0 / slope, constant), None), Doubt(np.zeros(1, bool))
-        third, doubt = linear(slope, sine, arrays.mul(-1.0, constant), 0, size, prefer[2])
-        return normalised(third), doubt
+        third, doubt = sub.linear(slope, sine, arrays.mul(-1.0, constant), 0, size, prefer[2])
+        return sub.normalised(third), doubt
 
 
 def _at_joint(terms: list[Entry], joint: Pair) -> Entry:
