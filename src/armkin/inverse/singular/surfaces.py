@@ -88,7 +88,7 @@ def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:
     arm, task, target, _ = goals
     _, J = newton.scaled(arm, task, q, np.repeat(target, len(q), axis=0))
     S, V = np.linalg.svd(J)[1:]
-    lost = arm.n - (S > tol.FOLDED).sum(axis=1)
+    lost = arm.n - (S > tol.WEAK).sum(axis=1)
     null = np.arange(arm.n) >= arm.n - lost[:, None]
     moves = (np.where(null[:, :, None], np.abs(V), 0.0) > tol.FOLDED).any(axis=1)
     return J, np.asarray(~moves & (lost > 1)[:, None])
