@@ -213,37 +213,12 @@ def _polynomials(
 
     q: (M, n) where they begin, along v (M, n); u: (M, rows, k) directions out of reach; w: (M, n) the second
     derivative, as far as it is known; span: (M,).
-    Each node is Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation
-    problems, 1977).
     """
-    M, n = q.shape
-    rows, k = u.shape[1:]
-    t, unit = np.multiply.outer(NODE, span)[:, :, None], radian_or_reach(arm)
-    away = t * (v + 0.5 * t * w)
-    inverse, left = np.empty((NODES, M, rows + 1, rows + 1)), np.empty((NODES, M, k))
-    bordered = np.zeros(inverse.shape)
-    bordered[:, :, :rows, n:], bordered[:, :, rows, :n] = u, v
-    on, going, before = np.zeros(M, bool), np.arange(M), np.zeros(M)
-    for _ in range(ITERATIONS):
-        at, goal = away[:, going], np.concatenate([target[going]] * NODES)
-        r, J = newton.scaled(arm, task, (q[going] + at * unit).reshape(-1, n), goal)
-        matrix = bordered[:, going]
-        matrix[:, :, :rows, :n] = J.reshape(NODES, -1, rows, n)
-        ahead = t[:, going] - (v[going] * at).sum(axis=2, keepdims=True)
-        last = newton.nudged(np.linalg.inv, matrix.reshape(-1, rows + 1, rows + 1)).reshape(matrix.shape)
-        step = (last @ np.concatenate([r.reshape(NODES, -1, rows), ahead], axis=2)[..., None])[..., 0]
-        away[:, going], left[:, going], inverse[:, going] = at + step[:, :, :n], step[:, :, n:], last
-        size = np.abs(step[:, :, :n]).max(axis=(0, 2))
-        # the next step is about as many times smaller than this as this one's square than the last one's
-        done = (size < tol.ARRIVED) | (size**3 < tol.ERROR * before[going] ** 2)
-        near = (np.abs(away[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0)
-        on[going], before[going] = done & near, size
-        going = going[~done & near]
-        if not len(going):
-            break
-    # the last rows span what no motion across v reaches: u has turned on the way
-    g = _least_residual(inverse[:, :, n:, :rows], left)
-    chebyshev = np.tensordot(_FIT, np.concatenate([away, g], axis=2), axes=1)
+    n, rows = q.shape[1], u.shape[1]
+    on, x, along_u, inverse = _nodes(arm, task, q, target, u, v, w, span)
+    # the last rows of the inverse span what no motion across v reaches: u has turned on the way
+    g = _least_residual(inverse[:, :, n:, :rows], along_u)
+    chebyshev = np.tensordot(_FIT, np.concatenate([x, g], axis=2), axes=1)
     # the polynomials are exact on the span if their last coefficients are small
     last = np.abs(chebyshev[-2:]).max(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -251,14 +226,57 @@ def _polynomials(
         # these grow with as high a power of the span
         longer = np.where(on, np.clip(0.9 * off ** (1.0 / (2 - NODES)), *LONGER), LONGER[0])
         on &= off < 1.0
-    # a crossing is a zero of the bordered Jacobian's smallest singular value, which no two nodes are as close to as it
-    # changes between any two
+    power = np.tensordot(_POWERS, chebyshev, axes=1)
+    return np.asarray(on), longer, _crossed_by_none(inverse, span), power[:, :, :n], power[:, :, n:]
+
+
+def _nodes(
+    arm: Arm, task: Task, q: Array, target: Array, u: Array, v: Array, w: Array, span: Array
+) -> tuple[Bool, Array, Array, Array]:
+    """Of the curves of `_polynomials` the nodes: which curves (M,) have all of them, the joints' ways (NODES, M, n),
+    the residual along u (NODES, M, k), and the inverses of the bordered Jacobians.
+
+    Each is Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation problems,
+    1977).
+    """
+    M, n = q.shape
+    rows, k = u.shape[1:]
+    t, unit = np.multiply.outer(NODE, span)[:, :, None], radian_or_reach(arm)
+    x = t * (v + 0.5 * t * w)
+    inverse, along_u = np.empty((NODES, M, rows + 1, rows + 1)), np.empty((NODES, M, k))
+    bordered = np.zeros(inverse.shape)
+    bordered[:, :, :rows, n:], bordered[:, :, rows, :n] = u, v
+    on, going, before = np.zeros(M, bool), np.arange(M), np.zeros(M)
+    for _ in range(ITERATIONS):
+        at, goal = x[:, going], np.concatenate([target[going]] * NODES)
+        r, J = newton.scaled(arm, task, (q[going] + at * unit).reshape(-1, n), goal)
+        matrix = bordered[:, going]
+        matrix[:, :, :rows, :n] = J.reshape(NODES, -1, rows, n)
+        ahead = t[:, going] - (v[going] * at).sum(axis=2, keepdims=True)
+        last = newton.nudged(np.linalg.inv, matrix.reshape(-1, rows + 1, rows + 1)).reshape(matrix.shape)
+        step = (last @ np.concatenate([r.reshape(NODES, -1, rows), ahead], axis=2)[..., None])[..., 0]
+        x[:, going], along_u[:, going], inverse[:, going] = at + step[:, :, :n], step[:, :, n:], last
+        size = np.abs(step[:, :, :n]).max(axis=(0, 2))
+        # the next step is about as many times smaller than this as this one's square than the last one's
+        done = (size < tol.ARRIVED) | (size**3 < tol.ERROR * before[going] ** 2)
+        near = (np.abs(x[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0)
+        on[going], before[going] = done & near, size
+        going = going[~done & near]
+        if not len(going):
+            break
+    return on, x, along_u, inverse
+
+
+def _crossed_by_none(inverse: Array, span: Array) -> Bool:
+    """Which curves (M,) no other one crosses within their spans.
+
+    A crossing is a zero of the bordered Jacobian's smallest singular value, which no two nodes are as close to as it
+    changes between any two; inverse: of these Jacobians at the nodes.
+    """
     weakest = 1.0 / np.sqrt((inverse * inverse).sum(axis=(2, 3)))
     apart = np.multiply.outer(-np.diff(NODE), span)
     steepest = (np.abs(np.diff(weakest, axis=0)) / apart).max(axis=0)
-    alone = (weakest[1:] + weakest[:-1] > 2.0 * steepest * apart).all(axis=0)
-    power = np.tensordot(_POWERS, chebyshev, axes=1)
-    return np.asarray(on), longer, np.asarray(alone), power[:, :, :n], power[:, :, n:]
+    return np.asarray((weakest[1:] + weakest[:-1] > 2.0 * steepest * apart).all(axis=0))
 
 
 def _least_residual(across: Array, left: Array) -> Array:

@@ -78,12 +78,8 @@ def settled(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bool]:
     if not len(left) or task.constraints != arm.n or not len(partners):
         open_[left] = True
         return Rows(q, doubt, complete, None, guesses), open_
-    away = newton.wrapped_distance(arm, seed[left][:, partners], seed[left][:, None])
-    partner = partners[np.where(bad[left][:, None], away, np.inf).min(axis=2).argmin(axis=1)]
-    k, first = np.nonzero(
-        (bad[left] | np.take_along_axis(bad[left], partner, axis=1)) & (np.arange(q.shape[1]) < partner)
-    )
-    second, row = partner[k, first], left[k]
+    k, first, second = _pairs(arm, seed[left], bad[left], partners)
+    row = left[k]
     apart = newton.difference(arm, seed[row, first], seed[row, second]) * radian_or_reach(arm)
     middle = seed[row, first] - 0.5 * apart
     pair = _meet(arm, task, middle, target[row])
@@ -98,6 +94,16 @@ def settled(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bool]:
         doubt[row] |= np.isnan(q[row, place, 0]) & (pair.square > -TOUCHING)
     doubt |= _merged(arm, q).any(axis=1)
     return Rows(q, doubt & ~open_, complete, None, guesses), open_
+
+
+def _pairs(arm: Arm, seed: Array, bad: Bool, partners: Int) -> tuple[Int, Int, Int]:
+    """Pairs of branches (M, B, n) that may be two of one root, with a bad one (M, B) in each: of which target (P,), and
+    which branches. All pairs of a target lie along one axis of branches, that of the pair which is closest together."""
+    away = newton.wrapped_distance(arm, seed[:, partners], seed[:, None])
+    partner = partners[np.where(bad[:, None], away, np.inf).min(axis=2).argmin(axis=1)]
+    either = bad | np.take_along_axis(bad, partner, axis=1)
+    k, first = np.nonzero(either & (np.arange(seed.shape[1]) < partner))
+    return k, first, partner[k, first]
 
 
 def _merged(arm: Arm, q: Array) -> Bool:
