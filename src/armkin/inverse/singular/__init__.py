@@ -7,9 +7,8 @@ linkages.py            self-motions of two joints about one line and of four bar
 high_order_roots.py    roots of high order: which candidates are one
 self_motions.py        whether joints can move while the target is kept, and what lies on one self-motion
 meetings.py            postures in which self-motions meet, replaced by one of each
-curves.py              one-dimensional solution sets, followed
+curves.py              one-dimensional solution sets, followed, and which postures share a circuit of one
 surfaces.py            self-motions of two dimensions that two joints about one line sweep, by the curves of the others
-circuits.py            the connected pieces of a self-motion of three joints or more
 legal_postures.py      edges of which only other postures than those listed are within limits, or hit no keep-out
 near_itself.py         `near` where it solves its target itself
 """

@@ -20,7 +20,7 @@ from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular import chains, circuits, high_order_roots, meetings, self_motions
+from armkin.inverse.singular import chains, curves, high_order_roots, meetings, self_motions
 from armkin.inverse.singular.local_structure import beyond_folds, local_structure
 
 AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
@@ -268,7 +268,7 @@ class _Groups:
         some = np.flatnonzero(far.any(axis=1))
         if len(some):
             at, goal = q[k[some], b[some]], target[k[some]]
-            mine[some] &= circuits.on_one(arm, task, at, joints[some], q[k[some]], far[some], goal)
+            mine[some] &= curves.share_circuit(arm, task, at, joints[some], q[k[some]], far[some], goal)
             i, c = np.nonzero(far & mine & (self.resting[k] & joints[:, None]).any(axis=2))  # another curve crosses
             self._push(k[i], c)
             rests = self.resting[k[i], c] & ~self.which[k[i], c]

@@ -1,4 +1,4 @@
-"""One-dimensional solution sets, followed from given postures, all at once.
+"""One-dimensional solution sets, followed from given postures, all at once; which postures are on one circuit.
 
 A step along the direction that is lost, pulled back at right angles to it (Allgower and Georg, Numerical Continuation
 Methods, 1990, ch. 2). Its length is bounded by the second smallest singular value: a curve bends where another is near.
@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
+from armkin.inverse.closed import four_bars
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
@@ -114,3 +115,50 @@ def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> 
         q = q + (back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
         r = newton.missed(arm, task, q, target)
     return q, V, np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))
+
+
+def share_circuit(arm: Arm, task: Task, q: Array, joints: Bool, postures: Array, compared: Bool, target: Array) -> Bool:
+    """Which of postures (M, K, n) lie on one circuit with q (M, n), of those compared (M, K); else True.
+
+    Two postures with the same values of the joints that a self-motion holds need not lie on one: a linkage of four bars
+    has two circuits where its shortest bar can go all the way round (Grashof's condition). joints: (M, n) those that
+    move. The curve is walked both ways at once until it closes. Where another curve crosses it, or it is too long, all
+    count as on it.
+    """
+    same = np.ones(compared.shape, bool)
+    if task.orientation == "full":
+        is_linkage, joint = four_bars.dead_points(arm, q, joints)
+        k, c = np.nonzero(compared & is_linkage[:, None] & (joint >= 0)[:, None])
+        pair = np.concatenate([q[k], postures[k, c]])
+        side = four_bars.sides(arm, pair, np.tile(joints[k], (2, 1)), np.tile(joint[k], 2)).reshape(2, -1)
+        same[k, c] = side[0] == side[1]
+        compared = compared & ~is_linkage[:, None]
+    curve, column = np.nonzero(compared)
+    ahead, crossing = directions(arm, task, q, joints, target)
+    met = crossing[curve]
+    if len(open_ := np.flatnonzero(~met)):
+        rows, place = np.unique(curve[open_], return_inverse=True)
+        twice = np.tile(rows, 2)
+        walk = Curves(arm, task, q[twice], joints[twice], target[twice], np.concatenate([ahead[rows], -ahead[rows]]))
+        met[open_] = _met(arm, walk, place, postures[curve, column][open_])
+    same[curve, column] = met
+    return same
+
+
+def _met(arm: Arm, walk: Curves, curve: Int, posture: Array) -> Bool:
+    """Which postures (P, n) the curve-th of these curves meet, until each has met all of its own: (P,).
+
+    The second half of `walk` are the same curves the other way: they tell nothing more once the first half has closed.
+    """
+    M, P = len(walk.at) // 2, len(curve)
+    ways, met = np.concatenate([curve, curve + M]), np.zeros(2 * P, bool)
+    while walk.going.any():
+        step = walk.step()
+        unsure = np.zeros(2 * M, bool)
+        unsure[step.rows] = step.unsure
+        unmet = np.flatnonzero(~met & np.isin(ways, step.rows))
+        way = ways[unmet]
+        met[unmet] = step.passes(arm, posture[unmet % P], np.searchsorted(step.rows, way)) | unsure[way]
+        left = np.bincount(curve[~(met[:P] | met[P:])], minlength=M) > 0
+        walk.going &= np.concatenate([left, left & ~walk.closed[:M]])
+    return np.asarray(met[:P] | (met[P:] & ~walk.closed[curve]))

@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular import circuits, high_order_roots
+from armkin.inverse.singular import curves, high_order_roots
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -107,7 +107,7 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, l
     if len(left):  # whether the self-motion of the one goes round to the other
         joints = curve[k[left], i[left]] | (size[left] > tol.SAME)
         end, compared = (start[left] + apart[left] * unit)[:, None], np.ones((len(left), 1), bool)
-        same[left] = circuits.on_one(arm, task, start[left], joints, end, compared, target[k[left]])[:, 0]
+        same[left] = curves.share_circuit(arm, task, start[left], joints, end, compared, target[k[left]])[:, 0]
     k, i, j = k[same], i[same], j[same]
     motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
     nearer = motion[k, i] < motion[k, j] - tol.SAME
