@@ -14,12 +14,12 @@ from armkin.model.arm import Arm
 from armkin.robot_file import RobotFile
 from armkin.robot_file.scene_file import Scene
 
-_build = armkin.model.build_arm.build
+_build = armkin.model.build_arm.arm_of_file
 _arms: dict[tuple[str, str], Arm] = {}
 
 
 def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
-    """`armkin.model.build_arm.build`, once for each robot file."""
+    """`armkin.model.build_arm.arm_of_file`, once for each robot file."""
     if scene is not None or tool is not None:
         return _build(file, scene, tool)
     key = file.path, file.sha256
@@ -35,5 +35,5 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
 
 def install() -> None:
     """For all tests of this process."""
-    armkin.model.build_arm.build = build
-    armkin.keep_out.load_with_scene.build = build  # type: ignore[attr-defined]
+    armkin.model.build_arm.arm_of_file = build
+    armkin.keep_out.load_with_scene.arm_of_file = build  # type: ignore[attr-defined]

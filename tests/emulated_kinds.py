@@ -15,7 +15,7 @@ from armkin.board.firmware.configuration import configure
 from armkin.board.kinds import board_of
 from armkin.board.klipper.extra_axes import axes_of
 from armkin.board.sim.sim_servo_bus import Servo
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 from other_programs import GRBL, OURS
 from starting_elsewhere import KINDS
@@ -144,7 +144,7 @@ def start(kind: str) -> Start:
     text = KINDS[name] if kind in EMULATED else KINDS[name].replace(name, kind)
 
     def begin() -> Emulated:
-        board = board_of(build(parse_robot_file(text)))
+        board = board_of(arm_of_file(parse_robot_file(text)))
         made: Emulated = emulate(board, board.simulated())
         return made
 

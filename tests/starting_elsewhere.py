@@ -22,7 +22,7 @@ from armkin.board.klipper.extra_axes import axes_of
 from armkin.board.sim.sim_servo_bus import Servo
 from armkin.board_catalogue import BOARDS
 from armkin.formula.arrays import Array
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 from command_line import ROOT
 
@@ -102,7 +102,7 @@ KINDS = {
 
 def on(kind: str, at: Array | None = None) -> Kind:
     """three_dof on a simulated board of that kind, at home or at joint values (n,) [rad]."""
-    arm = build(parse_robot_file(KINDS[kind]))
+    arm = arm_of_file(parse_robot_file(KINDS[kind]))
     seen: list[list[float]] = []
     board = board_of(arm)
     port: Any = board.simulated()

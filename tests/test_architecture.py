@@ -351,7 +351,7 @@ def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     """A file in board/kinds/ alone, and robot files, their schema and `board_of` know the kind."""
     from armkin import board_catalogue
     from armkin.board import kinds
-    from armkin.model.build_arm import build
+    from armkin.model.build_arm import arm_of_file
     from armkin.robot_file import parse_robot_file
     from armkin.robot_file.robot_schema import json_schema
 
@@ -363,7 +363,7 @@ def test_a_new_kind_is_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         robot = (
             (SOURCE.parent / "tests/robots/three_dof_grbl.yaml").read_text().replace("kind: grbl", "kind: gcode_box")
         )
-        board = kinds.board_of(build(parse_robot_file(robot)))
+        board = kinds.board_of(arm_of_file(parse_robot_file(robot)))
         assert (board.kind, type(board).__module__) == ("gcode_box", "armkin.board.kinds.gcode_box")
         assert "gcode_box" in json_schema()["$defs"]["Board"]["properties"]["kind"]["enum"]
     finally:

@@ -5,7 +5,7 @@ import pytest
 
 import armkin
 from armkin import robot_file
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 
 LEVEL, DROP = 60.0, -40.0  # from the last joint to the tip, always level
 
@@ -26,7 +26,7 @@ motors:
 
 def test_a_level_tool_is_an_offset_of_joint_1() -> None:
     """Against the linkage by trigonometry: heights and distances of both bars, then the level piece."""
-    arm = build(robot_file.parse_robot_file(TEXT))
+    arm = arm_of_file(robot_file.parse_robot_file(TEXT))
     for yaw, lift, bend in np.random.default_rng(1).uniform(-1, 1, (20, 3)):
         out = 150 * np.cos(lift) + 160 * np.cos(lift + bend) + LEVEL
         up = 100 + 150 * np.sin(lift) + 160 * np.sin(lift + bend) + DROP
@@ -35,7 +35,7 @@ def test_a_level_tool_is_an_offset_of_joint_1() -> None:
 
 
 def test_the_forearms_motor_turns_the_sum() -> None:
-    arm = build(robot_file.parse_robot_file(TEXT))
+    arm = arm_of_file(robot_file.parse_robot_file(TEXT))
     per_degree = 200 * 16 * 5 / 360
     pulses = armkin.pulses(arm, np.radians([10, 20, -30]))
     assert pulses.tolist() == [round(10 * per_degree), round(20 * per_degree), round(-10 * per_degree)]

@@ -13,7 +13,7 @@ from armkin import robot_file
 from armkin.errors import UsageError
 from armkin.forward import position
 from armkin.model.arm import Arm, from_links
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.motors import (
     best_pulses,
     joints,
@@ -144,7 +144,7 @@ def servo_arm(invert: bool) -> Arm:
     text = (ROOT / "robots/planar_2dof.yaml").read_text()
     if invert:
         text = text.replace("axis: S1,", "axis: S1, invert: true,")
-    return build(robot_file.parse_robot_file(text))
+    return arm_of_file(robot_file.parse_robot_file(text))
 
 
 def test_servo_pulse_widths() -> None:

@@ -183,8 +183,10 @@ def test_three_dof_as_printed() -> None:
 
     text = (ROOT / "robots/three_dof.yaml").read_text()
     # E1: Tables 1 and 3 print alpha1 = -90 and d2 = +10, which mirrors z for all cases but the first.
-    printed = arm.build(robot_file.parse_robot_file(text.replace("alpha: 90, a: 0, d: 170", "alpha: -90, a: 0, d: 170")
-                                         .replace("a: 197, d: -10", "a: 197, d: 10")))  # fmt: skip
+    other = text.replace("alpha: 90, a: 0, d: 170", "alpha: -90, a: 0, d: 170").replace(
+        "a: 197, d: -10", "a: 197, d: 10"
+    )
+    printed = arm.arm_of_file(robot_file.parse_robot_file(other))
     assert armkin.fk(printed, np.deg2rad([0, -90, 90]))[:3, 3].tolist() == near([258, 10, 367], 4)
     assert armkin.fk(printed, np.deg2rad([-30, 5, -5]))[2, 3] == near(152.8303, 4)
     # E4: the right arm's rows as printed do not reach the target.

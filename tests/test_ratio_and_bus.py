@@ -6,7 +6,7 @@ import pytest
 import armkin
 from armkin import robot_file
 from armkin.errors import RobotFileError
-from armkin.model.arm import actual, from_links
+from armkin.model.arm import actual_arm, from_links
 from armkin.motors import outside_travel, pulse_units
 from command_line import ROOT, run
 
@@ -55,8 +55,8 @@ def test_a_turn_of_the_arm_is_less_than_a_commanded_turn() -> None:
     assert np.diff(np.sort(copies[:, 0])) == pytest.approx(2 * np.pi / 1.25)
     s = armkin.ik(arm, armkin.fk(arm, [6.0, 1.0])[:2, 3], near=[6.0, 1.0])
     assert s.q[s.best] == pytest.approx([6.0, 1.0])
-    assert actual(arm).upper[0] == 10.0
-    assert actual(actual(arm)) is actual(arm)
+    assert actual_arm(arm).upper[0] == 10.0
+    assert actual_arm(actual_arm(arm)) is actual_arm(arm)
 
 
 def test_bus_counts_are_absolute_and_come_back() -> None:

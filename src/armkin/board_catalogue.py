@@ -156,5 +156,5 @@ def foreign_board(kind: str) -> ForeignBoard | None:
     """The data of a kind with other firmware; None for armkin's own, and for what is not installed."""
     if kind in BOARDS or not kind_exists(kind):
         return None
-    found: ForeignBoard = kind_module(kind).KIND
-    return found
+    kind_data: ForeignBoard = kind_module(kind).KIND
+    return kind_data

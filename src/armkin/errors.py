@@ -129,9 +129,9 @@ class NoSolutionError(ArmkinError):
         Returns:
             An error of the same class.
         """
-        told = super().within(place, **fields)
-        told.plan = self.plan
-        return told
+        error = super().within(place, **fields)
+        error.plan = self.plan
+        return error
 
 
 class NoBranchError(NoSolutionError):

@@ -27,12 +27,12 @@ def protect_input(path: str | os.PathLike[str] | int) -> None:
     A number is a descriptor: 0 is what standard input comes from.
     """
     with suppress(OSError, ValueError):
-        found = os.stat(path)
-        if stat.S_ISREG(found.st_mode):
-            _kept.add((found.st_dev, found.st_ino))
+        status = os.stat(path)
+        if stat.S_ISREG(status.st_mode):
+            _kept.add((status.st_dev, status.st_ino))
 
 
-def forget() -> None:
+def forget_inputs() -> None:
     """Forget what was kept: a new command begins."""
     _kept.clear()
 
@@ -54,13 +54,13 @@ def write_whole(
         raise FileError(f"{name!r}: cannot write: a name has no null bytes", file=name)
     try:
         real = os.path.realpath(name)  # through a link: what it points to is replaced, not the link
-        there = os.stat(real) if os.path.exists(real) else None
-        if there is not None and (not stat.S_ISREG(there.st_mode) or _is_stream(there)):
-            with _open(real, _APPEND[mode] if stat.S_ISREG(there.st_mode) else mode) as file:
+        status = os.stat(real) if os.path.exists(real) else None
+        if status is not None and (not stat.S_ISREG(status.st_mode) or _is_stream(status)):
+            with _open(real, _APPEND[mode] if stat.S_ISREG(status.st_mode) else mode) as file:
                 yield file
             return
-        if there is not None:
-            _check_replaceable(name, real, there, corrects=corrects)
+        if status is not None:
+            _check_replaceable(name, real, status, corrects=corrects)
         import tempfile  # needed for writing alone: it takes a millisecond
 
         handle, temporary = tempfile.mkstemp(prefix=".armkin-", suffix=".part", dir=os.path.dirname(real))
@@ -79,15 +79,15 @@ def write_whole(
         raise FileError(f"{name}: cannot write: {why}", file=name) from None
 
 
-def check(path: str | os.PathLike[str]) -> None:
+def check_writable(path: str | os.PathLike[str]) -> None:
     """Raise what `write_whole` would of a name: before long work, not after it."""
     name = os.fspath(path)
     if "\0" in name:
         raise FileError(f"{name!r}: cannot write: a name has no null bytes", file=name)
     real = os.path.realpath(name)
     try:
-        if os.path.exists(real) and stat.S_ISREG((there := os.stat(real)).st_mode) and not _is_stream(there):
-            _check_replaceable(name, real, there)
+        if os.path.exists(real) and stat.S_ISREG((status := os.stat(real)).st_mode) and not _is_stream(status):
+            _check_replaceable(name, real, status)
     except OSError as error:
         raise FileError(f"{name}: cannot write: {error.strerror or error}", file=name) from None
     folder = os.path.dirname(real)
@@ -95,13 +95,13 @@ def check(path: str | os.PathLike[str]) -> None:
         raise FileError(f"{name}: cannot write: there is no folder {os.path.dirname(name)}", file=name)
 
 
-def ending(path: str | os.PathLike[str], content: str, allowed: Sequence[str], *, may_lack: bool = False) -> str:
+def file_ending(path: str | os.PathLike[str], content: str, allowed: Sequence[str], *, may_lack: bool = False) -> str:
     """The ending of a file's name, in lower case: what the file is written as, one of `allowed`.
 
     content: such a file's content with its verb, for the message. may_lack: a name without an ending will do, too, and
     gives ""; so does a pipe or device, whatever its name. Raises UsageError for another ending, and for two.
 
-    >>> ending("poses.NPZ", "rows are", (".csv", ".npz"))
+    >>> file_ending("poses.NPZ", "rows are", (".csv", ".npz"))
     '.npz'
     """
     name = os.fspath(path)
@@ -110,8 +110,8 @@ def ending(path: str | os.PathLike[str], content: str, allowed: Sequence[str], *
     if may_lack and (not end or (os.path.exists(name) and not os.path.isfile(name))):
         return ""
     if end not in allowed:
-        *others, last = allowed
-        kinds, them = (f"{', '.join(others)} or {last}", "one of them") if others else (last, "that")
+        *earlier, last = allowed
+        kinds, them = (f"{', '.join(earlier)} or {last}", "one of them") if earlier else (last, "that")
         raise UsageError(f"{name}: {content} written as {kinds}; end the file's name with {them}")
     if before in (*allowed, *_DATA):
         raise UsageError(f"{name}: its name has two endings, {before} and {end}; end it with one of them")

@@ -53,8 +53,8 @@ def fk(arm: Arm, q: ArrayLike) -> Poses:
 
     values = as_joints(arm, q)
     if values.size == arm.n:
-        return _single(arm, values.reshape(arm.n)).reshape(*values.shape[:-1], 4, 4)
-    return _batched(arm, values, (4, 4), tip_formula)
+        return _single_pose(arm, values.reshape(arm.n)).reshape(*values.shape[:-1], 4, 4)
+    return _run_batched(arm, values, (4, 4), tip_formula)
 
 
 def position(arm: Arm, q: ArrayLike) -> Points:
@@ -74,12 +74,12 @@ def position(arm: Arm, q: ArrayLike) -> Points:
     >>> position(armkin.load("robots/planar_2dof.yaml"), np.deg2rad([20, 50])).round(6).tolist()
     [290.544567, 350.311815, 0.0]
     """
-    return _batched(arm, as_joints(arm, q), (3,), point_formula)
+    return _run_batched(arm, as_joints(arm, q), (3,), point_formula)
 
 
 def point_numbers(arm: Arm) -> Callable[..., tuple[float, ...]]:
     """`position` in plain Python: takes the n joint values of one pose [rad | mm], returns x, y, z [mm]."""
-    return _recorded(arm, point_formula).record_now().numbers()
+    return _recorded_code(arm, point_formula).record_now().numbers()
 
 
 def frames(arm: Arm, q: ArrayLike) -> Frames:
@@ -99,7 +99,7 @@ def frames(arm: Arm, q: ArrayLike) -> Frames:
         UsageError: q is no array of numbers, or its last axis has not the arm's n values.
     """
 
-    return _batched(arm, as_joints(arm, q), (arm.n + 2, 4, 4), _frames)
+    return _run_batched(arm, as_joints(arm, q), (arm.n + 2, 4, 4), _frames_formula)
 
 
 def jacobian(arm: Arm, q: ArrayLike) -> Jacobians:
@@ -117,15 +117,15 @@ def jacobian(arm: Arm, q: ArrayLike) -> Jacobians:
         UsageError: q is no array of numbers, or its last axis has not the arm's n values.
     """
 
-    return _batched(arm, as_joints(arm, q), (6, arm.n), jacobian_formula)
+    return _run_batched(arm, as_joints(arm, q), (6, arm.n), jacobian_formula)
 
 
 def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Poses, Jacobians]:
     """`fk` and `jacobian` in one, at little more than the cost of the latter: (..., 4, 4) and (..., 6, n)."""
     values = as_joints(arm, q)
-    both = _batched(arm, values, (16 + 6 * arm.n,), _pose_and_jacobian)
+    entries = _run_batched(arm, values, (16 + 6 * arm.n,), _pose_and_jacobian)
     lead = values.shape[:-1]
-    return both[..., :16].reshape(*lead, 4, 4), both[..., 16:].reshape(*lead, 6, arm.n)
+    return entries[..., :16].reshape(*lead, 4, 4), entries[..., 16:].reshape(*lead, 6, arm.n)
 
 
 def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Figures:
@@ -176,27 +176,27 @@ def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, sca
     J = jacobian(arm, q)
     J[..., :3, :] /= scale
     J = J[..., rows, :]
-    known = np.asarray(np.isfinite(J).all(axis=(-2, -1), keepdims=True))  # not so for the nan rows of `Solutions.q`
-    values = np.linalg.svd(np.where(known, J, 0.0), compute_uv=False)
-    return np.where(known[..., 0], values, np.nan)
+    finite = np.asarray(np.isfinite(J).all(axis=(-2, -1), keepdims=True))  # not so for the nan rows of `Solutions.q`
+    values = np.linalg.svd(np.where(finite, J, 0.0), compute_uv=False)
+    return np.where(finite[..., 0], values, np.nan)
 
 
 def move(arm: Arm, P: Pose, joint: int, value: Motion) -> Pose:
     """The pose after a joint's motion: ``P Z(r q)``, r the joint's ratio."""
     if arm.prismatic[joint]:
-        return pose.slide(P, _slid(arm, joint, value))
-    return pose.rotate(P, *_turned(arm, joint, value))
+        return pose.slide(P, _actual_slide(arm, joint, value))
+    return pose.rotate(P, *_actual_cos_sin(arm, joint, value))
 
 
-def _slid(arm: Arm, joint: int, value: Any) -> Entry:
+def _actual_slide(arm: Arm, joint: int, value: Any) -> Entry:
     """The actual joint value for a commanded one."""
     ratio = float(arm.ratio[joint])
     return value if ratio == 1.0 else arrays.mul(ratio, value)
 
 
-def _turned(arm: Arm, joint: int, value: Motion) -> tuple[Entry, Entry]:
+def _actual_cos_sin(arm: Arm, joint: int, value: Motion) -> tuple[Entry, Entry]:
     """Cosine and sine of the actual angle for a commanded one."""
-    return value if isinstance(value, tuple) else arrays.cos_sin(_slid(arm, joint, value))
+    return value if isinstance(value, tuple) else arrays.cos_sin(_actual_slide(arm, joint, value))
 
 
 def one_pose(arm: Arm, q: ArrayLike, name: str) -> Array:
@@ -213,10 +213,10 @@ def as_joints(arm: Arm, q: ArrayLike) -> Joints:
     """``q`` as a float array with the arm's number of joints on its last axis."""
     values = arrays.real_array(q, "joint values")
     if values.ndim == 0 or values.shape[-1] != arm.n:
-        got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
+        given_text = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
         raise UsageError(
             f"{arm.name} has {arm.n} joints ({', '.join(arm.joint_names)}): "
-            f"expected {arm.n} values on the last axis, got {got}"
+            f"expected {arm.n} values on the last axis, got {given_text}"
         )
     return values
 
@@ -226,18 +226,18 @@ def tip_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
         P = pose.compose(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
-    return _rows(P)
+    return _matrix_entries(P)
 
 
-def _frames(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
+def _frames_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """All frames, row by row: 16 (n + 2) entries."""
-    out = _rows(pose.constant(arm.base))
+    entries = _matrix_entries(pose.constant(arm.base))
     P = pose.constant(arm.link[0])
     for i in range(arm.n):
         P = move(arm, P, i, q[i])
-        out += _rows(pose.compose(P, pose.constant(arm.frame[i])))
+        entries += _matrix_entries(pose.compose(P, pose.constant(arm.frame[i])))
         P = pose.compose(P, pose.constant(arm.link[i + 1]))
-    return out + _rows(P)
+    return entries + _matrix_entries(P)
 
 
 def jacobian_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
@@ -258,10 +258,10 @@ def _pose_and_jacobian(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
         column = [*z, 0.0, 0.0, 0.0] if arm.prismatic[i] else [*arrays.cross(z, lever), *z]
         ratio = float(arm.ratio[i])
         columns.append(column if ratio == 1.0 else [arrays.mul(ratio, entry) for entry in column])
-    return [*_rows(P), *(column[row] for row in range(6) for column in columns)]
+    return [*_matrix_entries(P), *(column[row] for row in range(6) for column in columns)]
 
 
-def _rows(P: Pose) -> list[Entry]:
+def _matrix_entries(P: Pose) -> list[Entry]:
     """A pose as the 16 entries of its matrix, row by row."""
     return [*P[0::3], *P[1::3], *P[2::3], 0.0, 0.0, 0.0, 1.0]
 
@@ -271,16 +271,16 @@ def point_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
     for i in reversed(range(arm.n)):
         if arm.prismatic[i]:
-            p = [p[0], p[1], arrays.add(p[2], _slid(arm, i, q[i]))]
+            p = [p[0], p[1], arrays.add(p[2], _actual_slide(arm, i, q[i]))]
         else:
-            c, s = _turned(arm, i, q[i])
+            c, s = _actual_cos_sin(arm, i, q[i])
             x, y, z = p
             p = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
         p = pose.apply(pose.constant(arm.link[i]), p)
     return p
 
 
-def _single(arm: Arm, q: Array) -> Array:
+def _single_pose(arm: Arm, q: Array) -> Array:
     """The tool's pose for one set of joint values, by matrix products: shorter than any batch of one."""
     T = arm.link[0]
     for i in range(arm.n):
@@ -298,52 +298,52 @@ Formula = Callable[["Arm", Sequence[Motion]], list[Entry]]
 
 
 @lru_cache(maxsize=256)
-def _recorded(arm: Arm, formula: Formula) -> LazyCode:
+def _recorded_code(arm: Arm, formula: Formula) -> LazyCode:
     """A formula of an arm's joint values as straight-line code."""
     return LazyCode(lambda q: formula(arm, q), arm.n)
 
 
 @lru_cache(maxsize=256)
 def _recorded_of_turns(arm: Arm, formula: Formula) -> LazyCode:
-    """A formula of what `_turns` returns as straight-line code."""
-    return LazyCode(lambda inputs: formula(arm, _motions(arm, inputs)), 2 * arm.n - int(arm.prismatic.sum()))
+    """A formula of what `_slides_and_turns` returns as straight-line code."""
+    return LazyCode(lambda inputs: formula(arm, _joint_motions(arm, inputs)), 2 * arm.n - int(arm.prismatic.sum()))
 
 
 @lru_cache(maxsize=256)
-def _places(arm: Arm) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Of what `_turns` returns: where slides and where cosines stand; and the ratios of what turns (m, 1)."""
+def _turn_places(arm: Arm) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+    """Of `_slides_and_turns`: where slides and where cosines stand; and the ratios of what turns (m, 1)."""
     first = np.cumsum([0, *np.where(arm.prismatic, 1, 2)])[:-1]
     return first[arm.prismatic], first[~arm.prismatic], arm.ratio[~arm.prismatic, None]
 
 
-def _turns(arm: Arm, q: Array) -> Array:
+def _slides_and_turns(arm: Arm, q: Array) -> Array:
     """Of joint values (N, n) slides, and actual cosines and sines of what turns, joint by joint: (2 n - slides, N)."""
-    slides, turning, ratio = _places(arm)
+    slides, turning, ratio = _turn_places(arm)
     values = np.ascontiguousarray(q.T)
-    out = np.empty((len(slides) + 2 * len(turning), len(q)))
+    rows = np.empty((len(slides) + 2 * len(turning), len(q)))
     if len(slides):
-        out[slides], values = values[arm.prismatic], values[~arm.prismatic]
+        rows[slides], values = values[arm.prismatic], values[~arm.prismatic]
     angles: Any = values * ratio
     turns: Any = arrays.cos_sin(angles)
-    out[turning], out[turning + 1] = turns
-    return out
+    rows[turning], rows[turning + 1] = turns
+    return rows
 
 
-def _motions(arm: Arm, turns: Iterable[Entry]) -> list[Motion]:
+def _joint_motions(arm: Arm, turns: Iterable[Entry]) -> list[Motion]:
     """The same joint by joint."""
-    rest = iter(turns)
-    return [next(rest) if slides else (next(rest), next(rest)) for slides in arm.prismatic.tolist()]
+    remaining = iter(turns)
+    return [next(remaining) if slides else (next(remaining), next(remaining)) for slides in arm.prismatic.tolist()]
 
 
-def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
+def _run_batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
     """Run a formula over the batch axes of q, of small batches with all cosines and sines taken at once.
 
     Large ones in chunks that stay in the cache.
     """
-    out = np.empty(values.shape[:-1] + shape)
-    flat_q, flat_out = values.reshape(-1, arm.n), out.reshape(-1, math.prod(shape))
+    results = np.empty(values.shape[:-1] + shape)
+    flat_q, flat_out = values.reshape(-1, arm.n), results.reshape(-1, math.prod(shape))
     if len(flat_q) > SMALL:
-        large = _recorded(arm, formula).record_now()
+        large = _recorded_code(arm, formula).record_now()
         workspace = large.workspace(min(len(flat_q), arrays.CHUNK))
         for start in range(0, len(flat_q), arrays.CHUNK):
             columns = np.ascontiguousarray(flat_q[start : start + arrays.CHUNK].T)
@@ -351,16 +351,16 @@ def _batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) 
                 workspace = large.workspace(columns.shape[1])
             for k, entry in enumerate(large.run(list(columns), workspace)):
                 flat_out[start : start + arrays.CHUNK, k] = entry
-        return out
-    turns, code = _turns(arm, flat_q), _recorded_of_turns(arm, formula).get(len(flat_q))
+        return results
+    turns, code = _slides_and_turns(arm, flat_q), _recorded_of_turns(arm, formula).get(len(flat_q))
     if code is not None and len(flat_q) <= FEW:
         numbers = code.numbers()
-        for k, one in enumerate(turns.T.tolist()):
-            flat_out[k] = numbers(*one)
-        return out
-    found: Any = (
-        formula(arm, _motions(arm, turns)) if code is None else code.run(list(turns), code.workspace(len(flat_q)))
+        for k, inputs in enumerate(turns.T.tolist()):
+            flat_out[k] = numbers(*inputs)
+        return results
+    entries: Any = (
+        formula(arm, _joint_motions(arm, turns)) if code is None else code.run(list(turns), code.workspace(len(flat_q)))
     )
-    for k, entry in enumerate(found):
+    for k, entry in enumerate(entries):
         flat_out[:, k] = entry
-    return out
+    return results

@@ -105,14 +105,14 @@ def pulses(arm: Arm, q: ArrayLike) -> Pulses:
     >>> armkin.pulses(arm, np.deg2rad([-30, 5, -5])).tolist()
     [-1067, -10144, 5667]
     """
-    exact, slack = _exact(arm, q)
-    whole = np.floor(np.abs(exact) + (0.5 + slack))
-    return np.copysign(whole, exact).astype(np.int64)
+    exact, slack = _exact_and_slack(arm, q)
+    magnitude = np.floor(np.abs(exact) + (0.5 + slack))
+    return np.copysign(magnitude, exact).astype(np.int64)
 
 
-def places(arm: Arm, q: ArrayLike) -> Array:
+def exact_pulses(arm: Arm, q: ArrayLike) -> Array:
     """Pulses of every motor before they are rounded: (..., n) [rad | mm] -> (..., motors)."""
-    return _exact(arm, q)[0]
+    return _exact_and_slack(arm, q)[0]
 
 
 def joints(arm: Arm, p: ArrayLike) -> Array:
@@ -140,8 +140,8 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     values = arrays.real_array(p, "pulses")
     m = len(arm.motor_gain)
     if values.ndim == 0 or values.shape[-1] != m:
-        got = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
-        raise UsageError(f"{arm.name} has {m} motors: expected {m} pulses on the last axis, got {got}")
+        given_text = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
+        raise UsageError(f"{arm.name} has {m} motors: expected {m} pulses on the last axis, got {given_text}")
     if not np.all(np.abs(values) <= _LARGEST):
         raise UsageError("pulses must be finite, and at most 2^53 from 0")
     offset = values - arm.motor_bias
@@ -209,7 +209,7 @@ def best_pulses(arm: Arm, q: ArrayLike) -> Best:
     Raises:
         UsageError: as `pulses`, or the arm has more than 12 motors.
     """
-    exact, _ = _exact(arm, q)
+    exact, _ = _exact_and_slack(arm, q)
     values = as_joints(arm, q)
     m = len(arm.motor_gain)
     steps = (-1.0, 0.0, 1.0, 2.0) if 4**m <= _CANDIDATES else (0.0, 1.0)
@@ -223,7 +223,7 @@ def best_pulses(arm: Arm, q: ArrayLike) -> Best:
     block = max(1, _AT_ONCE // len(around))
     for start in range(0, len(flat_q), block):
         part = slice(start, start + block)
-        chosen[part] = _nearest(arm, flat_q[part], flat_x[part], around)
+        chosen[part] = _nearest_pulses(arm, flat_q[part], flat_x[part], around)
     return Best(rounding(arm, values, chosen.reshape(exact.shape)), rounding(arm, values), tried=len(around) + 1)
 
 
@@ -242,8 +242,8 @@ def motor_accel(arm: Arm) -> Array:
     That of a motor which turns several joints suits the most delicate of them, whichever moves: so a hold,
     of which the board knows motors only, is within the joints' max_accel.
     """
-    each = np.abs(arm.motor_gain) * arm.max_accel
-    return np.asarray(np.where(each > 0, each, np.inf).min(axis=1))
+    per_joint = np.abs(arm.motor_gain) * arm.max_accel
+    return np.asarray(np.where(per_joint > 0, per_joint, np.inf).min(axis=1))
 
 
 def motor_names(arm: Arm) -> list[str]:
@@ -274,7 +274,7 @@ def outside_travel(arm: Arm, p: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray((values < allowed[:, 0]) | (values > allowed[:, 1]))
 
 
-def _exact(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
+def _exact_and_slack(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
     """Pulses before rounding, and how far arithmetic may have moved them: (..., motors) twice."""
     joints_per_pulse(arm)
     values = as_joints(arm, q)
@@ -287,7 +287,7 @@ def _exact(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
     return exact, _HALF + 4 * np.finfo(float).eps * size
 
 
-def undriven(arm: Arm) -> list[str]:
+def undriven_joints(arm: Arm) -> list[str]:
     """Names of the joints that no motor turns."""
     return [name for name, column in zip(arm.joint_names, arm.motor_gain.T, strict=True) if not column.any()]
 
@@ -298,7 +298,7 @@ def joints_per_pulse(arm: Arm) -> Array:
 
     Raises UsageError if the motors do not determine the joints.
     """
-    gain, still = arm.motor_gain, undriven(arm)
+    gain, still = arm.motor_gain, undriven_joints(arm)
     if still:
         lacks = "drives" if len(still) == arm.n else f"motor for {', '.join(still)}"
         raise UsageError(f"{arm.name} has no {lacks}; add motors: to its file, or drive: to each joint", undriven=still)
@@ -309,14 +309,14 @@ def joints_per_pulse(arm: Arm) -> Array:
             f"{arm.name}'s motors do not determine its joints; give it as many independent motors as joints"
         )
     if np.count_nonzero(gain) == len(gain) == arm.n:  # one to one: exact, without a factorisation
-        found = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain != 0).T
+        per_pulse = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain != 0).T
     else:
-        found = np.asarray(np.linalg.pinv(gain / scale) / scale[:, None])
-    found.flags.writeable = False
-    return found
+        per_pulse = np.asarray(np.linalg.pinv(gain / scale) / scale[:, None])
+    per_pulse.flags.writeable = False
+    return per_pulse
 
 
-def _nearest(arm: Arm, q: Array, exact: Array, corners: Array) -> Array:
+def _nearest_pulses(arm: Arm, q: Array, exact: Array, corners: Array) -> Array:
     """Per pose, the neighbouring pulses with the nearest tip: (N, motors)."""
     rounded = pulses(arm, q).astype(float)
     near = np.concatenate([rounded[:, None], np.floor(exact)[:, None] + corners], axis=1)  # (N, C, motors)

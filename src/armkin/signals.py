@@ -20,7 +20,7 @@ _waiting: set[int] = set()  # signals that come again
 _NOT_IN = ("_frozen_importlib", "importlib._bootstrap", "pydantic.")  # one module goes by its first two names
 
 
-def interrupted(number: int, frame: FrameType | None) -> None:
+def handle_interrupt(number: int, frame: FrameType | None) -> None:
     """The handler of Ctrl-C; while modules are imported or robot files checked, it waits."""
     if not put_off(number, frame):
         raise KeyboardInterrupt

@@ -27,7 +27,7 @@ from armkin.errors import UsageError
 from armkin.export.c.c_program import identifier, program
 from armkin.export.js.es_module import module
 from armkin.inverse.solvers.redundant import redundancy
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.robot_file import catalogue
 
 ROUNDS, TURNS = 15, 5
@@ -94,7 +94,7 @@ def speed(arm: armkin.Arm, folder: Path) -> str:
     turn = np.where(arm.prismatic, arm.reach, np.pi)
     low, high = np.maximum(arm.lower, -turn), np.minimum(arm.upper, turn)
     q = np.random.default_rng(1).uniform(low, high, (200 if general else 2000, arm.n))
-    if spare := redundancy(actual(arm), None):  # both hold the joint to spare where `near` has it
+    if spare := redundancy(actual_arm(arm), None):  # both hold the joint to spare where `near` has it
         q[:, spare.joint] = arm.home[spare.joint]
     goals = armkin.fk(arm, q) if spare else goals_of(arm, q)
     texts = program(arm, "arm.c")
@@ -126,7 +126,7 @@ def speed(arm: armkin.Arm, folder: Path) -> str:
 def agree(arm: armkin.Arm, folder: Path, seed: int) -> str:
     """How many answers differ from Python's, and which."""
     q = postures(arm, 200, 100, seed)
-    if spare := redundancy(actual(arm), None):
+    if spare := redundancy(actual_arm(arm), None):
         different = _held(arm, folder, q, spare.joint)
     else:
         different = differences(arm, ask(arm, folder, q)["ik"], armkin.ik(arm, goals_of(arm, q)))

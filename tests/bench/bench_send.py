@@ -34,7 +34,7 @@ SEGMENTS = 1000
 
 def noisy(seed: int) -> str:
     """One run; a line of the table."""
-    arm = arms.load(ROBOT)
+    arm = arms.load_arm(ROBOT)
     rng = np.random.default_rng(seed)
     configuration = configure(arm)
     with EmulatedBoard(seed=seed, reset_on_open=False, patience=0) as board:

@@ -39,7 +39,7 @@ class Suspended(Wire):
 
 def prepared() -> tuple[Suspended, FirmwareMachine]:
     """A board that knows its arm at home, and the program that speaks with it."""
-    arm = arms.load(ROOT / "robots/three_dof.yaml")
+    arm = arms.load_arm(ROOT / "robots/three_dof.yaml")
     configuration = configure(arm)
     port = Suspended(SimBoard(configuration.board))
     machine = FirmwareMachine(port, arm, configuration)

@@ -31,7 +31,7 @@ from armkin.robot_file import parse_robot_file
 
 @pytest.fixture(scope="module")
 def three_dof() -> Arm:
-    return arms.load("robots/three_dof.yaml")
+    return arms.load_arm("robots/three_dof.yaml")
 
 
 class LyingPort(SimPort):
@@ -130,7 +130,7 @@ def switched() -> Arm:
     for axis, switch_value in zip("XYZ", (-20, 75, -105), strict=True):
         homing = f"homing: {{switch: {axis}, direction: -1, at: {switch_value}, speed: 40, backoff: 3, normally: open}}"
         text = text.replace(f"    drive: {{axis: {axis},", f"    {homing}\n    drive: {{axis: {axis},")
-    return arms.build(parse_robot_file(text))
+    return arms.arm_of_file(parse_robot_file(text))
 
 
 @pytest.mark.parametrize("command", COMMANDS)

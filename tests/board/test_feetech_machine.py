@@ -13,7 +13,7 @@ from armkin.board.feetech import registers
 from armkin.board.feetech.feetech_machine import LAG, SETTLED, ServoMachine
 from armkin.board.sim.sim_servo_bus import Noise, Servo, ServoBus
 from armkin.errors import LinkError, NoSolutionError
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 
 TEXT = """
@@ -25,7 +25,7 @@ joints:
     f"     drive: {{kind: bus, id: {k}, counts: 4096, zero: {2048 + 10 * k}, invert: {str(k == 2).lower()}}}}}\n"
     for k, alpha, a, d in ((1, 90, 0, 60), (2, 0, 110, 0), (3, 0, 100, 0))
 )
-ARM = build(parse_robot_file(TEXT))
+ARM = arm_of_file(parse_robot_file(TEXT))
 HOME = armkin.pulses(ARM, ARM.home).tolist()
 
 

@@ -19,7 +19,7 @@ from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import expected_settings
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError, UsageError
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 from armkin.robot_file.robot_keys import Gripper
 from command_line import ROOT, THREE_DOF
@@ -183,7 +183,7 @@ def test_arms_that_grbl_cannot_drive_are_refused() -> None:
         ("microsteps: 16", "microsteps: 256", "enough for 500 steps a unit at most"),
     ):
         with pytest.raises(UsageError, match=message):
-            axes_of(build(parse_robot_file(text.replace(before, after))))
+            axes_of(arm_of_file(parse_robot_file(text.replace(before, after))))
     with pytest.raises(UsageError, match="GRBL drives steppers alone"):
         axes_of(armkin.load("ra02"))
 

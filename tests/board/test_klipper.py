@@ -22,7 +22,7 @@ from armkin.board.klipper.klipper_machine import KlipperMachine
 from armkin.board.klipper.trajectory_to_g1_lines import Lines
 from armkin.board.sim.sim_klipper import Klipper
 from armkin.errors import LinkError, PositionLostError, UsageError
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 from command_line import ROOT
 
@@ -263,7 +263,7 @@ def test_printer_cfg_is_compared() -> None:
 def test_arms_that_klipper_cannot_drive_are_refused() -> None:
     text = FILE.read_text()
     with pytest.raises(UsageError, match="motor q1 is on axis X; Klipper has A, B, C, D, H"):
-        axes_of(build(parse_robot_file(text.replace("axis: A", "axis: X").replace("board: {kind: klipper}", ""))))
+        axes_of(arm_of_file(parse_robot_file(text.replace("axis: A", "axis: X").replace("board: {kind: klipper}", ""))))
     with pytest.raises(UsageError, match="Klipper drives steppers alone"):
         axes_of(armkin.load("ra02"))
 

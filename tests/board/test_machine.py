@@ -54,12 +54,12 @@ SWITCHES = [
 
 @pytest.fixture(scope="module")
 def wrist() -> Arm:
-    return arms.build(parse_robot_file(WRIST % tuple(SWITCHES)))
+    return arms.arm_of_file(parse_robot_file(WRIST % tuple(SWITCHES)))
 
 
 @pytest.fixture(scope="module")
 def three_dof() -> Arm:
-    return arms.load(ROBOT)
+    return arms.load_arm(ROBOT)
 
 
 class NoisyPort(SimPort):
@@ -141,7 +141,7 @@ def test_lost_known_and_changed(three_dof: Arm) -> None:
     assert connect_board(three_dof, port).position() == "known"
     board.reset()
     assert connect_board(three_dof, port).position() == "retained"
-    changed_arm = arms.build(parse_robot_file(Path(ROBOT).read_text().replace("pulley: 4", "pulley: 5")))
+    changed_arm = arms.arm_of_file(parse_robot_file(Path(ROBOT).read_text().replace("pulley: 4", "pulley: 5")))
     changed = connect_board(changed_arm, port)
     assert changed.position() == "lost"
     with pytest.raises(LinkError, match="configured for another arm"):
@@ -181,7 +181,7 @@ def test_what_is_missing_is_named(before: str, after: str, message: str) -> None
     text = Path(ROBOT).read_text()
     assert before in text
     with pytest.raises(UsageError, match=message):
-        configure(arms.build(parse_robot_file(text.replace(before, after))))
+        configure(arms.arm_of_file(parse_robot_file(text.replace(before, after))))
 
 
 @settings(max_examples=200, deadline=None)

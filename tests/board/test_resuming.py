@@ -21,7 +21,7 @@ from armkin.board.sim.sim_port import SimPort
 from armkin.board_catalogue import BOARDS
 from armkin.motion.joint_moves import straight_move
 from armkin.motion.timing.trajectory import Trajectory
-from armkin.motors import joints, places
+from armkin.motors import exact_pulses, joints
 from command_line import ROOT, THREE_DOF, run
 
 ROWS = "10,80,-80\n12,60,-82\n-3,70,-60\n-20,70,-85\n0,90,-90\n"
@@ -274,6 +274,6 @@ def test_what_is_left_of_a_curve_keeps_to_the_joints_limits(begin: float) -> Non
     assert np.abs(left.evaluate(t, 1)[[0, -1]]).max() < 1e-6  # from rest to rest
     assert left.end == pytest.approx(stretch.end)
     assert left.duration < stretch.duration - t0 + 1.5
-    way = places(arm, stretch.evaluate(np.linspace(t0, stretch.duration, 20_000)))
-    track = [tuple(row) for row in places(arm, left.evaluate(t[::40]))]
+    way = exact_pulses(arm, stretch.evaluate(np.linspace(t0, stretch.duration, 20_000)))
+    track = [tuple(row) for row in exact_pulses(arm, left.evaluate(t[::40]))]
     assert distance(track, way) < 0.01

@@ -31,7 +31,7 @@ def ticks(cut: list[Segment]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 @pytest.mark.parametrize("speed", [0.01, 0.05, 0.2, 0.5, 1.0])
 def test_every_step_interval_is_right_to_60_us_or_2_percent(speed: float) -> None:
-    arm = arms.load("robots/three_dof.yaml")
+    arm = arms.load_arm("robots/three_dof.yaml")
     cut = plan_moves(arm, [0, 0, 0], np.deg2rad([-30, 5, -5]), speed=speed, min_interval=MIN_INTERVAL)
     move = next(cut.moves())
     when, places = ticks(list(move.segments))

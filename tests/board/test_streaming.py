@@ -20,7 +20,7 @@ from armkin.board_catalogue import BOARDS
 from armkin.errors import HeldError
 from armkin.model import build_arm as arms
 
-ARM = arms.load("robots/three_dof.yaml")
+ARM = arms.load_arm("robots/three_dof.yaml")
 
 
 class Stalling(SimPort):

@@ -101,7 +101,7 @@ def windows(made: NDArray[np.float64], seconds: float) -> tuple[float, float]:
 
 def moves(name: str, count: int, seed: int) -> Iterator[tuple[list[Segment], Profile, NDArray[np.int64], int]]:
     """Random moves of a shipped arm at 1 to 100 % of its speed."""
-    arm = arms.load(f"robots/{name}.yaml")
+    arm = arms.load_arm(f"robots/{name}.yaml")
     clock, least = CLOCKS[name]
     rng = np.random.default_rng(seed)
     for _ in range(count):

@@ -32,7 +32,7 @@ RAMPS = st.floats(0.03, 3.0)  # [s] to full speed
 
 @pytest.fixture(scope="module")
 def three_dof() -> Arm:
-    return arms.load("robots/three_dof.yaml")
+    return arms.load_arm("robots/three_dof.yaml")
 
 
 def tick_times(cut: Iterable[Segment]) -> list[int]:
@@ -259,7 +259,7 @@ def test_a_start_outside_the_limits_may_come_back(three_dof: Arm) -> None:
 
 
 def test_missing_rates_are_named() -> None:
-    arm = arms.load("robots/planar_2dof.yaml")
+    arm = arms.load_arm("robots/planar_2dof.yaml")
     with pytest.raises(
         UsageError, match=r"joints q1, q2 have no max_speed, .* add to robots/planar_2dof.yaml:\n  max_speed: 30 "
     ):
@@ -307,7 +307,7 @@ def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_move_of_hours_is_planned_at_once_in_bounded_memory() -> None:
     """Two million degrees: 9 hours, of which 47 s and 313 MB went into segments that nothing was waiting for."""
-    arm = replace(arms.load("robots/three_dof.yaml"), lower=np.full(3, -np.inf), upper=np.full(3, np.inf))
+    arm = replace(arms.load_arm("robots/three_dof.yaml"), lower=np.full(3, -np.inf), upper=np.full(3, np.inf))
 
     def planned() -> None:
         made = plan_moves(arm, [0, 0, 0], np.deg2rad([2e6, 90, -90]))

@@ -17,7 +17,7 @@ from armkin.calibration import dropped_rows, robust_fit
 from armkin.calibration.calibrate_arm import next_poses
 from armkin.calibration.corrected_chain import KINDS, correction_model
 from armkin.errors import UsageError
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from quick import least
 
 # arm, noise [mm], tip error on unseen poses that a prototype reached with 60 rows [mm]; the bar is 1.5 times as much
@@ -208,7 +208,7 @@ def test_tasks_that_need_parallel_axes_keep_them() -> None:
     tips = armkin.fk(arm, c * 1.003 + [0.02, 0.01, -0.01, 0.0])[:, :3, 3] + rng.normal(size=(40, 3)) * 0.05
     calibration = armkin.calibrate(arm, c, tips)
     assert calibration.held == ["twists: task xyz_pitch needs parallel axes"]
-    again = build(robot_file.parse_robot_file(calibration.text))
+    again = arm_of_file(robot_file.parse_robot_file(calibration.text))
     assert armkin.method(again) == armkin.method(arm)
     q = c[0]
     s = armkin.ik(again, [*armkin.fk(again, q)[:3, 3], 1.003 * q[1:].sum()], near=q)

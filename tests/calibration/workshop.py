@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import armkin
 from armkin import robot_file
 from armkin.export import conventions
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file.robot_file_text import format_robot_file
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ def built(arm: armkin.Arm, seed: int, *, base: bool = True) -> Built:
         "rpy": [float(x) for x in np.add(base_pose["rpy"], turn)],
     }
     keep = {key: value for key, value in data.items() if key in ("name", "convention", "tool")}
-    real_arm = build(robot_file.parse_robot_file(format_robot_file({**keep, "base": changed, "joints": joints})))
+    real_arm = arm_of_file(robot_file.parse_robot_file(format_robot_file({**keep, "base": changed, "joints": joints})))
     return Built(real_arm, 1.0 + 0.002 * rng.normal(size=arm.n))
 
 

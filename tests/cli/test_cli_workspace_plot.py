@@ -196,7 +196,7 @@ def test_plot_without_out_opens_a_window(monkeypatch: pytest.MonkeyPatch) -> Non
         def show(self) -> None:
             assert shown[-1].axes
 
-    monkeypatch.setattr("armkin.plot.canvas.windows", Windows)
+    monkeypatch.setattr("armkin.plot.canvas.window_pyplot", Windows)
     assert run("plot", THREE_DOF, "home").code == 0
     assert len(shown) == 1
 

@@ -18,7 +18,7 @@ from armkin.cli import batch_answers, csv_to_numbers
 from armkin.cli.csv_to_numbers import Columns
 from armkin.columns import csv_and_json_lines, finished_chunks, ik_columns
 from armkin.columns.csv_cells import csv_line
-from armkin.columns.table import Table, Words, part
+from armkin.columns.table import Table, Words, take_rows
 from armkin.compiled import least_motion as compiled_nearest
 from armkin.compiled import table_lines as compiled_text
 from armkin.errors import UnfinishedError
@@ -36,7 +36,7 @@ def test_a_reader_of_csv_gets_every_word_back() -> None:
 
 def by_python(table: Table, monkeypatch: pytest.MonkeyPatch) -> tuple[bytes, bytes]:
     monkeypatch.setattr(csv_and_json_lines, "WORTH", 10**9)
-    return csv_and_json_lines.csv(table), csv_and_json_lines.json_lines(table)
+    return csv_and_json_lines.to_csv(table), csv_and_json_lines.to_json_lines(table)
 
 
 @pytest.fixture
@@ -50,12 +50,12 @@ def table() -> Table:
 
 
 def test_pyarrow_prints_the_bytes_that_python_prints(table: Table, monkeypatch: pytest.MonkeyPatch) -> None:
-    fast = csv_and_json_lines.csv(table), csv_and_json_lines.json_lines(table)
+    fast = csv_and_json_lines.to_csv(table), csv_and_json_lines.to_json_lines(table)
     assert fast == by_python(table, monkeypatch)
     with monkeypatch.context() as patch:
         patch.setattr(csv_and_json_lines, "BLOCK", 3_333)
         patch.setattr(csv_and_json_lines, "WORTH", 2_000)
-        assert fast == (csv_and_json_lines.csv(table), csv_and_json_lines.json_lines(table))
+        assert fast == (csv_and_json_lines.to_csv(table), csv_and_json_lines.to_json_lines(table))
     names = ["", 'with, comma and "quote"', "right"]
     assert fast[0].splitlines()[7] == b"7,right,1.5e-07,true"
     assert csv_line([names[1]]).encode() in fast[0]
@@ -70,15 +70,17 @@ def test_machine_code_prints_the_bytes_that_python_prints(table: Table, monkeypa
     near = [10.0 ** rng.uniform(-6, 18, 20_000), 2.0 ** np.arange(-1074, 1024), rng.uniform(-400, 400, 20_000).round(3)]
     for values in (doubles, *near):
         float_table: Table = {"row": np.arange(len(values)) - 7, "value": values, "far": -values}
-        assert csv_and_json_lines.csv(float_table, compiled_text.table_lines) == by_python(float_table, monkeypatch)[0]
+        assert (
+            csv_and_json_lines.to_csv(float_table, compiled_text.table_lines) == by_python(float_table, monkeypatch)[0]
+        )
     fast = (
-        csv_and_json_lines.csv(table, compiled_text.table_lines),
-        csv_and_json_lines.json_lines(table, compiled_text.table_lines),
+        csv_and_json_lines.to_csv(table, compiled_text.table_lines),
+        csv_and_json_lines.to_json_lines(table, compiled_text.table_lines),
     )
     assert fast == by_python(table, monkeypatch)
-    assert csv_and_json_lines.csv(part(float_table, slice(0, 0)), compiled_text.table_lines) == b""
+    assert csv_and_json_lines.to_csv(take_rows(float_table, slice(0, 0)), compiled_text.table_lines) == b""
     integers = np.array([0, 9, 10, 99, 100, 2**32 - 1, 2**32, 10**8, 10**16, 2**63 - 1, -(2**63), -10])
-    assert csv_and_json_lines.csv({"a": integers}, compiled_text.table_lines).decode().split() == list(
+    assert csv_and_json_lines.to_csv({"a": integers}, compiled_text.table_lines).decode().split() == list(
         map(str, integers.tolist())
     )
 
@@ -318,7 +320,7 @@ def test_machine_code_takes_the_same_branch() -> None:
             q[::3, 1] = 2.0 * near - q[::3, 0] + 1e-12
         q[~is_valid] = np.nan
         python, fast = (
-            ik_columns.nearest(q, is_valid, near, scale),
+            ik_columns.nearest_branches(q, is_valid, near, scale),
             compiled_nearest.nearest_branches(q, is_valid, near, scale),
         )
         assert fast is not None

@@ -20,7 +20,7 @@ from armkin.compiled import toolchain
 from armkin.inverse.elimination import method
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 
 ROBOTS = Path(__file__).parents[2] / "robots"
@@ -351,7 +351,7 @@ def test_roots_that_solutions_share_are_taken_apart_in_c(
 @pytest.mark.usefixtures("quickly")
 def test_an_arm_off_its_class_is_solved_in_c_and_named_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A calibrated UR5e: all of its targets were solved in Python, 0.2 ms each."""
-    arm = build(parse_robot_file((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 0,", "alpha: 0.01,", 1)))
+    arm = arm_of_file(parse_robot_file((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 0,", "alpha: 0.01,", 1)))
     target = questions(arm, "random", 60)
     python, single = armkin.ik(arm, target), armkin.ik(arm, target[0])
     left = left_to_python(monkeypatch)
@@ -366,7 +366,7 @@ def test_an_arm_off_its_class_is_solved_in_c_and_named_after_it(monkeypatch: pyt
 @pytest.mark.usefixtures("quickly")
 def test_targets_on_an_edge_are_eliminated_in_c(monkeypatch: pytest.MonkeyPatch) -> None:
     """A calibrated UR5e with its wrist all but straight: Python eliminated such a target, and four around it, again."""
-    arm = build(parse_robot_file((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 0,", "alpha: 0.01,", 1)))
+    arm = arm_of_file(parse_robot_file((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 0,", "alpha: 0.01,", 1)))
     q = np.random.default_rng(8).uniform(-3, 3, (40, 6))
     low, high = q.copy(), q.copy()
     low[:, 4], high[:, 4] = -0.1, 0.1

@@ -18,7 +18,7 @@ from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 
 # of one arm there is one text in all tests of a process
 _text_of = cache(module)
@@ -62,7 +62,7 @@ def ask(
 
 def goals_of(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
     """The targets that postures (N, n) answer."""
-    task, _ = solver(actual(arm), None)
+    task, _ = solver(actual_arm(arm), None)
     return targets_of(task, armkin.fk(arm, q), q * arm.ratio)
 
 

@@ -17,7 +17,7 @@ import right_angles
 from armkin.export.c.c_program import identifier, program
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.model.rotation import rotation_about
 from armkin.robot_file import parse_robot_file
 from command_line import run as run_armkin
@@ -288,7 +288,7 @@ def test_the_test_program_of_a_calibrated_arm_passes(tmp_path: Path) -> None:
 def test_an_arm_a_little_off_its_class_is_written_with_numbered_branches(tmp_path: Path) -> None:
     """A calibrated AR4: its wrist's axes miss each other by some tenths of a millimetre."""
     text = (ROBOTS / "ar4.yaml").read_text()
-    arm = build(parse_robot_file(text.replace("a: 0,", "a: 0.3,").replace("alpha: 90,", "alpha: 90.2,")))
+    arm = arm_of_file(parse_robot_file(text.replace("a: 0,", "a: 0.3,").replace("alpha: 90,", "alpha: 90.2,")))
     assert "named after that class" in solver(arm, None)[1].why
     assert built(tmp_path, arm) == "8 postures, 0 failed\n"
     assert '"branch 1"' in (tmp_path / "arm.c").read_text()
@@ -307,7 +307,7 @@ def crooked(count: int, slides: tuple[int, ...] = (), task: str = "") -> armkin.
         f"dh: {{alpha: {alpha}, a: {a}, d: {d}}}}}"
         for k, (alpha, a, d) in enumerate(CROOKED[:count])
     ]
-    return build(parse_robot_file("\n".join(["name: crooked", "convention: standard", task, "joints:", *rows])))
+    return arm_of_file(parse_robot_file("\n".join(["name: crooked", "convention: standard", task, "joints:", *rows])))
 
 
 def test_five_joints_and_the_tool_s_axis_have_a_form(tmp_path: Path) -> None:

@@ -17,8 +17,8 @@ from armkin.errors import UsageError
 from armkin.export import conventions
 from armkin.export.urdf_writer import urdf_text as write_urdf
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.model.arm import actual, from_links
-from armkin.model.build_arm import build
+from armkin.model.arm import actual_arm, from_links
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import format_robot_file
 from command_line import ROOT, run
@@ -50,7 +50,7 @@ def numbers(element: ET.Element | None, name: str) -> np.ndarray:
 
 
 def again(data: dict[str, Any]) -> armkin.Arm:
-    return build(robot_file.parse_robot_file(format_robot_file(data)))
+    return arm_of_file(robot_file.parse_robot_file(format_robot_file(data)))
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -73,7 +73,7 @@ def test_a_table_is_the_same_arm(path: Path) -> None:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_out_to_urdf_and_back_is_the_same_arm(path: Path) -> None:
     arm = armkin.load(path)
-    turned = actual(arm)
+    turned = actual_arm(arm)
     read_back = again(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)
     q = values(arm)
     error = np.abs(armkin.fk(read_back, q) - armkin.fk(turned, q))

@@ -11,7 +11,7 @@ from stepped_port import SteppedPort
 from armkin.board.conformance import Emulated, Start
 from armkin.board.firmware.configuration import configure
 from armkin.board.kinds import board_of
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 from other_programs import OURS
 from starting_elsewhere import KINDS
@@ -23,7 +23,7 @@ def start(board: EmulatedBoard) -> Start:
     def begin() -> Emulated:
         board.control("reset power")
         board.run(0.05)
-        kind = board_of(build(parse_robot_file(KINDS[board.board])))
+        kind = board_of(arm_of_file(parse_robot_file(KINDS[board.board])))
         port = SteppedPort(board)
         base = list(board.net().values())
         axes = configure(kind.arm).axes

@@ -101,9 +101,9 @@ def test_coupled_motors_and_their_joint_limits_on_both_sides(tmp_path: Path) -> 
         outside = run("send", robot, 10, 45, 0, "--port", board.port)
         assert (outside.code, board.net()) == (3, pins)
         # A host that forgets its own check meets the board's: joint 2 would go to 45 degrees.
-        arm = arms.load(robot)
+        arm = arms.load_arm(robot)
         assert arm.file is not None
-        loose = arms.build(arm.file.model_copy(update={"joints": tuple(
+        loose = arms.arm_of_file(arm.file.model_copy(update={"joints": tuple(
             joint.model_copy(update={"limits": (-90.0, 90.0)}) for joint in arm.file.joints
         )}))  # fmt: skip
         port = SerialPort(board.port)

@@ -122,7 +122,7 @@ class _KilledError(Exception):
 @contextmanager
 def connected_machine(board: EmulatedBoard, dies_after: float | None = None) -> Iterator[FirmwareMachine]:
     """The three-joint arm on this board; a sender that dies falls silent in the middle of whatever it does."""
-    arm = arms.load(ROOT / THREE_DOF)
+    arm = arms.load_arm(ROOT / THREE_DOF)
     port = SerialPort(board.port)
     born = time.monotonic()
 

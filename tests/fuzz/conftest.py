@@ -41,7 +41,7 @@ def rounds(request: pytest.FixtureRequest) -> int:
 def _each_robot_file_is_read_once() -> Iterator[None]:
     """Nine commands on one file share its model and its arm: what they do with them is what differs."""
     arms: dict[int, tuple[RobotFile, Arm]] = {}  # the file beside its arm: as long as it lives, its id is its own
-    build_anew = build_arm.build
+    build_anew = build_arm.arm_of_file
 
     def build_once(file: RobotFile) -> Arm:
         if id(file) not in arms:
@@ -52,5 +52,5 @@ def _each_robot_file_is_read_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(robot_file, "parse_robot_file", lru_cache(KEPT)(robot_file.parse_robot_file))
-        patch.setattr(build_arm, "build", build_once)
+        patch.setattr(build_arm, "arm_of_file", build_once)
         yield

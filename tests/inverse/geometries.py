@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from oracle import Screws, screws
 
 from armkin.model.arm import Arm
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import RobotFile
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def robot(fields: Fields) -> RobotFile:
 
 def case(fields: Fields, task: str) -> Case:
     file = robot(fields)
-    return Case(build(file), screws(file), task)
+    return Case(arm_of_file(file), screws(file), task)
 
 
 def anywhere(rng: Rng) -> Fields:

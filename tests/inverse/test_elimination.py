@@ -22,7 +22,7 @@ import armkin
 from armkin.inverse.elimination import method
 from armkin.inverse.elimination.polish import refine
 from armkin.inverse.numeric.newton import nudged
-from armkin.model.rotation import shrunk
+from armkin.model.rotation import shrink_translations
 
 
 def jacobian(arm: Arm, q: Array) -> Array:
@@ -46,7 +46,9 @@ def polish(link: Array, prismatic: Bool, q: Array, T: Array, steps: int, damped:
     """Guesses (M, 6) moved onto their targets (M, 4, 4), and the residuals (M,), lengths over the links' sum."""
     length = float(np.linalg.norm(link[1:, :3, 3], axis=1).sum()) or 300.0
     unit = np.where(prismatic, length, 1.0)
-    refined = refine(shrunk(link, length), prismatic, q / unit, shrunk(T, length), steps, damped)
+    refined = refine(
+        shrink_translations(link, length), prismatic, q / unit, shrink_translations(T, length), steps, damped
+    )
     return refined.q * unit, refined.residual
 
 

@@ -13,7 +13,7 @@ import armkin
 from armkin import Arm
 from armkin.inverse.elimination import choose_variable, method, pencil, roots
 from armkin.inverse.elimination.closed_loop import roles
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.model.rotation import inverse, rotation_about
 from armkin.robot_file import parse_robot_file
 
@@ -37,7 +37,7 @@ def known(name: str) -> tuple[Arm, Screws]:
     if name != "gen3_lite":
         return shipped(name)
     file = parse_robot_file(GEN3_LITE)
-    return build(file), screws(file)
+    return arm_of_file(file), screws(file)
 
 
 def targets(arm: Arm, kind: str, count: int, tilt: float = 0.0) -> Array:

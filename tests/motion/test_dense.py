@@ -321,7 +321,7 @@ def test_a_picture_draws_every_corner_of_very_many_points(three_dof: Arm, monkey
     k = np.arange(100)
     zigzag = CENTRE - [15, 15, 0] + np.stack([30.0 * ((k + 1) // 2 % 2), 0.3 * k, 0 * k], axis=1)
     plan = armkin.path(three_dof, zigzag, corners="tolerance")
-    way = picture._way(plan)
+    way = picture._tool_way(plan)
     monkeypatch.setattr(picture, "_MANY", 0)
     thin = picture._thin_out(way, 0.1)
     assert len(thin) < len(way)

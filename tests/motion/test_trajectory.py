@@ -16,7 +16,7 @@ from armkin.motion.timing.trajectory import Straight
 
 @pytest.fixture(scope="module")
 def three_dof() -> Arm:
-    return arms.load("robots/three_dof.yaml")
+    return arms.load_arm("robots/three_dof.yaml")
 
 
 @settings(max_examples=60, deadline=None)
@@ -55,7 +55,7 @@ def test_position_speed_and_acceleration_belong_together(three_dof: Arm) -> None
 
 
 def test_an_arm_without_drives_has_trajectories() -> None:
-    arm = arms.load("robots/three_dof.yaml")
+    arm = arms.load_arm("robots/three_dof.yaml")
     bare = from_links(
         arm.link, arm.prismatic, limits=np.stack([arm.lower, arm.upper], 1), max_speed=arm.max_speed,
         max_accel=arm.max_accel,

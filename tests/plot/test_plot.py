@@ -18,7 +18,7 @@ from armkin.errors import FileError, MissingExtraError, UsageError
 from armkin.forward import fk
 from armkin.model.arm import from_links
 from armkin.plot import plot_poses, plot_workspace
-from armkin.plot.canvas import space, tick_step
+from armkin.plot.canvas import space_axes, tick_step
 from armkin.reachability import Workspace, workspace
 from armkin.robot_file import catalogue
 from armkin.view.skeleton import skeleton
@@ -348,5 +348,5 @@ def test_importing_the_module_does_not_import_matplotlib() -> None:
 
 @pytest.mark.parametrize(("view", "hidden"), [((90, -90), "z"), ((0, -90), "y"), ((0, 0), "x"), ((22, -60), "")])
 def test_an_axis_seen_end_on_has_no_label(view: tuple[float, float], hidden: str) -> None:
-    axes = space(Figure(), [0, 0, 1, 1], view)
+    axes = space_axes(Figure(), [0, 0, 1, 1], view)
     assert [name for name in "xyz" if not getattr(axes, f"get_{name}label")()] == list(hidden)

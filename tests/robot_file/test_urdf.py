@@ -12,7 +12,7 @@ import armkin
 from armkin import robot_file
 from armkin.errors import ArmkinError, FileError, RobotFileError, UsageError
 from armkin.export.urdf_writer import urdf_text as write_urdf
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import format_robot_file, number_text, rpy_angles
 from command_line import ROOT, run
@@ -23,7 +23,7 @@ from urdf_chains import text as as_urdf
 
 def imported(chain: dict[str, Any], **settings: Any) -> armkin.Arm:
     imported = urdf_reader.parse_urdf(as_urdf(chain).encode(), base=chain["base"], tip=chain["tip"], **settings)
-    return build(robot_file.parse_robot_file(format_robot_file(imported.data, imported.notes)))
+    return arm_of_file(robot_file.parse_robot_file(format_robot_file(imported.data, imported.notes)))
 
 
 @pytest.mark.parametrize("name", CHAINS)
@@ -47,7 +47,9 @@ def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
 def test_a_real_chain_goes_out_to_urdf_and_comes_back(name: str) -> None:
     """The same poses to 1e-9 mm, the same limits, and the same solver class."""
     arm = imported(CHAINS[name])
-    again = build(robot_file.parse_robot_file(format_robot_file(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)))
+    again = arm_of_file(
+        robot_file.parse_robot_file(format_robot_file(urdf_reader.parse_urdf(write_urdf(arm).encode()).data))
+    )
     slides = np.where(arm.prismatic, 100.0, 1.0)
     q = np.random.default_rng(8).uniform(-2, 2, (20, arm.n)) * slides
     error = np.abs(armkin.fk(again, q) - armkin.fk(arm, q))
@@ -294,7 +296,7 @@ def rough_wrist() -> str:
 
 def test_snapping_makes_right_angles_and_the_class_that_they_buy() -> None:
     exact, snapped = (
-        build(
+        arm_of_file(
             robot_file.parse_robot_file(
                 format_robot_file(urdf_reader.parse_urdf(rough_wrist().encode(), snap=snap).data)
             )

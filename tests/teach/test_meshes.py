@@ -13,7 +13,7 @@ import pytest
 import armkin
 from armkin import robot_file
 from armkin.errors import UsageError
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import format_robot_file
 from armkin.robot_file.urdf_document import parse_document
@@ -80,7 +80,7 @@ def loaded(file: Path, base: list[float] | None = None) -> Any:
     document = urdf_reader.read_urdf(file, tip="l3").data
     if base is not None:
         document = {"base": {"xyz": base, "rpy": [0, 0, 30]}} | document
-    return build(robot_file.parse_robot_file(format_robot_file(document), "arm.yaml"))
+    return arm_of_file(robot_file.parse_robot_file(format_robot_file(document), "arm.yaml"))
 
 
 def corners(drawn: dict[str, Any], body: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 
 import armkin
 from armkin.model.rotation import rotation_about
-from armkin.view.skeleton import shape, skeleton
+from armkin.view.skeleton import arm_shape, skeleton
 from command_line import ROOT
 
 ROBOTS = sorted(path.stem for path in (ROOT / "robots").glob("*.yaml"))
@@ -16,7 +16,7 @@ ROBOTS = sorted(path.stem for path in (ROOT / "robots").glob("*.yaml"))
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_bodies_meet_at_every_joint_and_end_at_the_tip(robot: str) -> None:
     arm = armkin.load(str(ROOT / f"robots/{robot}.yaml"))
-    form = shape(arm)
+    form = arm_shape(arm)
     rng = np.random.default_rng(3)
     q = rng.uniform(-2, 2, arm.n) * np.where(arm.prismatic, arm.reach / 10, 1.0)
     T, end = arm.link[0], form.bodies[0][-1]
@@ -42,7 +42,7 @@ def test_bodies_meet_at_every_joint_and_end_at_the_tip(robot: str) -> None:
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_between_axes_that_are_not_parallel_lies_the_common_normal(robot: str) -> None:
     arm = armkin.load(str(ROOT / f"robots/{robot}.yaml"))
-    form = shape(arm)
+    form = arm_shape(arm)
     for i in range(arm.n - 1):
         link = arm.link[i + 1]
         _, foot, across = form.bodies[i + 1]

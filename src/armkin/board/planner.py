@@ -90,7 +90,7 @@ class Total:
             "waypoints": self.waypoints,
             "start_joints": units.joints_out(arm, joints(arm, first)).tolist(),
             "joints": units.joints_out(arm, end).tolist(),
-            "joint_units": units.names(arm),
+            "joint_units": units.unit_names(arm),
             "motors": motor_names(arm),
             "pulse_units": pulse_units(arm),
             "start_pulses": first,
@@ -175,6 +175,6 @@ def where_arm_stands(machine: Backend) -> Where:
         "position": machine.position(),
         "pulses": list(machine.counts()) if is_known else None,
         "joints": None if q is None else units.joints_out(arm, q).tolist(),
-        "joint_units": units.names(arm),
+        "joint_units": units.unit_names(arm),
         "position_mm": None if q is None else (fk(arm, q)[:3, 3] + 0.0).tolist(),
     }

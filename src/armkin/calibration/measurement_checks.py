@@ -120,7 +120,7 @@ _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "
 
 def _readings(arm: Arm, rows: Measurements) -> list[_Reading]:
     c, x = rows.c, rows.position
-    degree = units.scale(arm)
+    degree = units.joint_scale(arm)
     readings = [
         _Reading("the joint values look like radians where degrees are expected", c / degree, x),
         _Reading("the joint values look like degrees where radians are expected", c * degree, x),

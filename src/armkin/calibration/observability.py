@@ -71,7 +71,7 @@ def suggest_poses(model: Model, count: int, free: NDArray[np.intp], measured: Ar
     if count < 1 or count > 1000:
         raise UsageError(f"{count} poses cannot be suggested; ask for 1 to 1000")
     arm = model.arm
-    step = units.scale(arm)  # whole degrees and millimetres, as people type them
+    step = units.joint_scale(arm)  # whole degrees and millimetres, as people type them
     low, high = _joint_range(arm)
     candidates = np.clip(np.round(_random_poses(arm, CANDIDATES) / step) * step, low, high)
     J = _whitened_jacobian(model, candidates, free)

@@ -39,7 +39,7 @@ import io
 import os
 import sys
 
-from armkin.signals import interrupted
+from armkin.signals import handle_interrupt
 
 TYPE_CHECKING = False  # importing typing takes long enough for a Ctrl-C, which `main` takes care of
 
@@ -61,7 +61,7 @@ def _run_command_line() -> int:
     import signal
 
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell's background job ignores it
-        signal.signal(signal.SIGINT, interrupted)
+        signal.signal(signal.SIGINT, handle_interrupt)
     # Start-up makes many objects and hardly any garbage: look for it seldom.
     gc.set_threshold(100_000, 50, 100)
     # Threads take longer to start than matrices of this size could gain by them.

@@ -250,7 +250,7 @@ class _ToFile:
     def __init__(self, batch: Batch, format: Format, job: Job, tally: Tally, size: int | None) -> None:
         self.batch, self.format, self.job, self.tally = batch, format, job, tally
         self.path = str(batch.out)
-        files.check(self.path)
+        files.check_writable(self.path)
         identity = {"armkin": __version__, "format": format.name, "json": batch.as_json, "input size": size}
         self.parts = Parts(self.path, {**batch.settings, **identity})
         self.first: Done | None = None  # the only piece so far: it may be the last
@@ -260,7 +260,7 @@ class _ToFile:
         """Answer what is missing, and make the file."""
         if not self.batch.resume:
             self.parts.refuse_begun()
-        pool = self.batch.engine.pool
+        pool = self.batch.engine.uses_pool
         if pool or self.parts.begun:
             self.parts.begin()
         job = self.job._replace(parts=self.parts) if pool else self.job
@@ -273,7 +273,7 @@ class _ToFile:
                 raise pieces.empty(self.tally.skipped)
             self._write_file()
         except BaseException as error:
-            of_no_use = isinstance(error, UsageError) or not self.parts.some
+            of_no_use = isinstance(error, UsageError) or not self.parts.has_any
             if of_no_use and not self.batch.resume and self.parts.held:
                 self.parts.remove()
             raise
@@ -338,6 +338,6 @@ class _ToFile:
             file.write((csv_line(heading) + "\n").encode())
         first = self.first
         if self.parts.held or first is None:
-            self.format.write_parts(file, lambda: self.parts.opened(self.count))
+            self.format.write_parts(file, lambda: self.parts.open_parts(self.count))
         else:
             self.format.write_parts(file, lambda: [io.BytesIO(first.data)])

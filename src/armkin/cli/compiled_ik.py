@@ -33,7 +33,7 @@ def fk(arm: Arm, q: Array, task: str | None = None) -> Array:
 
 
 def nearest(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
-    """`armkin.columns.ik_columns.nearest`, where it serves."""
+    """`armkin.columns.ik_columns.nearest_branches`, where it serves."""
     from armkin.compiled import least_motion as found
 
     return found.nearest_branches(q, candidates, near, scale)

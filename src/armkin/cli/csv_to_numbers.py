@@ -357,7 +357,7 @@ def _split_cells(text: str) -> list[str]:
 
 
 def _column_places(heading: Sequence[str], name: str) -> list[int]:
-    """See `armkin.columns.input_columns.places`."""
-    from armkin.columns.input_columns import places  # here, as it needs numpy
+    """See `armkin.columns.input_columns.column_places`."""
+    from armkin.columns.input_columns import column_places  # here, as it needs numpy
 
-    return places(heading, name)
+    return column_places(heading, name)

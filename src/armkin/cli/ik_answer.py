@@ -45,7 +45,7 @@ def answer_of(
         "method": chosen.method,
         "why": chosen.why,
         "complete": chosen.complete,
-        "joint_units": units.names(arm),
+        "joint_units": units.unit_names(arm),
         "branch_count": chosen.total,
         "branches_within_limits": chosen.within_limits,
         "branches": [_branch_json(request, branch, turns) for branch in listed],

@@ -26,9 +26,9 @@ def locked_values(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
         values[name] = number(word, f"--lock {name}")
         k = joint_index(arm, name)
         value = units.joints_in(arm, [values[name] if i == k else 0.0 for i in range(arm.n)])
-        if limits.outside(arm, value)[k]:
+        if limits.outside_limits(arm, value)[k]:
             raise NoSolutionError(
-                f"--lock {text}: {limits.outside_text(arm, k, value[k])}", **limits.fields(arm, k, value[k])
+                f"--lock {text}: {limits.outside_text(arm, k, value[k])}", **limits.limit_fields(arm, k, value[k])
             )
     return values
 

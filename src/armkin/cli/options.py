@@ -70,7 +70,7 @@ def _out_option(content: str, *allowed: str) -> Any:
         if path:
             from armkin import files
 
-            files.ending(path, content, allowed, may_lack=True)
+            files.file_ending(path, content, allowed, may_lack=True)
         return path
 
     return typer.Option(
@@ -106,8 +106,8 @@ def _check_drawable(path: str | None) -> str | None:
     if path is not None:
         from armkin.plot import canvas
 
-        canvas.check(path)
-        canvas.require()
+        canvas.check_picture(path)
+        canvas.require_matplotlib()
     return path
 
 

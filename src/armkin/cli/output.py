@@ -20,7 +20,7 @@ _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warning
 def destination(path: str | None, content: str = "", endings: Sequence[str] = ()) -> Iterator[Write]:
     """The function that writes a command's data: to stdout ("-"), or to a file that appears whole or not at all.
 
-    what, endings: what is written, and how the file's name may end (`files.ending`), where no option has checked it.
+    what, endings: what is written, and how the file's name may end (`file_ending`), where no option has checked it.
     """
     from armkin.errors import FileError, UsageError
 
@@ -31,7 +31,7 @@ def destination(path: str | None, content: str = "", endings: Sequence[str] = ()
 
         with files.write_whole(path) as file:
             if endings:
-                files.ending(path, content, endings, may_lack=True)
+                files.file_ending(path, content, endings, may_lack=True)
             yield file.write
     elif sys.stdout is None:
         raise FileError("standard output is closed; give --out FILE or open it")
@@ -44,8 +44,8 @@ def check_destination(path: str | None, content: str, *endings: str) -> None:
     if path not in (None, "", "-"):
         from armkin import files
 
-        files.check(path)
-        files.ending(path, content, endings, may_lack=True)
+        files.check_writable(path)
+        files.file_ending(path, content, endings, may_lack=True)
 
 
 @contextmanager
@@ -68,7 +68,7 @@ def for_programs(as_json: bool, words: Iterable[str] = ()) -> None:
     parts = {part for word in words for part in (word, word.partition("=")[2])}
     _broken = sorted((part for part in parts if part.strip() and len(f"{part}.".splitlines()) > 1), key=len)[::-1]
     if (used := sys.modules.get("armkin.files")) is not None:  # `armkin --help` needs no files
-        used.forget()
+        used.forget_inputs()
 
 
 def warn(message: str) -> None:

@@ -33,11 +33,11 @@ def scene_and_tool(arm: Arm) -> Any:
 
 def violations(arm: Arm, values: Array, q: Array) -> list[list[Violation]]:
     """For each row, the joints outside their limits: values (N, n) [deg | mm], q the same in [rad | mm]."""
-    from armkin.model.limits import outside
+    from armkin.model.limits import outside_limits
 
     return [
         [violation(arm, i, row[i]) for i, is_outside in enumerate(flags) if is_outside] if any(flags) else []
-        for row, flags in zip(values.tolist(), outside(arm, q).tolist(), strict=True)
+        for row, flags in zip(values.tolist(), outside_limits(arm, q).tolist(), strict=True)
     ]
 
 
@@ -61,7 +61,7 @@ def hits_in_words(answer: Mapping[str, Any]) -> str:
 
 def violation(arm: Arm, joint: int, value: float) -> Violation:
     """A joint outside its limits, for JSON; value: [deg | mm]."""
-    lower, upper = map(units.finite, units.limits_out(arm)[joint])
+    lower, upper = map(units.finite_or_none, units.limits_out(arm)[joint])
     return {"joint": arm.joint_names[joint], "value": value, "lower": lower, "upper": upper}
 
 
@@ -127,7 +127,7 @@ def row(title: str, names: Sequence[str], values: Sequence[str]) -> str:
 
 def pose_line(arm: Arm, values: Sequence[float]) -> str:
     """The arm and its joint values on one line: ``three_dof: q1 = -30, q2 = 5, q3 = -5 deg``."""
-    return f"{arm.name}: {label_values(arm.joint_names, values, units.names(arm))}"
+    return f"{arm.name}: {label_values(arm.joint_names, values, units.unit_names(arm))}"
 
 
 def wrap_text(text: str, first: str = "", indent: str = "") -> str:
@@ -148,7 +148,7 @@ def label_values(names: Sequence[str], values: Sequence[float], each_unit: Seque
 
 def joint_headings(arm: Arm) -> list[str]:
     """Column headings of joint values: ``q1/deg``."""
-    return [f"{name}/{unit}" for name, unit in zip(arm.joint_names, units.names(arm), strict=True)]
+    return [f"{name}/{unit}" for name, unit in zip(arm.joint_names, units.unit_names(arm), strict=True)]
 
 
 def warn_of_limits(arm: Arm, violations: list[Violation], near: Mapping[str, Any] | None = None) -> None:

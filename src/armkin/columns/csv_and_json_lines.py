@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.columns.csv_cells import cell
-from armkin.columns.table import Column, Table, Words, part, rows
+from armkin.columns.csv_cells import csv_cell
+from armkin.columns.table import Column, Table, Words, row_count, take_rows
 
 WORTH = 2_000  # rows for which pyarrow is worth its import
 BLOCK = 8_192  # rows printed at once: their texts stay in the cache, and no memory is asked for again
@@ -26,33 +26,33 @@ BLOCK = 8_192  # rows printed at once: their texts stay in the cache, and no mem
 Lines = Callable[[Table, list[str], Callable[[Any], str], str], bytes]
 
 
-def csv(table: Table, lines: Lines | None = None) -> bytes:
+def to_csv(table: Table, lines: Lines | None = None) -> bytes:
     """The rows of a table as CSV, without a heading; lines: what prints them, by default what is quickest here."""
     names = list(table)
     between = ["", *[","] * (len(names) - 1), "\n"]
-    return (lines or _written)(table, between, cell, "")
+    return (lines or _print_lines)(table, between, csv_cell, "")
 
 
-def json_lines(table: Table, lines: Lines | None = None) -> bytes:
+def to_json_lines(table: Table, lines: Lines | None = None) -> bytes:
     """The rows of a table as flat JSON objects, one a line."""
     between = [("{" if i == 0 else ", ") + json.dumps(name) + ": " for i, name in enumerate(table)]
-    return (lines or _written)(table, [*between, "}\n"], json.dumps, "null")
+    return (lines or _print_lines)(table, [*between, "}\n"], json.dumps, "null")
 
 
-def _written(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+def _print_lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
     """See `Lines`."""
-    count = rows(table)
-    if count >= WORTH and (arrow := _arrow()) is not None:
-        parts = (table if count <= BLOCK else part(table, slice(i, i + BLOCK)) for i in range(0, count, BLOCK))
-        return b"".join([_by_arrow(arrow, some, between, quoted, missing) for some in parts])
-    columns = [_texts(column, quoted, missing) for column in table.values()]
+    count = row_count(table)
+    if count >= WORTH and (arrow := _import_arrow()) is not None:
+        parts = (table if count <= BLOCK else take_rows(table, slice(i, i + BLOCK)) for i in range(0, count, BLOCK))
+        return b"".join([_print_by_arrow(arrow, block, between, quoted, missing) for block in parts])
+    columns = [_column_texts(column, quoted, missing) for column in table.values()]
     if not count:
         return b""
     line = "%s".join(text.replace("%", "%%") for text in between)
     return "".join([line % row for row in zip(*columns, strict=True)]).encode()
 
 
-def _texts(column: Column, quoted: Callable[[Any], str], missing: str) -> list[str]:
+def _column_texts(column: Column, quoted: Callable[[Any], str], missing: str) -> list[str]:
     if isinstance(column, Words):
         names = [*map(quoted, column.names), missing]
         return [names[i] for i in column.index.tolist()]
@@ -67,7 +67,7 @@ def _texts(column: Column, quoted: Callable[[Any], str], missing: str) -> list[s
 
 
 @cache
-def _arrow() -> Any:
+def _import_arrow() -> Any:
     """pyarrow with its functions, or None where it is not installed."""
     try:
         import pyarrow
@@ -77,7 +77,7 @@ def _arrow() -> Any:
     return pyarrow
 
 
-def _by_arrow(pa: Any, table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+def _print_by_arrow(pa: Any, table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
     pieces = [_arrow_texts(pa, column, quoted, missing) for column in table.values()]
     if len(set(between[1:-1])) <= 1 and not between[0]:  # one separator: half as many pieces to join
         lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(between[1]))
@@ -85,9 +85,9 @@ def _by_arrow(pa: Any, table: Table, between: list[str], quoted: Callable[[Any],
     else:
         every = [piece for pair in zip(map(pa.scalar, between), pieces, strict=False) for piece in pair]
         lines = pa.compute.binary_join_element_wise(*every, pa.scalar(between[-1]), pa.scalar(""))
-    _, offsets, data = lines.buffers()
+    _, offsets, buffer = lines.buffers()
     ends = np.frombuffer(offsets, np.int32, len(lines) + 1, 4 * lines.offset)
-    return bytes(memoryview(data)[ends[0] : ends[-1]])
+    return bytes(memoryview(buffer)[ends[0] : ends[-1]])
 
 
 def _arrow_texts(pa: Any, column: Column, quoted: Callable[[Any], str], missing: str) -> Any:

@@ -14,10 +14,10 @@ def csv_line(record: Iterable[Any]) -> str:
     >>> csv_line(['is "home" now', -0.0])
     '"is ""home"" now",-0.0'
     """
-    return ",".join([repr(value) if type(value) is float else cell(value) for value in record])
+    return ",".join([repr(value) if type(value) is float else csv_cell(value) for value in record])
 
 
-def cell(value: Any) -> str:
+def csv_cell(value: Any) -> str:
     """One cell."""
     if value is None:
         return ""

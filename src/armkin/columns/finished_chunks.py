@@ -39,7 +39,7 @@ class Parts:
         return self.folder.is_dir()
 
     @property
-    def some(self) -> bool:
+    def has_any(self) -> bool:
         """Whether a part is finished."""
         return any(self.folder.glob("[0-9]*[0-9]"))
 
@@ -87,14 +87,14 @@ class Parts:
             return
         except ValueError:
             raise FileError(f"{place}: this is no job of armkin's; remove {self.folder}", file=str(place)) from None
-        other = [name for name in {**before, **self.job} if before.get(name) != self.job.get(name)]
-        if other:
-            now = ", ".join(other)
+        differing = [name for name in {**before, **self.job} if before.get(name) != self.job.get(name)]
+        if differing:
+            names = ", ".join(differing)
             raise UsageError(
-                f"{self.path}.parts belongs to another job: {now} differ{'s' if len(other) == 1 else ''} from before; "
+                f"{self.path}.parts belongs to another job: {names} differ{'s' * (len(differing) == 1)} from before; "
                 f"give them as they were, or remove {self.folder}",
                 file=self.path,
-                differs=other,
+                differs=differing,
             )
 
     def about(self, number: int) -> dict[str, Any] | None:
@@ -113,7 +113,7 @@ class Parts:
         with self._errors():
             self._write(self._place(number), json.dumps(about).encode() + b"\n", data)
 
-    def opened(self, count: int) -> Iterator[IO[bytes]]:
+    def open_parts(self, count: int) -> Iterator[IO[bytes]]:
         """The bytes of the first parts, one file after the other: each is closed when the next is opened."""
         for number in range(count):
             with open(self._place(number), "rb") as file:

@@ -17,29 +17,29 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def poses(arm: Arm, values: Array, T: Array | None = None) -> Table:
+def pose_columns(arm: Arm, values: Array, T: Array | None = None) -> Table:
     """The columns of fk: values (N, n) [deg | mm]; T: the tool's poses (N, 4, 4), by default worked out."""
     q = units.joints_in(arm, values)
-    found = (forward.fk(arm, q) if T is None else T) + 0.0  # no -0.0
-    table: Table = _named(arm.joint_names, values)
-    table |= _named("xyz", found[:, :3, 3])
-    table |= _named(("roll", "pitch", "yaw"), units.angles_out(rotation.rpy(found[:, :3, :3])))
-    table["within_limits"] = np.asarray(~limits.outside(arm, q).any(axis=1))
+    matrices = (forward.fk(arm, q) if T is None else T) + 0.0  # no -0.0
+    table: Table = _named_columns(arm.joint_names, values)
+    table |= _named_columns("xyz", matrices[:, :3, 3])
+    table |= _named_columns(("roll", "pitch", "yaw"), units.angles_out(rotation.rpy(matrices[:, :3, :3])))
+    table["within_limits"] = np.asarray(~limits.outside_limits(arm, q).any(axis=1))
     return table
 
 
-def counts(arm: Arm, values: Array, best: bool = False) -> Table:
+def pulse_columns(arm: Arm, values: Array, best: bool = False) -> Table:
     """The columns of pulses: values (N, n) [deg | mm]; best: see `armkin.best_pulses`."""
     q = units.joints_in(arm, values)
     r = motors.best_pulses(arm, q).chosen if best else motors.rounding(arm, q)
-    table: Table = _named(arm.joint_names, values)
-    table |= _named([f"pulses_{name}" for name in motors.motor_names(arm)], r.pulses)
-    table |= _named([f"actual_{name}" for name in arm.joint_names], units.joints_out(arm, r.actual_joints))
-    table |= _named("xyz", r.actual + 0.0)
+    table: Table = _named_columns(arm.joint_names, values)
+    table |= _named_columns([f"pulses_{name}" for name in motors.motor_names(arm)], r.pulses)
+    table |= _named_columns([f"actual_{name}" for name in arm.joint_names], units.joints_out(arm, r.actual_joints))
+    table |= _named_columns("xyz", r.actual + 0.0)
     table["error_mm"] = r.error
-    table["within_limits"] = np.asarray(~limits.outside(arm, q).any(axis=1))
+    table["within_limits"] = np.asarray(~limits.outside_limits(arm, q).any(axis=1))
     return table
 
 
-def _named(names: Sequence[str], values: NDArray[Any]) -> Table:
+def _named_columns(names: Sequence[str], values: NDArray[Any]) -> Table:
     return {name: np.ascontiguousarray(column) for name, column in zip(names, values.T, strict=True)}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import IO
 
 from armkin.columns import csv_and_json_lines, npz, parquet
-from armkin.files import ending
+from armkin.files import file_ending
 
 Source = Callable[[], Iterable[IO[bytes]]]  # opens the parts, one after the other, as often as it is called
 
@@ -23,16 +23,16 @@ class Format:
     is_text: bool = False
 
 
-def _joined(file: IO[bytes], parts: Source) -> None:
+def _join_parts(file: IO[bytes], parts: Source) -> None:
     for part in parts():
         shutil.copyfileobj(part, file, 1 << 20)
 
 
-CSV = Format("csv", csv_and_json_lines.csv, _joined, is_text=True)
-JSON_LINES = Format("jsonl", csv_and_json_lines.json_lines, _joined, is_text=True)
+CSV = Format("csv", csv_and_json_lines.to_csv, _join_parts, is_text=True)
+JSON_LINES = Format("jsonl", csv_and_json_lines.to_json_lines, _join_parts, is_text=True)
 _BY_ENDING = {
-    ".npz": Format("npz", npz.encoded, npz.write_parts),
-    ".parquet": Format("parquet", parquet.encoded, parquet.write_parts),
+    ".npz": Format("npz", npz.encode_table, npz.write_parts),
+    ".parquet": Format("parquet", parquet.encode_table, parquet.write_parts),
     ".jsonl": JSON_LINES,
     ".csv": CSV,
     "": CSV,
@@ -48,4 +48,4 @@ def format_of(path: str | None) -> Format:
     >>> format_of("poses.npz").name, format_of("-").name
     ('npz', 'csv')
     """
-    return CSV if path is None else _BY_ENDING[ending(path, "rows are", ENDINGS, may_lack=True)]
+    return CSV if path is None else _BY_ENDING[file_ending(path, "rows are", ENDINGS, may_lack=True)]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.columns.table import Table, Words, joined
+from armkin.columns.table import Table, Words, join_tables
 from armkin.formula.arrays import numbers_within
 from armkin.inverse import choose_branch
 from armkin.inverse.answers.solutions import Solutions, Status
@@ -36,7 +36,7 @@ class BranchTable(NamedTuple):
     unsolved: Bool
 
 
-def columns(
+def branch_columns(
     request: choose_branch.Request,
     targets: Array,
     rows: NDArray[np.integer],
@@ -46,23 +46,26 @@ def columns(
 ) -> BranchTable:
     """The columns of ik: targets (N, ...) [mm, rad], rows (N,) their numbers; all_branches: not the best alone.
 
-    more: of `armkin.ik`. The request sweeps no joint. quick: `nearest` by machine code, None where it does not serve.
+    more: of `armkin.ik`. The request sweeps no joint. quick: `nearest_branches` by machine code; None where it does not
+    serve.
     """
     arm, near = request.arm, units.joints_in(request.arm, request.near_out)
-    kept = [i for i, name in enumerate(arm.joint_names) if name not in request.held]
-    s = request.ik(choose_branch.locked_arm(request), targets, request.task, near=near[kept], **more)
+    free_indices = [i for i, name in enumerate(arm.joint_names) if name not in request.held]
+    s = request.ik(choose_branch.locked_arm(request), targets, request.task, near=near[free_indices], **more)
     q, within = s.q, s.within_limits
     if request.held:
         values = units.joints_in(arm, [request.held.get(name, 0.0) for name in arm.joint_names])
         q = unlock(arm, {name: values[arm.joint_names.index(name)] for name in request.held}, s.q)
-        within = within & ~limits.outside(arm, q).any(axis=-1)
+        within = within & ~limits.outside_limits(arm, q).any(axis=-1)
     free = within & s.clear if arm.keep_out else within
     names = () if request.branch is None else find_branches(s.names, request.branch)
     parts = [
-        _listed(request, _Answers(s, slice(i, i + BLOCK), q, within, free, near, names), rows, all_branches, quick)
+        _list_branches(
+            request, _Answers(s, slice(i, i + BLOCK), q, within, free, near, names), rows, all_branches, quick
+        )
         for i in range(0, max(len(q), 1), BLOCK)
     ]
-    return BranchTable(joined([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
+    return BranchTable(join_tables([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
 
 
 class _Answers(NamedTuple):
@@ -80,65 +83,66 @@ class _Answers(NamedTuple):
     names: Sequence[int]
 
 
-def _listed(
+def _list_branches(
     request: choose_branch.Request, answers: _Answers, rows: NDArray[np.integer], all_branches: bool, quick: Any
 ) -> BranchTable:
-    s, some, scale = answers.s, answers.rows, units.scale(request.arm)
-    q, within, free, valid = answers.q[some], answers.within_limits[some], answers.free[some], s.valid[some]
-    wanted = free if request.branch is None else free & np.isin(s.branch[some], answers.names)
+    s, block, scale = answers.s, answers.rows, units.joint_scale(request.arm)
+    q, within, free, valid = answers.q[block], answers.within_limits[block], answers.free[block], s.valid[block]
+    allowed = free if request.branch is None else free & np.isin(s.branch[block], answers.names)
     if all_branches:
-        unsolved, motion = ~_any_column(wanted), _motion(q, answers.near, scale)
+        unsolved, motion = ~_any_column(allowed), _joint_motion(q, answers.near, scale)
         key = np.where(valid, motion.round(EQUAL), np.inf)
         count = valid.sum(axis=1)
         lines = np.maximum(count, 1)
         target = np.repeat(np.arange(len(lines)), lines)
-        there = np.repeat(count > 0, lines)
+        has_branch = np.repeat(count > 0, lines)
         place = numbers_within(lines)
-        branch = _ranked(key, valid, within, free)[target[there], place[there]]
-        motion = motion[target[there], branch]
+        branch = _rank_branches(key, valid, within, free)[target[has_branch], place[has_branch]]
+        motion = motion[target[has_branch], branch]
     else:
-        best, motion = (quick and quick(q, wanted, answers.near, scale)) or nearest(q, wanted, answers.near, scale)
-        target, there = np.arange(len(best)), best >= 0
-        unsolved, branch, motion = ~there, best[there], motion[there]
-    chosen = target[there], branch
-    values = _Lines(target, there, q[chosen], within[chosen], motion, *chosen)
-    return BranchTable(_table(request, s, rows[some], some, values), unsolved)
+        arguments = q, allowed, answers.near, scale
+        best, motion = (quick and quick(*arguments)) or nearest_branches(*arguments)
+        target, has_branch = np.arange(len(best)), best >= 0
+        unsolved, branch, motion = ~has_branch, best[has_branch], motion[has_branch]
+    chosen = target[has_branch], branch
+    values = _Lines(target, has_branch, q[chosen], within[chosen], motion, *chosen)
+    return BranchTable(_branch_table(request, s, rows[block], block, values), unsolved)
 
 
-def nearest(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
+def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
     """The branch (N,) of q (N, B, n) that moves the joints least of those wanted (N, B), -1 if none is; and how far.
 
     Motions are sums of |change| from near (n,), each joint by its scale (n,); to `EQUAL` decimals the first one counts.
     """
-    there, motion = _any_column(candidates), _motion(q, near, scale)
+    has_branch, motion = _any_column(candidates), _joint_motion(q, near, scale)
     if not q.shape[1]:
         return np.full(len(q), -1), np.full(len(q), np.nan)
     branch = np.where(candidates, motion.round(EQUAL), np.inf).argmin(axis=1)
-    return np.where(there, branch, -1), motion[np.arange(len(q)), branch]
+    return np.where(has_branch, branch, -1), motion[np.arange(len(q)), branch]
 
 
 def _any_column(flags: Bool) -> Bool:
     """``flags.any(axis=1)`` of a few columns, column by column, which is quicker."""
-    found = np.zeros(len(flags), bool)
+    any_flag = np.zeros(len(flags), bool)
     for column in flags.T:
-        found |= column
-    return found
+        any_flag |= column
+    return any_flag
 
 
-def _ranked(key: Array, valid: Bool, within_limits: Bool, free: Bool) -> NDArray[np.intp]:
+def _rank_branches(key: Array, valid: Bool, within_limits: Bool, free: Bool) -> NDArray[np.intp]:
     """Branches (N, B) in the order in which they are listed: free, with hits, outside limits; equal ones as found."""
     rank = np.argsort(key, axis=1, kind="stable")
-    other = np.flatnonzero((free != valid).any(axis=1))
-    if len(other):
-        k, v, w, f = key[other], valid[other], within_limits[other], free[other]
-        rank[other] = np.lexsort((k, w & ~f, ~w, ~v), axis=-1)
+    mixed = np.flatnonzero((free != valid).any(axis=1))
+    if len(mixed):
+        k, v, w, f = key[mixed], valid[mixed], within_limits[mixed], free[mixed]
+        rank[mixed] = np.lexsort((k, w & ~f, ~w, ~v), axis=-1)
     return rank
 
 
-def _motion(q: Array, near: Array, scale: Array) -> Array:
+def _joint_motion(q: Array, near: Array, scale: Array) -> Array:
     """Sums of |change| from near (n,), each joint by its scale: (N, B, n) -> (N, B), as numpy would add them up."""
     if q.shape[-1] > 7:
-        return _sum(np.abs(q - near) / scale)
+        return _sum_joints(np.abs(q - near) / scale)
     total = np.zeros(q.shape[:-1])
     for i, (start, unit) in enumerate(zip(near, scale, strict=True)):
         away = q[..., i] - start  # joint by joint: no array of all of them
@@ -148,7 +152,7 @@ def _motion(q: Array, near: Array, scale: Array) -> Array:
     return total
 
 
-def _sum(values: Array) -> Array:
+def _sum_joints(values: Array) -> Array:
     """``values.sum(axis=-1)``, to the same bits: numpy adds up to seven numbers from left to right, but slowly."""
     if values.shape[-1] > 7:
         return np.asarray(values.sum(axis=-1))
@@ -170,41 +174,41 @@ class _Lines(NamedTuple):
     branch: NDArray[np.intp]  # (K,)
 
 
-def _table(
+def _branch_table(
     request: choose_branch.Request, s: Solutions, rows: NDArray[np.integer], rows_of_part: slice, lines: _Lines
 ) -> Table:
     """One line for each target, or branch of it, with numbers where there is a branch."""
-    there, every = lines.has_branch, bool(lines.has_branch.all())
-    mm, rad = _missed(request, s, rows_of_part, lines)
+    present, every = lines.has_branch, bool(lines.has_branch.all())
+    mm, rad = _residuals(request, s, rows_of_part, lines)
     names = tuple(name.replace(",", "") for name in s.names)  # so that `cut` sees one column
-    label = np.full(len(there), -1)
-    label[there] = s.branch[rows_of_part][lines.target, lines.branch]
+    label = np.full(len(present), -1)
+    label[present] = s.branch[rows_of_part][lines.target, lines.branch]
     table: Table = {
         "row": rows[lines.line_target],
         "status": Words(s.status[rows_of_part][lines.line_target], _STATUS),
         "branch": Words(label, names),
     }
     joints = np.ascontiguousarray(units.joints_out(request.arm, lines.q).T)
-    legal = np.zeros(len(there), bool)
-    legal[there] = lines.within_limits
+    legal = np.zeros(len(present), bool)
+    legal[present] = lines.within_limits
     table |= dict(zip(request.arm.joint_names, joints, strict=True)) | {"within_limits": legal}
     table |= {"residual_mm": mm, "residual_deg": units.angles_out(rad), "motion": lines.motion}
     if every:
         return table
     numbers = (*request.arm.joint_names, "residual_mm", "residual_deg", "motion")
-    return table | {name: _with_gaps(np.asarray(table[name]), there) for name in numbers}
+    return table | {name: _with_gaps(np.asarray(table[name]), present) for name in numbers}
 
 
-def _missed(request: choose_branch.Request, s: Solutions, part: slice, lines: _Lines) -> tuple[Array, Array]:
+def _residuals(request: choose_branch.Request, s: Solutions, part: slice, lines: _Lines) -> tuple[Array, Array]:
     """What some branches miss: (K,) [mm] and (K,) [rad]."""
     q = s.q[part][lines.target, lines.branch] if request.held else lines.q
     target = s.target[part] if len(q) == len(lines.has_branch) == len(s.target[part]) else s.target[part][lines.target]
     missing = residual(s.task, request.fk(s.arm, q), q, target)
     p = s.task.position
-    return _norm(missing[:, :p]), _norm(missing[:, p:])
+    return _row_norms(missing[:, :p]), _row_norms(missing[:, p:])
 
 
-def _norm(values: Array) -> Array:
+def _row_norms(values: Array) -> Array:
     """Lengths of rows."""
     total = np.zeros(len(values))
     for column in values.T:
@@ -214,6 +218,6 @@ def _norm(values: Array) -> Array:
 
 def _with_gaps(values: Array, present: Bool) -> Array:
     """Values where they are `present`, nan elsewhere."""
-    out = np.full(len(present), np.nan)
-    out[present] = values
-    return out
+    padded = np.full(len(present), np.nan)
+    padded[present] = values
+    return padded

@@ -22,43 +22,43 @@ def reader_of(path: str) -> Callable[[str, Sequence[str], int], Iterator[Array]]
 
     It is called with the path, the columns wanted and how many rows to give at a time, and yields (N, columns).
     """
-    return {".npz": _npz, ".parquet": _parquet, ".jsonl": _json_lines}.get(Path(path).suffix.lower())
+    return {".npz": _read_npz, ".parquet": _read_parquet, ".jsonl": _read_json_lines}.get(Path(path).suffix.lower())
 
 
-def places(heading: Sequence[str], name: str) -> list[int]:
+def column_places(heading: Sequence[str], name: str) -> list[int]:
     """Columns of a name: those of exactly this name, or those with a unit behind it."""
     exact = [i for i, cell in enumerate(heading) if cell == name]
-    others = (f"{name}_mm", f"{name}_deg", f"{name}/mm", f"{name}/deg", f"tool_{name}_mm")
-    return exact or [i for i, cell in enumerate(heading) if cell in others]
+    with_units = (f"{name}_mm", f"{name}_deg", f"{name}/mm", f"{name}/deg", f"tool_{name}_mm")
+    return exact or [i for i, cell in enumerate(heading) if cell in with_units]
 
 
 def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str]) -> list[str]:
     """The file's names of the columns wanted."""
     lower = [cell.lower() for cell in heading]
-    found = {name: places(lower, name.lower()) for name in names}
-    missing = [name for name, there in found.items() if not there]
+    places_of = {name: column_places(lower, name.lower()) for name in names}
+    missing = [name for name, places_found in places_of.items() if not places_found]
     if missing:
-        some = ", ".join(heading[:20])
-        raise UsageError(f"{path} has no column{'s' * (len(missing) > 1)} {', '.join(missing)}; it has {some}")
-    double = [name for name, there in found.items() if len(there) > 1]
+        heading_text = ", ".join(heading[:20])
+        raise UsageError(f"{path} has no column{'s' * (len(missing) > 1)} {', '.join(missing)}; it has {heading_text}")
+    double = [name for name, places_found in places_of.items() if len(places_found) > 1]
     if double:
         raise UsageError(f"{path} has two columns {double[0]}")
-    return [heading[there[0]] for there in found.values()]
+    return [heading[places_found[0]] for places_found in places_of.values()]
 
 
-def _npz(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+def _read_npz(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
     try:
         with ExitStack() as stack:
             archive = stack.enter_context(zipfile.ZipFile(path))
             heading = [name.removesuffix(".npy") for name in archive.namelist()]
             files = [stack.enter_context(archive.open(f"{name}.npy")) for name in _wanted_names(path, heading, names)]
-            heads = [_head(path, name, file) for name, file in zip(names, files, strict=True)]
+            heads = [_array_head(path, name, file) for name, file in zip(names, files, strict=True)]
             if len({count for count, _ in heads}) > 1:
                 raise UsageError(f"{path}: its columns are not of one length")
             for start in range(0, heads[0][0], rows):
-                some = min(rows, heads[0][0] - start)
+                rows_read = min(rows, heads[0][0] - start)
                 columns = [
-                    np.frombuffer(file.read(some * dtype.itemsize), dtype)
+                    np.frombuffer(file.read(rows_read * dtype.itemsize), dtype)
                     for file, (_, dtype) in zip(files, heads, strict=True)
                 ]
                 yield np.column_stack(columns).astype(float)
@@ -68,7 +68,7 @@ def _npz(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
         raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None
 
 
-def _head(path: str, name: str, file: Any) -> tuple[int, np.dtype[Any]]:
+def _array_head(path: str, name: str, file: Any) -> tuple[int, np.dtype[Any]]:
     version = np.lib.format.read_magic(file)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(file)
@@ -77,8 +77,8 @@ def _head(path: str, name: str, file: Any) -> tuple[int, np.dtype[Any]]:
     return shape[0], dtype
 
 
-def _parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
-    pa = parquet.require()
+def _read_parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+    pa = parquet.require_pyarrow()
     try:
         file = pa.parquet.ParquetFile(path)
         chosen = _wanted_names(path, file.schema_arrow.names, names)
@@ -92,7 +92,7 @@ def _parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
         raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None
 
 
-def _json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+def _read_json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
     chosen: list[str] = []
     try:
         with open(path, encoding="utf-8") as file:
@@ -100,15 +100,15 @@ def _json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
             while lines := list(itertools.islice(numbered, rows)):
                 table = []
                 for number, line in lines:
-                    row = _object(path, number, line)
+                    row = _row_object(path, number, line)
                     chosen = chosen or _wanted_names(path, list(row), names)
-                    table.append([_number(path, number, name, row.get(name)) for name in chosen])
+                    table.append([_cell_number(path, number, name, row.get(name)) for name in chosen])
                 yield np.array(table, dtype=float)
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None
 
 
-def _object(path: str, number: int, line: str) -> dict[str, Any]:
+def _row_object(path: str, number: int, line: str) -> dict[str, Any]:
     try:
         row = json.loads(line)
     except ValueError:
@@ -118,7 +118,7 @@ def _object(path: str, number: int, line: str) -> dict[str, Any]:
     return row
 
 
-def _number(path: str, number: int, name: str, value: Any) -> float:
+def _cell_number(path: str, number: int, name: str, value: Any) -> float:
     if value is None:
         return np.nan
     if isinstance(value, bool) or not isinstance(value, int | float):

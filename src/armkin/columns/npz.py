@@ -23,7 +23,7 @@ class _Kept(NamedTuple):
     words: tuple[str, ...] | None
 
     @property
-    def shown(self) -> np.dtype[Any]:
+    def written_dtype(self) -> np.dtype[Any]:
         """The type that is written."""
         return self.dtype if self.words is None else np.array([*self.words, ""]).dtype
 
@@ -34,46 +34,48 @@ class _Kept(NamedTuple):
         return values if self.words is None else Words(values, self.words)
 
 
-def encoded(table: Table) -> bytes:
+def encode_table(table: Table) -> bytes:
     """A table as a part: a line of JSON about its columns, then their numbers; `write_parts` makes an .npz of parts."""
-    each = [(column.index, column.names) if isinstance(column, Words) else (column, None) for column in table.values()]
-    head = [[name, len(v), v.dtype.str, words] for name, (v, words) in zip(table, each, strict=True)]
-    return b"".join([json.dumps(head).encode(), b"\n", *(np.ascontiguousarray(values).data for values, _ in each)])
+    columns = [
+        (column.index, column.names) if isinstance(column, Words) else (column, None) for column in table.values()
+    ]
+    head = [[name, len(v), v.dtype.str, words] for name, (v, words) in zip(table, columns, strict=True)]
+    return b"".join([json.dumps(head).encode(), b"\n", *(np.ascontiguousarray(values).data for values, _ in columns)])
 
 
-def decoded(data: bytes) -> Table:
+def decode_table(encoded: bytes) -> Table:
     """The table of a part."""
-    part = io.BytesIO(data)
-    return {one.name: one.read(part) for one in _columns(part)}
+    part = io.BytesIO(encoded)
+    return {column.name: column.read(part) for column in _stored_columns(part)}
 
 
 def write_parts(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
     """One .npz of several, column by column: memory does not grow with their number."""
-    heads = [_columns(part) for part in parts()]
-    with zipfile.ZipFile(file, "w") as whole:
+    heads = [_stored_columns(part) for part in parts()]
+    with zipfile.ZipFile(file, "w") as archive:
         for i, (name, *_) in enumerate(heads[0] if heads else []):
-            dtype = np.result_type(*(head[i].shown for head in heads))
-            with whole.open(member(name), "w", force_zip64=True) as out:
+            dtype = np.result_type(*(head[i].written_dtype for head in heads))
+            with archive.open(archive_member(name), "w", force_zip64=True) as member_file:
                 shape = (sum(head[i].rows for head in heads),)
                 described = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
-                np.lib.format.write_array_header_1_0(out, described)
+                np.lib.format.write_array_header_1_0(member_file, described)
                 for part, head in zip(parts(), heads, strict=True):
                     column = head[i].read(part)
                     values = column.texts() if isinstance(column, Words) else column
-                    out.write(np.ascontiguousarray(values, dtype).view(np.uint8).data)
+                    member_file.write(np.ascontiguousarray(values, dtype).view(np.uint8).data)
 
 
-def member(name: str) -> zipfile.ZipInfo:
+def archive_member(name: str) -> zipfile.ZipInfo:
     """An archive's entry for a column, with a date of its own, so that the same columns are the same bytes."""
     return zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
 
 
-def _columns(part: IO[bytes]) -> list[_Kept]:
+def _stored_columns(part: IO[bytes]) -> list[_Kept]:
     """What stands in a part, from where it is read now."""
-    head, found = json.loads(part.readline()), []
-    at = part.tell()
+    head, columns = json.loads(part.readline()), []
+    offset = part.tell()
     for name, count, kind, words in head:
         dtype = np.dtype(kind)
-        found.append(_Kept(name, at, count, dtype, None if words is None else tuple(words)))
-        at += count * dtype.itemsize
-    return found
+        columns.append(_Kept(name, offset, count, dtype, None if words is None else tuple(words)))
+        offset += count * dtype.itemsize
+    return columns

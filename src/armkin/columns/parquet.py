@@ -10,7 +10,7 @@ from armkin.columns.table import Column, Table, Words
 from armkin.errors import MissingExtraError
 
 
-def require() -> Any:
+def require_pyarrow() -> Any:
     """pyarrow. Raises MissingExtraError where it is not installed."""
     try:
         import pyarrow
@@ -20,19 +20,19 @@ def require() -> Any:
     return pyarrow
 
 
-def encoded(table: Table) -> bytes:
+def encode_table(table: Table) -> bytes:
     """A table as the bytes of an Arrow stream, which `write_parts` makes a row group of."""
-    pa = require()
-    whole = pa.table({name: _array(pa, column) for name, column in table.items()})
-    out = io.BytesIO()
-    with pa.ipc.new_stream(out, whole.schema) as stream:
-        stream.write_table(whole)
-    return out.getvalue()
+    pa = require_pyarrow()
+    arrow_table = pa.table({name: _arrow_array(pa, column) for name, column in table.items()})
+    stream_bytes = io.BytesIO()
+    with pa.ipc.new_stream(stream_bytes, arrow_table.schema) as stream:
+        stream.write_table(arrow_table)
+    return stream_bytes.getvalue()
 
 
 def write_parts(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> None:
     """One Parquet file, a row group a part."""
-    pa = require()
+    pa = require_pyarrow()
     writer = None
     for part in parts():
         table = pa.ipc.open_stream(part.read()).read_all()
@@ -45,7 +45,7 @@ def write_parts(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> No
         writer.close()
 
 
-def _array(pa: Any, column: Column) -> Any:
+def _arrow_array(pa: Any, column: Column) -> Any:
     if isinstance(column, Words):
         names = pa.array([*column.names, None], pa.string())
         return names.take(pa.array(column.index % (len(column.names) + 1)))

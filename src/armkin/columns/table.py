@@ -29,12 +29,12 @@ Column = NDArray[Any] | Words  # numbers: nan is a cell without one
 Table = dict[str, Column]
 
 
-def rows(table: Table) -> int:
+def row_count(table: Table) -> int:
     """How many rows a table has."""
     return len(next(iter(table.values()))) if table else 0
 
 
-def part(table: Table, rows: slice) -> Table:
+def take_rows(table: Table, rows: slice) -> Table:
     """Some rows of a table."""
     return {
         name: Words(column.index[rows], column.names) if isinstance(column, Words) else column[rows]
@@ -42,26 +42,26 @@ def part(table: Table, rows: slice) -> Table:
     }
 
 
-def joined(tables: Sequence[Table]) -> Table:
+def join_tables(tables: Sequence[Table]) -> Table:
     """Tables of the same columns, one behind the other."""
     if len(tables) == 1:
         return tables[0]
-    return {name: _joined([table[name] for table in tables]) for name in tables[0]}
+    return {name: _join_columns([table[name] for table in tables]) for name in tables[0]}
 
 
-def _joined(columns: Sequence[Any]) -> Column:
+def _join_columns(columns: Sequence[Any]) -> Column:
     if isinstance(columns[0], Words):
         return Words(np.concatenate([column.index for column in columns]), columns[0].names)
     return np.concatenate(columns)
 
 
-def of_records(heading: Sequence[str], records: Sequence[Sequence[Any]]) -> Table:
+def table_of_records(heading: Sequence[str], records: Sequence[Sequence[Any]]) -> Table:
     """A table of rows of numbers, words and None."""
     columns = zip(*records, strict=True) if records else [()] * len(heading)
-    return {name: _column(values) for name, values in zip(heading, columns, strict=True)}
+    return {name: _column_of_values(values) for name, values in zip(heading, columns, strict=True)}
 
 
-def _column(values: Sequence[Any]) -> Column:
+def _column_of_values(values: Sequence[Any]) -> Column:
     if any(isinstance(value, str) for value in values):
         names = tuple(dict.fromkeys(value for value in values if value is not None))
         place = {name: i for i, name in enumerate(names)} | {None: -1}

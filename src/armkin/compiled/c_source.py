@@ -65,7 +65,7 @@ class Library(NamedTuple):
 def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | None) -> Library:
     """The C file of an arm: fk alone without a task, or if the class has no form in C.
 
-    commanded: the arm; arm: the same in actual joint values, `armkin.model.arm.actual`, of which the branches are.
+    commanded: the arm; arm: the same in actual joint values, `armkin.model.arm.actual_arm`, of which the branches are.
     """
     solve, branches, level = "", 0, 3
     if task is not None and geometry is not None and c_program.has_form(geometry):

@@ -31,7 +31,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.choose_task import default_task
 from armkin.inverse.tasks.task import distance, read_targets
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -175,7 +175,7 @@ class _CompiledTask:
 
     def __init__(self, arm: Arm, task: str | None) -> None:
         self.arm, self.name, self.n = arm, task, arm.n
-        self.turned = actual(arm)  # formulas are those of actual joint values
+        self.turned = actual_arm(arm)  # formulas are those of actual joint values
         solved_task, form = _class_of(self.turned, task)
         if solved_task is not None and form is not None:  # an elimination named after a class is that elimination in C
             form = c_program.plain_form(self.turned, solved_task, form) if form.places is not None else form

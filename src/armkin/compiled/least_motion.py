@@ -1,4 +1,4 @@
-"""The branch that moves the joints least by machine code: as `armkin.columns.ik_columns.nearest`, to the same bits."""
+"""The branch that moves the joints least by machine code: as `ik_columns.nearest_branches`, to the same bits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST = 7  # joints that numpy adds up from left to right
 
 
 def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
-    """See `armkin.columns.ik_columns.nearest`; None for more joints than are added up one after the other."""
+    """See `armkin.columns.ik_columns.nearest_branches`; None for more joints than are added up one after the other."""
     N, B, n = q.shape
     if n > MOST:
         return None

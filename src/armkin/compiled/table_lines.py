@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from armkin.columns.table import Column, Table, Words, part, rows
+from armkin.columns.table import Column, Table, Words, row_count, take_rows
 from armkin.compiled import toolchain
 
 SOURCE = Path(__file__).parent / "parts" / "table_lines.c"
@@ -23,7 +23,7 @@ BLOCK = 4_096  # rows printed at once: their text stays in the cache
 
 def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
     """See `armkin.columns.csv_and_json_lines.Lines`."""
-    count = rows(table)
+    count = row_count(table)
     print_rows = _library()
     texts = [_column_words(column, quoted) for column in table.values()]
     cells = [[before, missing, *cell] for before, cell in zip(between, texts, strict=False)] + [[between[-1]]]
@@ -34,10 +34,10 @@ def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], 
     words, buffer = b"".join(flat), np.empty(min(count, BLOCK) * width + SPARE, np.uint8)
     printed = []
     for start in range(0, count, BLOCK):
-        block = part(table, slice(start, start + BLOCK))
+        block = take_rows(table, slice(start, start + BLOCK))
         kinds, values = zip(*map(_column_values, block.values()), strict=True)
         size = print_rows(
-            rows(block),
+            row_count(block),
             len(kinds),
             (ctypes.c_int * len(kinds))(*kinds),
             (ctypes.c_void_p * len(kinds))(*(parts.ctypes.data for parts in values)),

@@ -29,7 +29,7 @@ AHEAD = 3  # chunks a thread of the workers
 
 def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]) -> Iterator[Result]:
     """See `armkin.engines.ordered_chunks`. Raises ClusterError for a scheduler that cannot be reached or goes away."""
-    client = _client(address)
+    client = _connect(address)
     try:
         _check_workers(client, address)
         data = pickle.dumps((work, job))
@@ -46,22 +46,22 @@ def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> I
         try:
             threads = sum(client.nthreads().values()) if not waiting else 0
             window = max(AHEAD * threads, 2, len(waiting))
-            while len(waiting) < window and (some := next(source, waiting)) is not waiting:
-                waiting.append(client.submit(_run_chunk, data, name, some, pure=False))
+            while len(waiting) < window and (chunk := next(source, waiting)) is not waiting:
+                waiting.append(client.submit(_run_chunk, data, name, chunk, pure=False))
             if not waiting:
                 return
-            result = waiting.popleft().result()
+            answer = waiting.popleft().result()
         except ArmkinError:
             raise
         except Exception as error:
-            raise _lost(client, address, error) from None
-        yield result
+            raise _lost_error(client, address, error) from None
+        yield answer
         # one out, one in: the window stays full
         with suppress(StopIteration):
             waiting.append(client.submit(_run_chunk, data, name, next(source), pure=False))
 
 
-def _lost(client: Any, address: str, error: Exception) -> ClusterError:
+def _lost_error(client: Any, address: str, error: Exception) -> ClusterError:
     kind = type(error).__name__
     if kind == "KilledWorker":
         return ClusterError(f"{address}: the same chunk has ended several workers: out of memory?", address=address)
@@ -70,7 +70,7 @@ def _lost(client: Any, address: str, error: Exception) -> ClusterError:
     return ClusterError(f"{address}: a chunk failed: {kind}: {error}", address=address)
 
 
-def _client(address: str) -> Any:
+def _connect(address: str) -> Any:
     try:
         distributed: Any = import_module("distributed")
     except ImportError:
@@ -109,19 +109,19 @@ def _check_workers(client: Any, address: str) -> None:
     """Raise ClusterError if there is no worker, or one that would compute with another armkin, numpy or Python."""
     try:
         client.wait_for_workers(1, timeout=SECONDS)
-        told = client.run(versions)
+        of_workers = client.run(versions)
     except TimeoutError:
         raise ClusterError(
             f"{address}: the scheduler has no worker; start one with: dask worker {address}", address=address
         ) from None
     except Exception as error:
         raise ClusterError(f"{address}: a worker has no armkin of this version: {error}", address=address) from None
-    here = versions()
-    for worker, there in told.items():
-        other = [name for name in here if here[name] != there.get(name)]
-        if other:
-            found = ", ".join(f"{name} {there.get(name)} (here {here[name]})" for name in other)
-            raise ClusterError(f"{address}: worker {worker} has {found}", address=address)
+    own = versions()
+    for worker, of_worker in of_workers.items():
+        differing = [name for name in own if own[name] != of_worker.get(name)]
+        if differing:
+            differences = ", ".join(f"{name} {of_worker.get(name)} (here {own[name]})" for name in differing)
+            raise ClusterError(f"{address}: worker {worker} has {differences}", address=address)
 
 
 def versions() -> dict[str, str]:
@@ -134,7 +134,7 @@ def versions() -> dict[str, str]:
 
 
 def _run_chunk(data: bytes, name: str, chunk: Any) -> Any:
-    work, job = _unpacked(_PackedJob(data, name))
+    work, job = _unpack(_PackedJob(data, name))
     return work(job, chunk)
 
 
@@ -152,6 +152,6 @@ class _PackedJob:
 
 
 @lru_cache(maxsize=4)
-def _unpacked(packed: _PackedJob) -> tuple[Callable[[Any, Any], Any], Any]:
+def _unpack(packed: _PackedJob) -> tuple[Callable[[Any, Any], Any], Any]:
     work, job = pickle.loads(packed.data)
     return work, job

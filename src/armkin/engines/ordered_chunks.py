@@ -23,7 +23,7 @@ class Engine(NamedTuple):
         return self.workers == 1 and self.cluster is None
 
     @property
-    def pool(self) -> bool:
+    def uses_pool(self) -> bool:
         """Whether it is done in other processes of this machine."""
         return self.workers > 1 and self.cluster is None
 

@@ -31,37 +31,37 @@ def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunk
     """See `armkin.engines.ordered_chunks.in_order`."""
     source = iter(chunks)
     waiting: deque[tuple[Chunk, Future[Result]]] = deque()
-    pool, lost = _pool(workers, work, job), 0
+    pool, lost = _start_pool(workers, work, job), 0
     try:
         while True:
-            while len(waiting) < AHEAD * workers and (some := next(source, waiting)) is not waiting:
-                waiting.append((some, _submitted(pool, some)))  # type: ignore[arg-type]
+            while len(waiting) < AHEAD * workers and (next_chunk := next(source, waiting)) is not waiting:
+                waiting.append((next_chunk, _submit(pool, next_chunk)))  # type: ignore[arg-type]
             if not waiting:
                 return
             try:
-                result = waiting[0][1].result()
+                answer = waiting[0][1].result()
             except BrokenProcessPool:
                 lost += 1
                 if lost > PATIENCE:
                     why = f"the process of the same chunk has ended {lost} times: out of memory?"
                     raise ClusterError(why) from None
                 pool.shutdown(wait=True, cancel_futures=True)
-                pool = _pool(workers, work, job)
-                waiting = deque((chunk, _submitted(pool, chunk)) for chunk, _ in waiting)
+                pool = _start_pool(workers, work, job)
+                waiting = deque((chunk, _submit(pool, chunk)) for chunk, _ in waiting)
                 continue
             lost = 0
             waiting.popleft()
-            yield result
+            yield answer
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _pool(workers: int, work: Callable[[Any, Any], Any], job: Any) -> ProcessPoolExecutor:
-    context = multiprocessing.get_context("fork" if _threads() == 1 else "spawn")
-    return ProcessPoolExecutor(workers, context, _begin, (work, job))
+def _start_pool(workers: int, work: Callable[[Any, Any], Any], job: Any) -> ProcessPoolExecutor:
+    context = multiprocessing.get_context("fork" if _thread_count() == 1 else "spawn")
+    return ProcessPoolExecutor(workers, context, _begin_worker, (work, job))
 
 
-def _threads() -> int:
+def _thread_count() -> int:
     """How many threads this process has, those of libraries among them; 0: the system does not tell."""
     try:
         return len(os.listdir("/proc/self/task"))
@@ -69,7 +69,7 @@ def _threads() -> int:
         return 0
 
 
-def _submitted(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
+def _submit(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
     """A chunk given to the pool; of one that is broken already, a future that says so, as those given before do."""
     try:
         return pool.submit(_run_chunk, chunk)
@@ -79,7 +79,7 @@ def _submitted(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
         return lost
 
 
-def _begin(work: Callable[[Any, Any], Any], job: Any) -> None:
+def _begin_worker(work: Callable[[Any, Any], Any], job: Any) -> None:
     """In a new process: Ctrl-C is the parent's matter, and without the parent there is nothing to do."""
     global _job
     signal.signal(signal.SIGINT, signal.SIG_IGN)

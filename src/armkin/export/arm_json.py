@@ -22,7 +22,7 @@ def arm_numbers(arm: Arm) -> dict[str, Any]:
     `links`: the tool's pose is links[0] Z1(ratio1 q1) links[1] ... Zn(ratio_n q_n) links[n], Z = Rz or Tz.
     """
     screws = conventions.screws(arm)
-    limits, home, unit = units.limits_out(arm), units.home_out(arm), units.names(arm)
+    limits, home, unit = units.limits_out(arm), units.home_out(arm), units.unit_names(arm)
     speeds, accels = (units.joints_out(arm, values).tolist() for values in (arm.max_speed, arm.max_accel))
     joints = [
         {

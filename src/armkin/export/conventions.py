@@ -17,7 +17,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import fk
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 from armkin.model.rotation import FLIP, inverse, transform
 from armkin.robot_file.robot_file_text import format_robot_file, pose_keys, tidy
 
@@ -262,7 +262,7 @@ def differences(arm: Arm, keys: dict[str, Any]) -> list[str]:
 
 
 def _build_arm(keys: dict[str, Any]) -> Arm:
-    return build(robot_file.parse_robot_file(format_robot_file(keys), str(keys["name"])))
+    return arm_of_file(robot_file.parse_robot_file(format_robot_file(keys), str(keys["name"])))
 
 
 def _check_poses(arm: Arm, keys: dict[str, Any], links: Array) -> None:

@@ -15,9 +15,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.robot_file.robot_file_text import number_text, rpy_angles
-from armkin.view.skeleton import shape
+from armkin.view.skeleton import arm_shape
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -36,11 +36,11 @@ def urdf_text(arm: Arm) -> str:
     >>> urdf_text(armkin.load("robots/three_dof.yaml")).splitlines()[2]
     '<robot name="three_dof">'
     """
-    turned = actual(arm)
+    turned = actual_arm(arm)
     links = ["base_link"]
     for name in arm.joint_names:
         links.append(_free_name(f"{name}_link", tuple(links)))
-    radius, form = THICK * arm.reach, shape(turned)
+    radius, form = THICK * arm.reach, arm_shape(turned)
     lines = [
         '<?xml version="1.0"?>',
         f"<!-- {_comment_text(arm)} -->",

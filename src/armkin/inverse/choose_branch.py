@@ -260,7 +260,7 @@ def _answers_of_call(request: Request, held: dict[str, float], s: Solutions, nea
     """The answers of one solver call, for the whole arm."""
     arm = request.arm
     q = unlock(arm, held, s.q) if held else s.q
-    outside = limits.outside(arm, q)  # nan is not outside anything
+    outside = limits.outside_limits(arm, q)  # nan is not outside anything
     within = s.within_limits & ~outside.any(axis=-1)
     mm, rad = s.residual()
     motions = units.joints_out(arm, np.abs(q - near)).sum(axis=-1)

@@ -37,7 +37,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets, targets_around
-from armkin.model.arm import Arm, actual
+from armkin.model.arm import Arm, actual_arm
 
 WORTH = 256  # poses of an elimination that are worth a thread, and of which its own chunks are
 
@@ -94,7 +94,7 @@ def ik(
         and (alone := way.solve(values, near)) is not None
     ):
         return alone
-    if (turned := actual(arm)) is not arm:
+    if (turned := actual_arm(arm)) is not arm:
         more: dict[str, Any] = {"examine": examine, "workers": workers, "position_first": position_first}
         s = ik(turned, targets, task, near=_actual_near(arm, near), rounding=rounding, **more)
         return _as_commanded(arm, s)
@@ -159,14 +159,14 @@ def columns(
     the next one is asked for. Raises RedundantArmError where the answers of a target are curves.
     """
     definition, geometry = solver(arm, task)
-    if geometry.pairs is None or actual(arm) is not arm:
+    if geometry.pairs is None or actual_arm(arm) is not arm:
         return None
     return chunks.columns(arm, definition, geometry, targets, kept)
 
 
 def isolated_branches(arm: Arm, targets: ArrayLike, task: str | None = None, **more: Any) -> Solutions:
     """`ik` for those who follow single branches: raises RedundantArmError where the answers of a target are curves."""
-    solver(actual(arm), task)
+    solver(actual_arm(arm), task)
     return ik(arm, targets, task, **more)
 
 

@@ -17,7 +17,7 @@ from armkin.formula import pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.trace import LazyCode
 from armkin.forward import Motion, move
-from armkin.view.skeleton import shape
+from armkin.view.skeleton import arm_shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +80,7 @@ def bodies(arm: Arm) -> Bodies:
 
 def _base_segments(arm: Arm) -> list[_Segment]:
     """The base's segments, with those of link 1 that lie on joint 1's own axis: they do not turn."""
-    form, least = shape(arm), 1e-9 * arm.reach
+    form, least = arm_shape(arm), 1e-9 * arm.reach
     still = list(_segments_between(form.bodies[0], least))
     if not arm.prismatic[0]:
         on_axis = [s for s in _segments_between(form.bodies[1], least) if _on_axis(s, least)]
@@ -90,7 +90,7 @@ def _base_segments(arm: Arm) -> list[_Segment]:
 
 def _link_segments(arm: Arm, i: int) -> list[_Segment]:
     """The segments that move with joint i; of a slide the first one, which grows, as well."""
-    corners, least = shape(arm).bodies[i + 1], 1e-9 * arm.reach
+    corners, least = arm_shape(arm).bodies[i + 1], 1e-9 * arm.reach
     segments = list(_segments_between(corners, least))
     if arm.prismatic[i]:
         return [(i + 1, corners[0], corners[0], True), *((i + 1, a, b, False) for a, b in segments)]

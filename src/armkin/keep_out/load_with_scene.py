@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING
 
-from armkin.model.build_arm import build
+from armkin.model.build_arm import arm_of_file
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -49,7 +49,7 @@ def load(
 
 def arm_in_scene(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
     """The arm of a robot file and a scene. Raises RobotFileError if a keep-out is hit in every posture."""
-    arm = build(file, scene, tool)
+    arm = arm_of_file(file, scene, tool)
     if arm.keep_out:
         from armkin.keep_out.body_pairs import check_keep_out
 

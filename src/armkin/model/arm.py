@@ -136,7 +136,7 @@ class Arm:
 
 
 @lru_cache(maxsize=256)
-def actual(arm: Arm) -> Arm:
+def actual_arm(arm: Arm) -> Arm:
     """The arm in actual joint values, ratio 1: limits, home and speeds are those of the actual motion.
 
     An arm whose ratios are all 1 is returned as it is.
@@ -146,15 +146,15 @@ def actual(arm: Arm) -> Arm:
         return arm
     return replace(
         arm,
-        lower=_frozen(arm.lower * r),
-        upper=_frozen(arm.upper * r),
-        home=_frozen(arm.home * r),
-        pose_joints=_frozen(arm.pose_joints * r),
-        max_speed=_frozen(arm.max_speed * r),
-        max_accel=_frozen(arm.max_accel * r),
-        max_jerk=_frozen(arm.max_jerk * r),
-        ratio=_frozen(np.ones(arm.n)),
-        motor_gain=_frozen(arm.motor_gain / r),
+        lower=_freeze(arm.lower * r),
+        upper=_freeze(arm.upper * r),
+        home=_freeze(arm.home * r),
+        pose_joints=_freeze(arm.pose_joints * r),
+        max_speed=_freeze(arm.max_speed * r),
+        max_accel=_freeze(arm.max_accel * r),
+        max_jerk=_freeze(arm.max_jerk * r),
+        ratio=_freeze(np.ones(arm.n)),
+        motor_gain=_freeze(arm.motor_gain / r),
     )
 
 
@@ -186,19 +186,19 @@ def from_links(
     rest: what is no array: motors, homing, hard_limits, gripper, board, path, sha256, description, source, file.
     """
     n = len(prismatic)
-    links = _frozen(link)
+    links = _freeze(link)
     span = np.broadcast_to([-math.inf, math.inf], (n, 2)) if limits is None else np.asarray(limits, dtype=float)
     gain = _as_array(motor_gain, np.zeros((0, n)))
     sliding = np.abs(np.where(np.isfinite(span), span, 0.0)).max(axis=1)[np.asarray(prismatic, dtype=bool)]
     return Arm(
         name=name,
         joint_names=joint_names or tuple(f"q{i + 1}" for i in range(n)),
-        prismatic=_frozen(prismatic, bool),
+        prismatic=_freeze(prismatic, bool),
         link=links,
         frame=_as_array(frame, np.broadcast_to(np.eye(4), (n, 4, 4))),
         base=_as_array(base, np.eye(4)),
-        lower=_frozen(span[:, 0]),
-        upper=_frozen(span[:, 1]),
+        lower=_freeze(span[:, 0]),
+        upper=_freeze(span[:, 1]),
         home=_as_array(home, np.zeros(n)),
         max_speed=_as_array(max_speed, np.full(n, math.nan)),
         max_accel=_as_array(max_accel, np.full(n, math.nan)),
@@ -212,7 +212,7 @@ def from_links(
         motor_bias=_as_array(motor_bias, np.zeros(len(gain))),
         reach=float(np.linalg.norm(links[1:, :3, 3], axis=1).sum() + sliding.sum()) or 1.0,
         pose_names=tuple(poses or ()),
-        pose_joints=_frozen(np.array(list((poses or {}).values()), dtype=float).reshape(-1, n)),
+        pose_joints=_freeze(np.array(list((poses or {}).values()), dtype=float).reshape(-1, n)),
         homing=rest.pop("homing", (None,) * n),
         hard_limits=rest.pop("hard_limits", (False,) * n),
         **rest,
@@ -220,10 +220,10 @@ def from_links(
 
 
 def _as_array(values: ArrayLike | None, default: Array) -> Array:
-    return _frozen(default if values is None else values)
+    return _freeze(default if values is None else values)
 
 
-def _frozen(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
+def _freeze(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
     array: NDArray[Any] = np.array(values, dtype=dtype)
     array.flags.writeable = False
     return array

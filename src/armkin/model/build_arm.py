@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from armkin.robot_file.scene_file import Scene
 
 
-def load(path: str | PathLike[str]) -> Arm:
+def load_arm(path: str | PathLike[str]) -> Arm:
     """Read and validate a robot file, given its path or the name of a shipped robot; a path to a file wins.
 
     Raises FileError if it cannot be read and RobotFileError if it is not valid.
     """
     from armkin import robot_file
 
-    return build(robot_file.read_robot_file(path))
+    return arm_of_file(robot_file.read_robot_file(path))
 
 
-def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
+def arm_of_file(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
     """The arm of a validated robot file, with a scene's keep-outs behind the file's own.
 
     tool: x, y, z, roll, pitch, yaw [mm, deg] after the last joint, in place of the file's.
@@ -38,7 +38,7 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
     base = transform(file.base.xyz, file.base.rpy)
     link, frame = _chain(file, base)
     unit = np.array([1.0 if j.type == "prismatic" else math.pi / 180 for j in file.joints])
-    gain, bias = _motors(file, unit)
+    gain, bias = _motor_gain_and_bias(file, unit)
     return from_links(
         link,
         [j.type == "prismatic" for j in file.joints],
@@ -70,9 +70,9 @@ def _joint_fields(joints: Sequence[Joint], unit: Array) -> dict[str, Any]:
         "joint_names": tuple(j.name for j in joints),
         "limits": [(-math.inf, math.inf) if j.limits is None else j.limits for j in joints] * unit[:, None],
         "home": np.array([j.home for j in joints]) * unit,
-        "max_speed": _numbers(j.max_speed for j in joints) * unit,
-        "max_accel": _numbers(j.max_accel for j in joints) * unit,
-        "max_jerk": _numbers(j.max_jerk for j in joints) * unit,
+        "max_speed": _numbers_or_nan(j.max_speed for j in joints) * unit,
+        "max_accel": _numbers_or_nan(j.max_accel for j in joints) * unit,
+        "max_jerk": _numbers_or_nan(j.max_jerk for j in joints) * unit,
         "dh_sign": [float(j.sign) for j in joints],
         "dh_theta": [0.0 if j.dh is None else math.radians(j.dh.theta) for j in joints],
         "ratio": [j.ratio for j in joints],
@@ -89,18 +89,18 @@ def _chain(file: RobotFile, base: Array) -> tuple[list[Array], list[Array]]:
     before, after, frame = [], [], []
     for joint in file.joints:
         if file.convention == "screws":
-            pre, post, at = _screw(joint)
+            pre, post, frame_after = _screw_factors(joint)
         else:
-            pre, post, at = _dh(joint, modified=file.convention == "modified")
+            pre, post, frame_after = _dh_factors(joint, modified=file.convention == "modified")
         flip = FLIP if joint.sign < 0 else np.eye(4)
         before.append(pre @ flip)
         after.append(flip @ post)
-        frame.append(flip @ at)
+        frame.append(flip @ frame_after)
     between = [post @ pre for post, pre in zip(after[:-1], before[1:], strict=True)]
     return [base @ before[0], *between, after[-1] @ end], frame
 
 
-def _numbers(values: Iterable[float | None]) -> Array:
+def _numbers_or_nan(values: Iterable[float | None]) -> Array:
     """Numbers of which the file may leave some out, nan there."""
     return np.array([math.nan if value is None else value for value in values])
 
@@ -109,7 +109,7 @@ def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
     """The arm's fields about keep-outs; none where there are none, so that such an arm is built as ever."""
     if not file.keep_out and scene is None:
         return {}
-    radii = _numbers(body.radius if body else None for body in (file.base.body, *(j.body for j in file.joints)))
+    radii = _numbers_or_nan(body.radius if body else None for body in (file.base.body, *(j.body for j in file.joints)))
     fields: dict[str, Any] = {"body_radius": radii, "keep_out": file.keep_out, "clearance": file.clearance}
     if scene is not None:
         fields["keep_out"] = (*file.keep_out, *scene.keep_out)
@@ -118,7 +118,7 @@ def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
     return fields
 
 
-def _dh(joint: Joint, *, modified: bool) -> tuple[Array, Array, Array]:
+def _dh_factors(joint: Joint, *, modified: bool) -> tuple[Array, Array, Array]:
     """Constant factors before and after a joint's motion, and its frame after the motion.
 
     Standard: A = Rz(theta + q) Tz(d) Tx(a) Rx(alpha). Modified (Craig): the row's a and
@@ -135,7 +135,7 @@ def _dh(joint: Joint, *, modified: bool) -> tuple[Array, Array, Array]:
     return np.eye(4), z_part @ x_part, z_part @ x_part
 
 
-def _screw(joint: Joint) -> tuple[Array, Array, Array]:
+def _screw_factors(joint: Joint) -> tuple[Array, Array, Array]:
     """exp([S] q) = B Z(q) B^-1 with B's z axis on the screw's axis (Lynch & Park, Modern Robotics, 3.3.2)."""
     assert joint.screw is not None
     w, v = (np.array(part, dtype=float) for part in joint.twist())
@@ -148,10 +148,10 @@ def _screw(joint: Joint) -> tuple[Array, Array, Array]:
     B[:3, 0] = _perpendicular(direction)
     B[:3, 1] = np.cross(direction, B[:3, 0])
     B[:3, 3] = point
-    at = np.eye(4)
-    at[:3, 3] = point
+    frame_after = np.eye(4)
+    frame_after[:3, 3] = point
     back = inverse(B)
-    return B, back, back @ at
+    return B, back, back @ frame_after
 
 
 def _perpendicular(z: Array) -> Array:
@@ -162,7 +162,7 @@ def _perpendicular(z: Array) -> Array:
     return np.asarray(x / np.linalg.norm(x))
 
 
-def _motors(file: RobotFile, unit: Array) -> tuple[Array, Array]:
+def _motor_gain_and_bias(file: RobotFile, unit: Array) -> tuple[Array, Array]:
     """Pulses per rad | mm of every motor and joint, and the pulses at home (servos only).
 
     A stepper's pulses per turn of the joint are full_steps x microsteps x gear x pulley,

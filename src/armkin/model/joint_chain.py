@@ -23,7 +23,7 @@ class Chain(NamedTuple):
         return len(self.prismatic)
 
 
-def reverse(chain: Chain) -> Chain:
+def reverse_chain(chain: Chain) -> Chain:
     """The chain walked from the tool to the base: its pose is the inverse, its joints are in reverse order."""
     links = FLIP @ inverse(chain.link[::-1]) @ FLIP
     links[0] = FLIP @ links[0]
@@ -31,7 +31,7 @@ def reverse(chain: Chain) -> Chain:
     return Chain(links, chain.prismatic[::-1])
 
 
-def axes(chain: Chain) -> tuple[Array, Array]:
+def joint_axes(chain: Chain) -> tuple[Array, Array]:
     """Points (n, 3) and directions (n, 3) of the joint axes when all joints are zero."""
     P = np.eye(4)
     points, directions = [], []

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import NoSolutionError, UsageError
-from armkin.model.units import DEGREE, finite, limits_out
+from armkin.model.units import DEGREE, finite_or_none, limits_out
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 SLACK = 1e-9  # [rad | mm] a joint this far outside still counts as on its limit
 
 
-def outside(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
+def outside_limits(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
     """Which joints are outside their limits.
 
     q: (..., n) [rad | mm]. Returns (..., n); a joint without limits is never outside.
 
     >>> import armkin, numpy as np
-    >>> outside(armkin.load("robots/three_dof.yaml"), np.deg2rad([0, 121, 0])).tolist()
+    >>> outside_limits(armkin.load("robots/three_dof.yaml"), np.deg2rad([0, 121, 0])).tolist()
     [False, True, False]
     """
     values = np.asarray(q, dtype=float)
     return (values < arm.lower - SLACK) | (values > arm.upper + SLACK)
 
 
-def fields(arm: Arm, joint: int, value: float) -> dict[str, Any]:
+def limit_fields(arm: Arm, joint: int, value: float) -> dict[str, Any]:
     """Fields of the error about a joint outside its limits: joint, value, lower, upper [deg | mm]; None: unlimited."""
     unit = 1.0 if arm.prismatic[joint] else DEGREE
-    lower, upper = map(finite, limits_out(arm)[joint])
+    lower, upper = map(finite_or_none, limits_out(arm)[joint])
     return {"joint": arm.joint_names[joint], "value": float(value) / unit, "lower": lower, "upper": upper}
 
 
@@ -61,9 +61,9 @@ def check_limits(arm: Arm, targets: NDArray[np.float64]) -> None:
         raise UsageError(f"{arm.name} has {arm.n} joints: expected {arm.n} values, got {targets.shape[-1]}")
     if not np.all(np.isfinite(targets)):
         raise UsageError("joint values must be finite to be sent")
-    for row, joint in np.argwhere(outside(arm, targets)):
-        which = f"waypoint {row + 1}: " if len(targets) > 1 else ""
+    for row, joint in np.argwhere(outside_limits(arm, targets)):
+        waypoint = f"waypoint {row + 1}: " if len(targets) > 1 else ""
         value = targets[row, joint]
         raise NoSolutionError(
-            f"{which}{outside_text(arm, joint, value)}: nothing was moved", **fields(arm, joint, value)
+            f"{waypoint}{outside_text(arm, joint, value)}: nothing was moved", **limit_fields(arm, joint, value)
         )

@@ -45,16 +45,16 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
             raise UsageError(f"{name} cannot be held at {value}: give one finite number")
     if len(held) >= arm.n:
         raise UsageError(f"{arm.name}: with {', '.join(held)} held no joint is left to solve for")
-    links, frame, kept = [arm.link[0]], [], []
+    links, frame, free = [arm.link[0]], [], []
     for i, name in enumerate(arm.joint_names):
         if name in held:
             links[-1] = links[-1] @ joint_motion(bool(arm.prismatic[i]), held[name] * arm.ratio[i]) @ arm.link[i + 1]
         else:
-            kept.append(i)
+            free.append(i)
             frame.append(arm.frame[i])
             links.append(arm.link[i + 1])
-    rest = {
-        field: getattr(arm, field)[kept]
+    per_joint = {
+        field: getattr(arm, field)[free]
         for field in (
             "prismatic",
             "lower",
@@ -70,16 +70,16 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     }
     return replace(
         arm,
-        joint_names=tuple(arm.joint_names[i] for i in kept),
+        joint_names=tuple(arm.joint_names[i] for i in free),
         link=np.array(links),
         frame=np.array(frame),
-        motor_gain=arm.motor_gain[:, kept],
-        pose_joints=arm.pose_joints[:, kept],
-        homing=tuple(arm.homing[i] for i in kept),
-        hard_limits=tuple(arm.hard_limits[i] for i in kept),
+        motor_gain=arm.motor_gain[:, free],
+        pose_joints=arm.pose_joints[:, free],
+        homing=tuple(arm.homing[i] for i in free),
+        hard_limits=tuple(arm.hard_limits[i] for i in free),
         held=(*arm.held, *held),
         whole=(arm, dict(held)) if arm.keep_out else None,
-        **rest,
+        **per_joint,
     )
 
 
@@ -109,11 +109,11 @@ def unlock(arm: Arm, held: Mapping[str, float], q: ArrayLike) -> Array:
     if values.ndim == 0 or values.shape[-1] != arm.n - len(held):
         raise UsageError(f"expected the {arm.n - len(held)} joint values that are not held, got shape {values.shape}")
     missing = np.isnan(values).any(axis=-1)
-    out = np.empty((*values.shape[:-1], arm.n))
-    rest = iter(range(values.shape[-1]))
+    joints = np.empty((*values.shape[:-1], arm.n))
+    remaining = iter(range(values.shape[-1]))
     for i, name in enumerate(arm.joint_names):
-        out[..., i] = np.where(missing, np.nan, held[name]) if name in held else values[..., next(rest)]
-    return out
+        joints[..., i] = np.where(missing, np.nan, held[name]) if name in held else values[..., next(remaining)]
+    return joints
 
 
 def joint_index(arm: Arm, name: str) -> int:

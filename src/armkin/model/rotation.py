@@ -87,21 +87,21 @@ def joint_motion(prismatic: bool, q: ArrayLike) -> Array:
     return Z
 
 
-def shrunk(motion: Array, length: float) -> Array:
+def shrink_translations(motion: Array, length: float) -> Array:
     """Motions (..., 4, 4) with their translations divided by a length."""
-    out = np.array(motion, float)
-    out[..., :3, 3] /= length
-    return out
+    motions = np.array(motion, float)
+    motions[..., :3, 3] /= length
+    return motions
 
 
 def inverse(T: Array) -> Array:
     """Inverse of rigid transforms (..., 4, 4)."""
-    out = np.zeros(T.shape)
+    inverses = np.zeros(T.shape)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
-    out[..., :3, :3] = Rt
-    out[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]
-    out[..., 3, 3] = 1.0
-    return out
+    inverses[..., :3, :3] = Rt
+    inverses[..., :3, 3] = -(Rt @ T[..., :3, 3:])[..., 0]
+    inverses[..., 3, 3] = 1.0
+    return inverses
 
 
 def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
@@ -121,18 +121,18 @@ def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
 
 def transforms(xyz: Array, rpy: Array) -> Array:
     """As `transform` of each row, to the same bits: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
-    out = np.zeros((*xyz.shape[:-1], 4, 4))
-    every, place, angles = out.reshape(-1, 4, 4), xyz.reshape(-1, 3), rpy.reshape(-1, 3)
+    matrices = np.zeros((*xyz.shape[:-1], 4, 4))
+    every, place, angles = matrices.reshape(-1, 4, 4), xyz.reshape(-1, 3), rpy.reshape(-1, 3)
     for start in range(0, len(every), BLOCK):
-        some = slice(start, start + BLOCK)
-        T = every[some]
-        (cr, cp, cy), (sr, sp, sy) = _cos_sin_deg(np.ascontiguousarray(angles[some].T))
+        block = slice(start, start + BLOCK)
+        T = every[block]
+        (cr, cp, cy), (sr, sp, sy) = _cos_sin_deg(np.ascontiguousarray(angles[block].T))
         cysp, sysp = cy * sp, sy * sp
         T[:, 0, 0], T[:, 0, 1], T[:, 0, 2] = cy * cp, cysp * sr - sy * cr, cysp * cr + sy * sr
         T[:, 1, 0], T[:, 1, 1], T[:, 1, 2] = sy * cp, sysp * sr + cy * cr, sysp * cr - cy * sr
         T[:, 2, 0], T[:, 2, 1], T[:, 2, 2] = -sp, cp * sr, cp * cr
-        T[:, :3, 3], T[:, 3, 3] = place[some], 1.0
-    return out
+        T[:, :3, 3], T[:, 3, 3] = place[block], 1.0
+    return matrices
 
 
 def _cos_sin_deg(angles: Array) -> tuple[Array, Array]:
@@ -152,7 +152,7 @@ def _cos_sin_deg(angles: Array) -> tuple[Array, Array]:
 
 def cos_sin_deg(angle: float) -> tuple[float, float]:
     """Cosine and sine of an angle in degrees, exact at multiples of 90."""
-    quarter, rest = divmod(angle, 90.0)
-    if rest == 0.0:
+    quarter, remainder = divmod(angle, 90.0)
+    if remainder == 0.0:
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter) % 4]
     return math.cos(math.radians(angle)), math.sin(math.radians(angle))

@@ -20,7 +20,7 @@ DEGREE = math.pi / 180
 JointUnits = Annotated[list[str], "unit of each joint value: deg or mm"]
 
 
-def names(arm: Arm) -> list[str]:
+def unit_names(arm: Arm) -> list[str]:
     """Unit of each joint: "deg" or "mm"."""
     return ["mm" if sliding else "deg" for sliding in arm.prismatic]
 
@@ -29,14 +29,14 @@ def joints_in(arm: Arm, values: ArrayLike) -> Array:
     """Joint values (..., n) from [deg | mm] to [rad | mm]."""
     import numpy as np
 
-    return np.asarray(values, dtype=float) * scale(arm)
+    return np.asarray(values, dtype=float) * joint_scale(arm)
 
 
 def joints_out(arm: Arm, q: ArrayLike) -> Array:
     """Joint values (..., n) from [rad | mm] to [deg | mm]."""
     import numpy as np
 
-    return np.asarray(q, dtype=float) / scale(arm) + 0.0  # + 0.0: no -0.0
+    return np.asarray(q, dtype=float) / joint_scale(arm) + 0.0  # + 0.0: no -0.0
 
 
 def limits_out(arm: Arm) -> list[tuple[float, float]]:
@@ -66,10 +66,12 @@ def _poses_out(arm: Arm) -> tuple[tuple[str, tuple[float, ...]], ...]:
 
 def _as_written(arm: Arm, q: Array) -> tuple[float, ...]:
     """Joint values [deg | mm] with the fewest digits that mean q: those of a file, which degrees of pi/180 lose."""
-    return tuple(_shortest(value, unit) for value, unit in zip(q.tolist(), scale(arm).tolist(), strict=True))
+    return tuple(
+        _shortest_number(value, unit) for value, unit in zip(q.tolist(), joint_scale(arm).tolist(), strict=True)
+    )
 
 
-def _shortest(value: float, unit: float) -> float:
+def _shortest_number(value: float, unit: float) -> float:
     exact = value / unit + 0.0  # + 0.0: no -0.0
     shorter = (float(f"{exact:.{digits}g}") for digits in range(6, 17))
     return next((text for text in shorter if text * unit == value), exact)
@@ -82,12 +84,12 @@ def angles_out(angles: ArrayLike) -> Array:
     return np.asarray(angles, dtype=float) / DEGREE + 0.0
 
 
-def finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
     """A number for JSON, which has neither infinity nor nan: null."""
     return float(value) if math.isfinite(value) else None
 
 
-def scale(arm: Arm) -> Array:
+def joint_scale(arm: Arm) -> Array:
     """What one unit of each joint, a degree or a millimetre, is in [rad | mm]: (n,)."""
     import numpy as np
 

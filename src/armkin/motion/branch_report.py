@@ -141,7 +141,7 @@ def plan_fields(plan: PathPlan) -> dict[str, Any]:
         "tolerance_mm": plan.tolerance,
         "deviation_mm": None,
         "blends_reduced": plan.reduced.count,
-        "joint_units": units.names(arm),
+        "joint_units": units.unit_names(arm),
         "start_joints": None,
         "joints": None,
         "runs": [_run_fields(arm, run) for run in plan.runs],

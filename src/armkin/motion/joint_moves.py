@@ -15,7 +15,7 @@ from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.motion.timing.profile import at_rest, seven_phases, trapezoid
 from armkin.motion.timing.trajectory import Straight, Trajectory
-from armkin.motors import motor_accel, pulses, undriven
+from armkin.motors import motor_accel, pulses, undriven_joints
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -71,7 +71,7 @@ def straight_move(
     top = float((arm.max_speed[moving] / change[moving]).min()) * speed
     accel = float((arm.max_accel[moving] / change[moving]).min())
     turned = np.abs(arm.motor_gain @ (end - start))
-    if arm.motors and not undriven(arm):
+    if arm.motors and not undriven_joints(arm):
         turned = np.maximum(turned, np.abs(np.diff(pulses(arm, [start, end]), axis=0)[0]))
     if turned.any():
         accel = min(accel, float((motor_accel(arm)[turned > 0] / turned[turned > 0]).min()))
@@ -89,7 +89,7 @@ def approach_move(
     An arm whose motors have the same counts in both stands there. speed, share, jerk: as in `straight_move`.
     """
     near = np.abs(start - standing).max() <= 1e-12
-    if near or (arm.motors and not undriven(arm) and np.array_equal(pulses(arm, start), pulses(arm, standing))):
+    if near or (arm.motors and not undriven_joints(arm) and np.array_equal(pulses(arm, start), pulses(arm, standing))):
         return None
     return Trajectory(arm, standing, (straight_move(arm, standing, start, speed, share, jerk),))
 

@@ -17,7 +17,7 @@ from armkin.motion.move_kinds import MOVES
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.trajectory_proof import prove_plan
 from armkin.motion.plan_moves import PathOptions, Walk
-from armkin.motors import legal_with_same_pulses, undriven
+from armkin.motors import legal_with_same_pulses, undriven_joints
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -60,7 +60,7 @@ def plan_path(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
     if pace.turn:
         wrist_turn.check_wrist(arm)
     standing = request.start_joints(arm)
-    if arm.motors and not undriven(arm):
+    if arm.motors and not undriven_joints(arm):
         standing = legal_with_same_pulses(arm, standing)
     near = None if request.near is None else np.asarray(request.near, dtype=float)
     wish = corners_wished(file, request.corners, request.blend)

@@ -17,7 +17,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.keep_out.clearance import clearance
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.motion.path_held import path_held
 from armkin.motion.path_outline import route_targets
 from armkin.motion.tool_path import path_numbers
@@ -135,7 +135,7 @@ def _values_to_try(arm: Arm, file: PathFile, task: str | None, close: float, sta
     Those at which it hits nothing come first, and of these those that keep `AWAY`; then the nearest to `close`. Where
     there is none, the one at which most have. A way that begins where the joints stand keeps them there.
     """
-    turned = actual(arm)
+    turned = actual_arm(arm)
     spare = redundancy(turned, task or file.task)
     assert spare is not None
     j = spare.joint

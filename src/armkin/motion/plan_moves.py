@@ -19,7 +19,7 @@ from armkin.inverse.branches.names import find_branches
 from armkin.inverse.solve import isolated_branches as ik
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.limits import check_limits, outside, outside_text
+from armkin.model.limits import check_limits, outside_limits, outside_text
 from armkin.motion import branch_report
 from armkin.motion.branches.branch_path import Pace, carry_route, run_stretches, starts_at
 from armkin.motion.branches.route_grid import Missed, largest_miss, route_deviation
@@ -291,7 +291,7 @@ class Walk:
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
-        bad = np.flatnonzero(outside(self.arm, goal))
+        bad = np.flatnonzero(outside_limits(self.arm, goal))
         if len(bad):
             raise NoSolutionError(f"{outside_text(self.arm, int(bad[0]), float(goal[bad[0]]))}: nothing was moved")
         speed = self.pace.speed * (1.0 if move is None or move.speed is None else move.speed / 100)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from armkin.errors import MissingExtraError, UsageError
-from armkin.files import ending, write_whole
+from armkin.files import file_ending, write_whole
 from armkin.formula.arrays import Array
 
 INK, SOFT, FAINT = "#1b1f24", "#6a737d", "#d5dae0"
@@ -42,12 +42,12 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-def check(path: str) -> str:
+def check_picture(path: str) -> str:
     """The kind of picture that a file's name asks for."""
-    return ending(path, "a picture is", _ENDS)[1:]
+    return file_ending(path, "a picture is", _ENDS)[1:]
 
 
-def require() -> None:
+def require_matplotlib() -> None:
     """Say at once what to install if there is no matplotlib."""
     try:
         import_module("matplotlib.figure")
@@ -62,14 +62,14 @@ def require() -> None:
 @contextmanager
 def picture(path: str | None, width: float, height: float) -> Iterator[Any]:
     """A figure [inches] to draw on, saved at the end: the file appears whole or not at all; None: in a window."""
-    kind = None if path is None else check(path)
-    require()
+    kind = None if path is None else check_picture(path)
+    require_matplotlib()
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
     with mpl.rc_context(_STYLE):
         if path is None:
-            plt = windows()
+            plt = window_pyplot()
             yield plt.figure(figsize=(width, height), facecolor="white")
             plt.show()
             return
@@ -81,12 +81,12 @@ def picture(path: str | None, width: float, height: float) -> Iterator[Any]:
             figure.savefig(file, format=kind, metadata=blank)
 
 
-def windows() -> Any:
+def window_pyplot() -> Any:
     """matplotlib's pyplot, if it can open a window here.
 
     Raises UsageError where there is no display, MissingExtraError where there is no toolkit for windows.
     """
-    require()
+    require_matplotlib()
     posix = sys.platform not in ("win32", "darwin")
     if posix and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise UsageError("there is no display to open a window on; name a file for the picture, a .png or .svg")
@@ -100,7 +100,7 @@ def windows() -> Any:
     return plt
 
 
-def space(figure: Any, place: Sequence[float], view: tuple[float, float]) -> Any:
+def space_axes(figure: Any, place: Sequence[float], view: tuple[float, float]) -> Any:
     """Axes in space at (left, bottom, width, height) of the figure; view: elevation, azimuth [deg]."""
     axes = figure.add_axes(place, projection="3d", computed_zorder=False)
     axes.view_init(elev=view[0], azim=view[1])
@@ -115,7 +115,7 @@ def space(figure: Any, place: Sequence[float], view: tuple[float, float]) -> Any
         axes.tick_params(axis=name, pad=4 if name == "z" else 1, colors=SOFT)
     axes.zaxis.set_rotate_label(False)
     axes.zaxis.label.set_rotation(90)
-    sizes = _on_paper(*view)
+    sizes = _lengths_on_paper(*view)
     for name, size in zip("xyz", sizes, strict=True):
         axis = getattr(axes, f"{name}axis")
         if size >= 0.1 > sizes.min():  # seen square: nothing slants away from under the ticks
@@ -126,12 +126,12 @@ def space(figure: Any, place: Sequence[float], view: tuple[float, float]) -> Any
     return axes
 
 
-def _on_paper(elevation: float, azimuth: float) -> Array:
+def _lengths_on_paper(elevation: float, azimuth: float) -> Array:
     """How long x, y and z of length 1 look from an eye far away at these angles [deg]."""
     up, around = np.radians(elevation), np.radians(azimuth)
     toward = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
-    seen: Array = np.sqrt(np.maximum(1.0 - toward**2, 0.0))
-    return seen
+    lengths: Array = np.sqrt(np.maximum(1.0 - toward**2, 0.0))
+    return lengths
 
 
 def true_proportions(axes: Any, points: Array, floor: float, ticks: float = 7.5) -> None:
@@ -158,7 +158,7 @@ def true_proportions(axes: Any, points: Array, floor: float, ticks: float = 7.5)
         edge = 0.0 if name == "z" else min(0.1 * (b - a), 0.5 * step)
         marks = step * np.arange(np.ceil((a + edge) / step), np.floor((b - edge) / step) + 1)
         getattr(axes, f"{name}axis").set_major_locator(FixedLocator(marks.tolist()))
-    _fill(axes, high - low)
+    _fill_place(axes, high - low)
 
 
 def renderer(figure: Any) -> Any:
@@ -169,7 +169,7 @@ def renderer(figure: Any) -> Any:
     return agg.FigureCanvasAgg(figure).get_renderer()
 
 
-def _fill(axes: Any, size: Array) -> None:
+def _fill_place(axes: Any, size: Array) -> None:
     """Make the box (size: mm along each axis) as large as its place allows, ticks and labels included."""
     x0, y0, width, height = axes.get_position().bounds
     room, middle = np.array([width, height]), np.array([x0 + 0.5 * width, y0 + 0.5 * height])
@@ -195,8 +195,8 @@ def _visible_corners(axes: Any) -> Array:
     across, up, _ = import_module("mpl_toolkits.mplot3d.proj3d").proj_transform(*corners.T, axes.M)
     points = [axes.transData.transform(np.column_stack([across, up]))]
     points += [box.get_points() for box in boxes if box is not None and np.isfinite(box.get_points()).all()]
-    seen = np.concatenate(points)
-    return np.array([seen.min(axis=0), seen.max(axis=0)])
+    pixels = np.concatenate(points)
+    return np.array([pixels.min(axis=0), pixels.max(axis=0)])
 
 
 def tick_step(size: float, most: float = 7.5) -> float:
@@ -209,7 +209,7 @@ def tick_step(size: float, most: float = 7.5) -> float:
     return float(power * next(m for m in (1, 2, 5, 10) if m * power >= size / most))
 
 
-def flat(figure: Any, place: Sequence[float], labels: tuple[str, str], shrink: bool = False) -> Any:
+def flat_axes(figure: Any, place: Sequence[float], labels: tuple[str, str], shrink: bool = False) -> Any:
     """Axes in a plane, a millimetre as long on both; shrink: the frame to the data, not the reverse."""
     axes = figure.add_axes(place)
     axes.set_aspect("equal", adjustable="box" if shrink else "datalim")

@@ -9,7 +9,7 @@ import numpy as np
 from armkin.forward import position
 from armkin.model import units
 from armkin.motion.branch_report import deviation_text
-from armkin.plot.canvas import flat, picture, space, true_proportions
+from armkin.plot.canvas import flat_axes, picture, space_axes, true_proportions
 from armkin.view.skeleton import skeleton
 
 if TYPE_CHECKING:
@@ -35,51 +35,51 @@ def plot_path(plan: PathPlan, out: str) -> None:
     q = plan.q(t)
     with picture(out, 11.5, 7.2) as figure:
         figure.text(0.03, 0.975, _title(plan), fontsize=11, va="top")
-        figure.text(0.03, 0.94, _names(plan), fontsize=9, va="top")
-        figure.text(0.03, 0.915, "\n".join([deviation_text(plan), *_passes(plan)]), fontsize=9, va="top")
-        _in_space(plan, figure, q)
+        figure.text(0.03, 0.94, _branch_names(plan), fontsize=9, va="top")
+        figure.text(0.03, 0.915, "\n".join([deviation_text(plan), *_wrist_pass_lines(plan)]), fontsize=9, va="top")
+        _draw_in_space(plan, figure, q)
         rows = [figure.add_axes((0.60, bottom, 0.37, 0.185)) for bottom in (0.735, 0.51, 0.285, 0.06)]
-        _joints(plan, rows[0], t, q)
-        fine = _fine(plan, t)
-        _shares(plan, rows[1], t, _most(t, fine, np.abs(plan.qd(fine)) / plan.arm.max_speed), "speed / max")
-        _shares(plan, rows[2], t, _most(t, fine, np.abs(plan.qdd(fine)) / plan.arm.max_accel), "accel. / max")
-        _tool(rows[3], t, fine, position(plan.arm, plan.q(fine)))
+        _draw_joints(plan, rows[0], t, q)
+        fine = _fine_times(plan, t)
+        _draw_shares(plan, rows[1], t, _peaks(t, fine, np.abs(plan.qd(fine)) / plan.arm.max_speed), "speed / max")
+        _draw_shares(plan, rows[2], t, _peaks(t, fine, np.abs(plan.qdd(fine)) / plan.arm.max_accel), "accel. / max")
+        _draw_tool_speed(rows[3], t, fine, position(plan.arm, plan.q(fine)))
         for axes in rows[:-1]:
             axes.set_xticklabels([])
         rows[-1].set_xlabel("time / s", labelpad=2, fontsize=8)
-        straight = [(_time_of(plan, one.begin), _time_of(plan, one.end)) for one in plan.passed]
+        straight = [(_time_of(plan, singularity.begin), _time_of(plan, singularity.end)) for singularity in plan.passed]
         for axes in rows:
             axes.set_xlim(0.0, max(plan.duration, 1e-9))
             axes.grid(True, linewidth=0.4)
             axes.tick_params(labelsize=8)
-            for when in _breaks(plan):
+            for when in _break_times(plan):
                 axes.axvline(when, color=_SINGULAR, linewidth=0.8, linestyle="--")
             for begin, end in straight:
                 axes.axvspan(begin, end, color=_STRAIGHT, linewidth=0)
 
 
-def _passes(plan: PathPlan) -> list[str]:
+def _wrist_pass_lines(plan: PathPlan) -> list[str]:
     """How the wrist passes singularities: the first in words, the others in number."""
     if not plan.passed:
         return []
     first, more = plan.passed[0], len(plan.passed) - 1
     turned = f"tool turned by {first.turned / units.DEGREE:.2g} deg"
     how = turned if first.turned else f"tip {first.aside:.2g} mm aside"
-    where = f"straight through a wrist singularity, {first.begin:.0f} to {first.end:.0f} mm"
-    return [f"{where}: {how}{f'; {more} more' if more else ''}"]
+    place = f"straight through a wrist singularity, {first.begin:.0f} to {first.end:.0f} mm"
+    return [f"{place}: {how}{f'; {more} more' if more else ''}"]
 
 
-def _fine(plan: PathPlan, t: Array) -> Array:
+def _fine_times(plan: PathPlan, t: Array) -> Array:
     """Times, more of them where the picture's are far apart beside the motion's own changes."""
     parts = int(np.clip(plan.duration / 0.02 / len(t), 1, _MOST // len(t)))
     return np.linspace(0.0, plan.duration, (len(t) - 1) * parts + 1)
 
 
-def _most(t: Array, fine: Array, values: Array) -> Array:
+def _peaks(t: Array, fine: Array, values: Array) -> Array:
     """The greatest of what falls about each of the times t (T,): (F, n) -> (T, n)."""
-    out = np.zeros((len(t), values.shape[1]))
-    np.maximum.at(out, np.rint(fine / max(t[-1], 1e-300) * (len(t) - 1)).astype(int), values)
-    return out
+    greatest = np.zeros((len(t), values.shape[1]))
+    np.maximum.at(greatest, np.rint(fine / max(t[-1], 1e-300) * (len(t) - 1)).astype(int), values)
+    return greatest
 
 
 def _title(plan: PathPlan) -> str:
@@ -87,24 +87,24 @@ def _title(plan: PathPlan) -> str:
     return f"{plan.arm.name}: {plan.length:.1f} mm of path in {plan.duration:.2f} s{before}"
 
 
-def _names(plan: PathPlan) -> str:
+def _branch_names(plan: PathPlan) -> str:
     """The branches, as many as there is room for beside the joints."""
     names = list(dict.fromkeys(name for run in plan.runs for _, name in run.names if name))
     text = f"on {' | '.join(names)}" if names else ""
     return text if len(text) <= _WIDE else f"{text[: _WIDE - 4].rstrip(' ,|')} ..."
 
 
-def _breaks(plan: PathPlan) -> list[float]:
+def _break_times(plan: PathPlan) -> list[float]:
     """When the branch is changed."""
     begins = plan.motion.begins
-    found = []
-    for one in plan.reconfigurations:
-        later = [begins[k] for k in sorted(plan.on_path) if plan.s_range(k)[0] >= one.s - 1e-6]
-        found += later[:1]
-    return found
+    times = []
+    for reconfiguration in plan.reconfigurations:
+        later = [begins[k] for k in sorted(plan.on_path) if plan.s_range(k)[0] >= reconfiguration.s - 1e-6]
+        times += later[:1]
+    return times
 
 
-def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
+def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     """The tip's way, the arm at its start and end, where it is nearest to a singularity, and on other branches."""
     arm = plan.arm
     poses: list[tuple[str, Array, str, float, Any]] = [
@@ -112,32 +112,34 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
         ("end", q[-1], "#2ca02c", 2.0, "-"),
     ]
     if plan.nearest_singularity is not None:  # dashed, on top: it may be the end
-        s, value, where = plan.nearest_singularity
+        s, value, posture = plan.nearest_singularity
         label = f"nearest to a singularity: {s:.0f} mm, condition {value:.3g}"
-        poses.append((label, where, _SINGULAR, 1.6, (0, (3, 2))))
-    others = _other_starts(plan)
-    many = len(others) != 1
-    label = f"{len(others)} other branch{'es' * many} that {'carry' if many else 'carries'} all, at the path's start"
-    poses = [*(("_" * (k > 0) + label, pose, "#b0b0b0", 1.6, "-") for k, pose in enumerate(others)), *poses]
+        poses.append((label, posture, _SINGULAR, 1.6, (0, (3, 2))))
+    starts = _other_starts(plan)
+    plural = len(starts) != 1
+    label = (
+        f"{len(starts)} other branch{'es' * plural} that {'carry' if plural else 'carries'} all, at the path's start"
+    )
+    poses = [*(("_" * (k > 0) + label, pose, "#b0b0b0", 1.6, "-") for k, pose in enumerate(starts)), *poses]
     bones = [(name, skeleton(arm, pose), *look) for name, pose, *look in poses]
     points = np.concatenate([position(arm, q), arm.base[None, :3, 3], *(bone.path for _, bone, *_ in bones)])
     reach = np.abs(points[:, :2] - arm.base[:2, 3]).max(axis=0)
     size = float((points.max(axis=0) - points.min(axis=0)).max())
-    way = _way(plan)
+    way = _tool_way(plan)
     small = float((np.nanmax(way, axis=0) - np.nanmin(way, axis=0)).max()) if len(way) else size
     large = small >= _SMALL * size
     way = _thin_out(way, _FINE * (size if large else small))
     low, high = (0.03, 0.76) if large else (0.37, 0.44)
-    axes = space(figure, (0.0, low, 0.53, high), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
+    axes = space_axes(figure, (0.0, low, 0.53, high), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
     for name, bone, colour, width, dashes in bones:
         axes.plot(*bone.path.T, color=colour, linewidth=width, linestyle=dashes, label=name, solid_capstyle="round")
         axes.plot(*bone.joints.T, color=colour, marker="o", markersize=4, linestyle="none")
     if not large:
-        _from_near(plan, figure, way)
+        _draw_from_near(plan, figure, way)
     axes.plot(*(way if len(way) else position(arm, q)).T, color=_INK, linewidth=1.2, label="tool")
-    for one in plan.reconfigurations:
-        at = position(arm, plan.q(_time_of(plan, one.s))[None])
-        axes.plot(*at.T, color=_SINGULAR, marker="x", markersize=8, linestyle="none")
+    for reconfiguration in plan.reconfigurations:
+        tip = position(arm, plan.q(_time_of(plan, reconfiguration.s))[None])
+        axes.plot(*tip.T, color=_SINGULAR, marker="x", markersize=8, linestyle="none")
     axes.legend(
         loc="upper left",
         bbox_to_anchor=(0.03, 0.88 if plan.passed else 0.90),
@@ -148,7 +150,7 @@ def _in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     true_proportions(axes, points, float(arm.base[2, 3]))
 
 
-def _way(plan: PathPlan) -> Array:
+def _tool_way(plan: PathPlan) -> Array:
     """The tool's way on the plan's own grid, its parts behind each other with a gap (nan) between: (N, 3) [mm]."""
     parts: list[Array] = []
     for k in sorted(plan.on_path):
@@ -176,11 +178,11 @@ def _time_of(plan: PathPlan, s: float) -> float:
     return high
 
 
-def _from_near(plan: PathPlan, figure: Any, way: Array) -> None:
+def _draw_from_near(plan: PathPlan, figure: Any, way: Array) -> None:
     """A way that is small beside the arm, seen along the axis in which it is thinnest."""
     size = np.nanmax(way, axis=0) - np.nanmin(way, axis=0)
     i, j = sorted(np.argsort(size)[1:].tolist())
-    axes = flat(figure, (0.06, 0.055, 0.46, 0.27), (f"{'xyz'[i]} / mm", f"{'xyz'[j]} / mm"), shrink=True)
+    axes = flat_axes(figure, (0.06, 0.055, 0.46, 0.27), (f"{'xyz'[i]} / mm", f"{'xyz'[j]} / mm"), shrink=True)
     length = np.nansum(np.linalg.norm(np.diff(way, axis=0), axis=1))
     thin = float(np.clip(_INKED * size[i] * size[j] / max(length, 1e-9) / size.max(), *_WIDTHS))
     axes.plot(way[:, i], way[:, j], color=_INK, linewidth=thin, label="the tool's way")
@@ -198,7 +200,7 @@ def _other_starts(plan: PathPlan) -> list[Array]:
     return [b.start_joints for b in plan.branches if b.carries >= plan.length - 0.01 and b.name not in taken]
 
 
-def _joints(plan: PathPlan, axes: Any, t: Array, q: Array) -> None:
+def _draw_joints(plan: PathPlan, axes: Any, t: Array, q: Array) -> None:
     """Joint values, as shares of their range where they have one."""
     arm = plan.arm
     for j, name in enumerate(arm.joint_names):
@@ -216,7 +218,7 @@ def _joints(plan: PathPlan, axes: Any, t: Array, q: Array) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=6, fontsize=7.5, frameon=False, handlelength=1.2)
 
 
-def _shares(plan: PathPlan, axes: Any, t: Array, share: Array, label: str) -> None:
+def _draw_shares(plan: PathPlan, axes: Any, t: Array, share: Array, label: str) -> None:
     for j in range(plan.arm.n):
         axes.plot(t, share[:, j], color=_COLOURS[j % len(_COLOURS)], linewidth=1.0)
     axes.axhline(1.0, color="#555555", linewidth=0.8, linestyle=":")
@@ -224,8 +226,8 @@ def _shares(plan: PathPlan, axes: Any, t: Array, share: Array, label: str) -> No
     axes.set_ylabel(label, fontsize=8)
 
 
-def _tool(axes: Any, t: Array, fine: Array, tips: Array) -> None:
+def _draw_tool_speed(axes: Any, t: Array, fine: Array, tips: Array) -> None:
     speed = np.linalg.norm(np.gradient(tips, fine, axis=0), axis=1)
-    axes.plot(t, _most(t, fine, speed[:, None])[:, 0], color=_INK, linewidth=1.0)
+    axes.plot(t, _peaks(t, fine, speed[:, None])[:, 0], color=_INK, linewidth=1.0)
     axes.set_ylim(0.0, 1.1 * float(speed.max()) or 1.0)
     axes.set_ylabel("tool / mm/s", fontsize=8)

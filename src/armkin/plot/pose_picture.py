@@ -15,8 +15,8 @@ from armkin.formula.arrays import Array
 from armkin.forward import as_joints, fk
 from armkin.forward import frames as joint_frames
 from armkin.keep_out.clearance import hits, hits_text
-from armkin.model.limits import outside
-from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat, picture, renderer, space, true_proportions
+from armkin.model.limits import outside_limits
+from armkin.plot.canvas import FAINT, INK, PALETTE, SOFT, flat_axes, picture, renderer, space_axes, true_proportions
 from armkin.reachability.volume import tip_freedoms
 from armkin.view.skeleton import Skeleton, skeleton
 
@@ -52,34 +52,34 @@ def plot_poses(
     view: elevation and azimuth of the eye [deg]. Arms that move in the xy plane are drawn in that plane.
     out: None opens a window.
     """
-    poses = _checked(arm, q, names)
+    poses = _check_poses(arm, q, names)
     alone = len(poses) == 1
-    shown = poses if names is not None else poses[_spread(len(poses))]
+    shown = poses if names is not None else poses[_spread_indices(len(poses))]
     bones = [skeleton(arm, pose) for pose in shown]
-    legal: list[bool] = np.logical_not(outside(arm, shown).any(axis=1)).tolist()
+    legal: list[bool] = np.logical_not(outside_limits(arm, shown).any(axis=1)).tolist()
     hit = _hit_texts(arm, shown)
-    legend = ["start", "end"] if names is None else _legend(names, legal, hit)
+    legend = ["start", "end"] if names is None else _legend_texts(names, legal, hit)
     with picture(out, 8.0 if alone else 9.6, 5.8) as figure:
-        track = None if alone or names is not None else fk(arm, _way(poses))[:, :3, 3]
+        track = None if alone or names is not None else fk(arm, _joint_way(poses))[:, :3, 3]
         drawing = _Drawing(arm, figure, bones, view, track)
-        drawing.keep_outs()
+        drawing.draw_keep_outs()
         notes = []
         if alone:
-            drawing.single(bones[0], _HIT if hit[0] else PALETTE[0])
+            drawing.draw_single(bones[0], _HIT if hit[0] else PALETTE[0])
             drawing.name_joints(bones[0])
-            notes = _of_one(bones[0], legal[0], hit[0])
+            notes = _notes_of_one(bones[0], legal[0], hit[0])
         else:
-            _several(drawing, bones, legend, legal, hit, in_turn=names is None)
+            _draw_several(drawing, bones, legend, legal, hit, in_turn=names is None)
         if track is not None:
-            drawing.track(track)
+            drawing.draw_track(track)
         if alone if frames is None else frames:
-            notes.append(drawing.frames(shown))
+            notes.append(drawing.draw_frames(shown))
         if target is not None:
-            drawing.mark(np.asarray(target, dtype=float))
+            drawing.mark_target(np.asarray(target, dtype=float))
         drawing.finish(arm.name if title is None else title, ";  ".join(notes), None if alone else legend)
 
 
-def _several(
+def _draw_several(
     drawing: _Drawing,
     bones: list[Skeleton],
     legend: Sequence[str],
@@ -93,23 +93,23 @@ def _several(
     if in_turn:
         for k, bone in enumerate(bones):
             label = legend[0] if k == 0 else legend[1] if k == last else None
-            drawing.arm(bone, _HIT if hit[k] else _path_colour(k / last), label, 2.6, dashed=not legal[k])
+            drawing.draw_arm(bone, _HIT if hit[k] else _path_colour(k / last), label, 2.6, dashed=not legal[k])
         return
     # Branches may lie on each other: the first one, which is the best, comes last and is the thinnest.
-    widths = 2.4 + np.minimum(0.5, 3.0 / len(bones)) * np.arange(len(bones)) + _twins(bones)
+    widths = 2.4 + np.minimum(0.5, 3.0 / len(bones)) * np.arange(len(bones)) + _extra_widths(bones)
     for k in sorted(range(len(bones)), key=lambda k: -widths[k]):
-        drawing.arm(
+        drawing.draw_arm(
             bones[k], _HIT if hit[k] else _branch_colour(k, len(bones)), legend[k], widths[k], dashed=not legal[k]
         )
 
 
-def _of_one(bone: Skeleton, legal: bool, hit: str) -> list[str]:
+def _notes_of_one(bone: Skeleton, legal: bool, hit: str) -> list[str]:
     """What is noted of a single pose."""
     tip = "tip ({:.1f}, {:.1f}, {:.1f}) mm".format(*np.round(bone.tip, 1) + 0.0)
     return [tip, *(["outside the joint limits"] if not legal else []), *([hit] if hit else [])]
 
 
-def _checked(arm: Arm, q: ArrayLike, names: Sequence[str] | None) -> Array:
+def _check_poses(arm: Arm, q: ArrayLike, names: Sequence[str] | None) -> Array:
     """The poses (K, n); raises UsageError for too many, for other names than poses, and for what is not finite."""
     poses = np.atleast_2d(as_joints(arm, q))
     if not 1 <= len(poses) <= MOST:
@@ -121,15 +121,15 @@ def _checked(arm: Arm, q: ArrayLike, names: Sequence[str] | None) -> Array:
     return poses
 
 
-def _legend(names: Sequence[str], legal: Sequence[bool], hit: Sequence[str]) -> list[str]:
+def _legend_texts(names: Sequence[str], legal: Sequence[bool], hit: Sequence[str]) -> list[str]:
     """Names of poses, with what is wrong with them."""
-    legend = [name + ("" if ok else " (outside limits)") for name, ok in zip(names, legal, strict=True)]
-    return ["\n".join([name, *wrap(what, _WIDE)]) for name, what in zip(legend, hit, strict=True)]
+    legend = [name + ("" if is_legal else " (outside limits)") for name, is_legal in zip(names, legal, strict=True)]
+    return ["\n".join([name, *wrap(hit_text, _WIDE)]) for name, hit_text in zip(legend, hit, strict=True)]
 
 
 def _hit_texts(arm: Arm, poses: Array) -> list[str]:
     """What each pose hits, in words: nothing where there are no keep-outs."""
-    return [_hit_text(found) for _, found in hits(arm, poses)] if arm.keep_out else [""] * len(poses)
+    return [_hit_text(hits_found) for _, hits_found in hits(arm, poses)] if arm.keep_out else [""] * len(poses)
 
 
 def _hit_text(hits: list[Hit]) -> str:
@@ -156,13 +156,13 @@ class _Drawing:
         self.size = float(np.ptp(self.points, axis=0).max()) or arm.reach
         if self.planar:
             self.dimensions = 2
-            self.axes = flat(figure, (0.11, 0.1, 0.86, 0.76), ("x / mm", "y / mm"))
+            self.axes = flat_axes(figure, (0.11, 0.1, 0.86, 0.76), ("x / mm", "y / mm"))
         else:
             self.dimensions = 3
-            self.axes = space(figure, (0.02, 0.02, 0.96, 0.88), view or _from_the_side(arm))
+            self.axes = space_axes(figure, (0.02, 0.02, 0.96, 0.88), view or _from_the_side(arm))
             self.floor = min(float(self.points[:, 2].min()), float(arm.base[2, 3]))
 
-    def keep_outs(self) -> None:
+    def draw_keep_outs(self) -> None:
         """What the arm must not touch, translucent; a floor is drawn as far as the picture goes."""
         if not self.robot.keep_out or self.dimensions == 2:
             return
@@ -171,7 +171,7 @@ class _Drawing:
 
         surfaces = import_module("mpl_toolkits.mplot3d.art3d").Poly3DCollection
         shapes = [shape for _, shape in guard(self.robot).obstacles]
-        for shape in sorted(shapes, key=lambda one: isinstance(one, Floor)):  # a floor is drawn under all others
+        for shape in sorted(shapes, key=lambda form: isinstance(form, Floor)):  # a floor is drawn under all others
             solid = shape.triangles(1.0)
             if isinstance(shape, Floor):
                 (x0, y0), (x1, y1) = self.points[:, :2].min(axis=0), self.points[:, :2].max(axis=0)
@@ -183,73 +183,75 @@ class _Drawing:
     def name_joints(self, bone: Skeleton) -> None:
         """Each joint's name beside it; joints in one place share a line."""
         groups: list[tuple[Array, list[str]]] = []
-        for at, name in zip(bone.joints, self.robot.joint_names, strict=True):
+        for joint, name in zip(bone.joints, self.robot.joint_names, strict=True):
             for place, names in groups:
-                if np.linalg.norm(place - at) < 0.06 * self.size:
+                if np.linalg.norm(place - joint) < 0.06 * self.size:
                     names.append(name)
                     break
             else:
-                groups.append((at, [name]))
+                groups.append((joint, [name]))
         for place, names in groups:
-            where = place[: self.dimensions]
+            point = place[: self.dimensions]
             halo = import_module("matplotlib.patheffects").withStroke(linewidth=2.5, foreground="white")
             beside = {"fontsize": 9.5, "color": INK, "zorder": 9, "path_effects": [halo]}
             if self.dimensions == 2:
                 offset = {"xytext": (7, -13), "textcoords": "offset points"}
-                self.axes.annotate(", ".join(names), where, **offset, **beside)
+                self.axes.annotate(", ".join(names), point, **offset, **beside)
             else:
-                self.axes.text(where[0], where[1], where[2] + 0.035 * self.size, "   " + ", ".join(names), **beside)
+                self.axes.text(point[0], point[1], point[2] + 0.035 * self.size, "   " + ", ".join(names), **beside)
 
-    def line(self, points: Array, **style: Any) -> None:
+    def draw_line(self, points: Array, **style: Any) -> None:
         """A line through points, in the plane or in space."""
         self.axes.plot(*points.T[: self.dimensions], **style)
 
-    def single(self, bone: Skeleton, colour: str) -> None:
+    def draw_single(self, bone: Skeleton, colour: str) -> None:
         """One pose: thick links, joints along their axes, a shadow that tells where over the floor it is."""
         if self.dimensions == 3:
             shadow = bone.path.copy()
             shadow[:, 2] = self.floor
-            self.line(shadow, color=FAINT, linewidth=3.5, solid_capstyle="round", zorder=1)
-        self._links(bone, colour, 5.0)
+            self.draw_line(shadow, color=FAINT, linewidth=3.5, solid_capstyle="round", zorder=1)
+        self._draw_links(bone, colour, 5.0)
         if self.dimensions == 2:
-            self._dots(bone, colour, 9.0)
+            self._draw_dots(bone, colour, 9.0)
         else:
-            for at, axis in zip(bone.joints, bone.axes, strict=True):
+            for centre, axis in zip(bone.joints, bone.axes, strict=True):
                 half = 0.035 * self.size * axis
-                ends = np.array([at - half, at + half])
-                self.line(ends, color=INK, linewidth=9.0, solid_capstyle="butt", zorder=4)
-        self.line(bone.tip[None], color=colour, marker="o", markersize=7, zorder=5)
+                ends = np.array([centre - half, centre + half])
+                self.draw_line(ends, color=INK, linewidth=9.0, solid_capstyle="butt", zorder=4)
+        self.draw_line(bone.tip[None], color=colour, marker="o", markersize=7, zorder=5)
 
-    def arm(self, bone: Skeleton, colour: Any, name: str | None, width: float, dashed: bool) -> None:
+    def draw_arm(self, bone: Skeleton, colour: Any, name: str | None, width: float, dashed: bool) -> None:
         """One pose of several; dashed: it is outside the limits."""
-        self._links(bone, colour, width, name, (0, (2.2, 1.2)) if dashed else "solid")
-        self._dots(bone, colour, 3.0 + 0.6 * width)
-        self.line(bone.tip[None], color=colour, marker="o", markersize=5, zorder=5)
+        self._draw_links(bone, colour, width, name, (0, (2.2, 1.2)) if dashed else "solid")
+        self._draw_dots(bone, colour, 3.0 + 0.6 * width)
+        self.draw_line(bone.tip[None], color=colour, marker="o", markersize=5, zorder=5)
 
-    def _links(self, bone: Skeleton, colour: Any, width: float, name: str | None = None, style: Any = "solid") -> None:
+    def _draw_links(
+        self, bone: Skeleton, colour: Any, width: float, name: str | None = None, style: Any = "solid"
+    ) -> None:
         round_off = {"solid_capstyle": "round", "solid_joinstyle": "round", "dash_capstyle": "butt"}
         for slide in bone.slides:
-            self.line(slide, color=colour, linewidth=2.2 * width, alpha=0.35, solid_capstyle="butt", zorder=2)
-        self.line(bone.path, color=colour, linewidth=width, linestyle=style, label=name, zorder=3, **round_off)
+            self.draw_line(slide, color=colour, linewidth=2.2 * width, alpha=0.35, solid_capstyle="butt", zorder=2)
+        self.draw_line(bone.path, color=colour, linewidth=width, linestyle=style, label=name, zorder=3, **round_off)
 
-    def _dots(self, bone: Skeleton, colour: Any, size: float) -> None:
+    def _draw_dots(self, bone: Skeleton, colour: Any, size: float) -> None:
         dots = {"marker": "o", "linestyle": "none", "markeredgecolor": colour, "markeredgewidth": 1.4}
-        self.line(bone.joints, color="white", markersize=size, zorder=4, **dots)
+        self.draw_line(bone.joints, color="white", markersize=size, zorder=4, **dots)
 
-    def frames(self, poses: Array) -> str:
+    def draw_frames(self, poses: Array) -> str:
         """The base's, every joint's and the tool's frame as short x, y and z axes; returns what is noted of them."""
         length = 0.1 * self.size
         for T in joint_frames(self.robot, poses).reshape(-1, 4, 4):
             for k, colour in enumerate(_AXES[: self.dimensions]):
                 ends = np.array([T[:3, 3], T[:3, 3] + length * T[:3, k]])
-                self.line(ends, color=colour, linewidth=1.6, zorder=6)
+                self.draw_line(ends, color=colour, linewidth=1.6, zorder=6)
         return "frames: x red, y green" + ("" if self.dimensions == 2 else ", z blue")
 
-    def track(self, tips: Array) -> None:
+    def draw_track(self, tips: Array) -> None:
         """The tip's way along a path."""
-        self.line(tips, color=INK, linewidth=1.3, linestyle=(0, (4, 2)), zorder=7)
+        self.draw_line(tips, color=INK, linewidth=1.3, linestyle=(0, (4, 2)), zorder=7)
 
-    def mark(self, point: Array) -> None:
+    def mark_target(self, point: Array) -> None:
         """A target."""
         self.points = np.concatenate([self.points, point[None]])
         ring = {
@@ -258,13 +260,13 @@ class _Drawing:
             "markeredgewidth": 1.6,
             "linestyle": "none",
         }
-        self.line(point[None], marker="o", markersize=13, label="target", zorder=8, **ring)
+        self.draw_line(point[None], marker="o", markersize=13, label="target", zorder=8, **ring)
 
     def finish(self, title: str, note: str, order: Sequence[str] | None) -> None:
         """Title, legend beside the axes, and limits that fill what is left."""
         self.figure.text(0.03, 0.97, title, fontsize=min(13.0, 800 / max(len(title), 1)), va="top", color=INK)
         self.figure.text(0.03, 0.92, note, fontsize=10, va="top", color=SOFT)
-        left = 0.02 if order is None else min(self._legend(order, 0.895 if note else 0.935), 0.5)
+        left = 0.02 if order is None else min(self._draw_legend(order, 0.895 if note else 0.935), 0.5)
         if self.dimensions == 3:
             self.axes.set_position([left, 0.02, 0.98 - left, 0.86])
             true_proportions(self.axes, self.points, self.floor)
@@ -272,7 +274,7 @@ class _Drawing:
             self.axes.set_position([left + 0.09, 0.1, 0.88 - left, 0.76])
             self.axes.margins(0.08)
 
-    def _legend(self, order: Sequence[str], top: float) -> float:
+    def _draw_legend(self, order: Sequence[str], top: float) -> float:
         """A legend in a column of its own; returns where it ends, as a share of the figure's width."""
         handles, texts = self.axes.get_legend_handles_labels()
         rank = {text: k for k, text in enumerate(order)}
@@ -296,12 +298,12 @@ def _from_the_side(arm: Arm) -> tuple[float, float]:
     return _ELEVATION, _AZIMUTHS[int(np.argmax(np.round(sideways, 6)))]
 
 
-def _spread(count: int) -> NDArray[np.int64]:
+def _spread_indices(count: int) -> NDArray[np.int64]:
     """Indices of the poses of a path that are drawn: its ends, and evenly in between."""
     return np.unique(np.linspace(0, count - 1, min(count, _DRAWN)).round().astype(np.int64))
 
 
-def _way(poses: Array) -> Array:
+def _joint_way(poses: Array) -> Array:
     """Joint values along a path (K, n) -> (M, n): straight from each pose to the next, as joints move."""
     between = max(1, min(_BETWEEN, MOST // len(poses)))
     share = np.arange(between)[:, None] / between
@@ -309,13 +311,13 @@ def _way(poses: Array) -> Array:
     return np.concatenate([steps.reshape(-1, poses.shape[1]), poses[-1:]])
 
 
-def _twins(bones: Sequence[Skeleton]) -> Array:
+def _extra_widths(bones: Sequence[Skeleton]) -> Array:
     """How much wider each skeleton is drawn because it lies on earlier ones: wrist flips move no corner."""
     rank = np.zeros(len(bones))
     for k, bone in enumerate(bones):
-        for other in bones[:k]:
-            same = bone.path.shape == other.path.shape
-            rank[k] += same and bool(np.allclose(bone.path, other.path, rtol=0, atol=1e-3 * np.ptp(bone.path)))
+        for earlier in bones[:k]:
+            same = bone.path.shape == earlier.path.shape
+            rank[k] += same and bool(np.allclose(bone.path, earlier.path, rtol=0, atol=1e-3 * np.ptp(bone.path)))
     return rank * min(3.2, 9.6 / max(float(rank.max()), 1.0))
 
 

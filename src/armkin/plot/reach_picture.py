@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.plot.canvas import INK, SOFT, flat, picture
+from armkin.plot.canvas import INK, SOFT, flat_axes, picture
 from armkin.reachability import voxels
 
 if TYPE_CHECKING:
@@ -23,41 +23,41 @@ def plot_reach(reach: Reach, out: str) -> None:
         raise UsageError("this map is in a file alone: too many cells for a picture")
     grid = reach.grid
     share = reach.columns["share"]
-    fullest = _fullest(grid.rings[:, 1], share.reshape(-1, grid.azimuths).sum(axis=1))
+    fullest = _fullest_level(grid.rings[:, 1], share.reshape(-1, grid.azimuths).sum(axis=1))
     side, slab = voxels.section_layer(grid), voxels.level_layer(grid, fullest)
     with picture(out, 11.4, 6.6) as figure:
         for column, (name, label) in enumerate(_SHOWN):
             values = np.where(share > 0, reach.columns[name], np.nan)
             left = 0.075 + 0.32 * column
-            above = flat(figure, (left, 0.53, 0.195, 0.34), ("x / mm", "z / mm"))
-            below = flat(figure, (left, 0.09, 0.195, 0.34), ("x / mm", "y / mm"))
+            above = flat_axes(figure, (left, 0.53, 0.195, 0.34), ("x / mm", "z / mm"))
+            below = flat_axes(figure, (left, 0.09, 0.195, 0.34), ("x / mm", "y / mm"))
             most = 1.0 if name != "branches" else max(float(np.nanmax(values, initial=1.0)), 1.0)
-            drawn = _squares(above, side, values, grid.step, most)
-            _squares(below, slab, values, grid.step, most)
+            drawn = _draw_squares(above, side, values, grid.step, most)
+            _draw_squares(below, slab, values, grid.step, most)
             place = figure.add_axes((left + 0.205, 0.15, 0.008, 0.66))
             bar = figure.colorbar(drawn, cax=place)
             bar.outline.set_visible(False)
             figure.text(left, 0.9, label, fontsize=10, color=INK)
-        each = f"{reach.orientations:,} orientation{'s' * (reach.orientations != 1)} each"
-        where = f"{reach.reached:,} of {reach.cells:,} cells, {each} ({reach.method})"
+        orientations_text = f"{reach.orientations:,} orientation{'s' * (reach.orientations != 1)} each"
+        cells_text = f"{reach.reached:,} of {reach.cells:,} cells, {orientations_text} ({reach.method})"
         figure.text(0.03, 0.985, grid.arm.name, fontsize=13, va="top", color=INK)
         figure.text(
             0.03,
             0.945,
-            f"{where};  above: y = 0;  below: z = {fullest * grid.step:g} mm",
+            f"{cells_text};  above: y = 0;  below: z = {fullest * grid.step:g} mm",
             fontsize=9,
             va="top",
             color=SOFT,
         )
 
 
-def _fullest(levels: Array, weight: Array) -> int:
+def _fullest_level(levels: Array, weight: Array) -> int:
     """The level in which most is reached."""
     names, index = np.unique(levels, return_inverse=True)
     return int(names[np.bincount(index, weight).argmax()])
 
 
-def _squares(axes: Any, layer: voxels.Layer, values: Array, step: float, most: float) -> Any:
+def _draw_squares(axes: Any, layer: voxels.Layer, values: Array, step: float, most: float) -> Any:
     """A plane of voxels: centres at half steps along x, at whole ones along the other axis."""
     table = layer.table(values)
     low = layer.places.min(axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
-from armkin.plot.canvas import INK, SOFT, flat, picture, space, true_proportions
+from armkin.plot.canvas import INK, SOFT, flat_axes, picture, space_axes, true_proportions
 
 if TYPE_CHECKING:
     from armkin.reachability import Workspace
@@ -39,17 +39,17 @@ def plot_workspace(workspace: Workspace, out: str, *, colour: str = "manipulabil
         raise UsageError(f"the survey has no {colour}; ask for it with measures=['{colour}']")
     if not len(workspace.tips):
         raise UsageError("the survey kept no samples to draw; ask for them with keep=100_000")
-    tips, values = workspace.tips, _values(workspace, colour)
-    flat_arm = workspace.extent is not None and workspace.extent.dimensions == 2 and _level(tips)
+    tips, values = workspace.tips, _colour_values(workspace, colour)
+    flat_arm = workspace.extent is not None and workspace.extent.dimensions == 2 and _is_level(tips)
     with picture(out, 8.0, 6.2) as figure:
         if flat_arm:
-            axes = flat(figure, (0.11, 0.1, 0.72, 0.76), ("x / mm", "y / mm"))
-            drawn = _spots(axes, tips[:, 0], tips[:, 1], values, 140)
+            axes = flat_axes(figure, (0.11, 0.1, 0.72, 0.76), ("x / mm", "y / mm"))
+            drawn = _draw_spots(axes, tips[:, 0], tips[:, 1], values, 140)
             bar = figure.add_axes((0.87, 0.1, 0.022, 0.76))
         else:
             base = workspace.arm.base
             round_base = (tips - base[:3, 3]) @ base[:3, :3]
-            cloud = space(figure, (0.01, 0.13, 0.54, 0.76), (20.0, -60.0))
+            cloud = space_axes(figure, (0.01, 0.13, 0.54, 0.76), (20.0, -60.0))
             order = _far_to_near(tips[:_CLOUD], -60.0)
             cloud.scatter(
                 *tips[order].T,
@@ -61,18 +61,18 @@ def plot_workspace(workspace: Workspace, out: str, *, colour: str = "manipulabil
                 rasterized=True,
             )
             true_proportions(cloud, tips, float(tips[:, 2].min()), ticks=5.5)
-            above = flat(figure, (0.675, 0.545, 0.305, 0.345), ("x / mm", "y / mm"), shrink=True)
-            drawn = _spots(above, tips[:, 0], tips[:, 1], values, 90)
-            side = flat(figure, (0.675, 0.095, 0.305, 0.345), ("r / mm", "z / mm"), shrink=True)
-            _spots(side, np.hypot(round_base[:, 0], round_base[:, 1]), round_base[:, 2], values, 90)
+            above = flat_axes(figure, (0.675, 0.545, 0.305, 0.345), ("x / mm", "y / mm"), shrink=True)
+            drawn = _draw_spots(above, tips[:, 0], tips[:, 1], values, 90)
+            side = flat_axes(figure, (0.675, 0.095, 0.305, 0.345), ("r / mm", "z / mm"), shrink=True)
+            _draw_spots(side, np.hypot(round_base[:, 0], round_base[:, 1]), round_base[:, 2], values, 90)
             side.set_xlim(left=min(0.0, side.get_xlim()[0]))  # the base's axis is part of the picture
             bar = figure.add_axes((0.06, 0.1, 0.44, 0.022))
-        _bar(figure, bar, drawn, _LABELS[colour], upright=flat_arm)
+        _draw_bar(figure, bar, drawn, _LABELS[colour], upright=flat_arm)
         figure.text(0.03, 0.97, workspace.arm.name if title is None else title, fontsize=13, va="top", color=INK)
         figure.text(0.03, 0.92, _caption(workspace), fontsize=10, va="top", color=SOFT)
 
 
-def _values(workspace: Workspace, colour: str) -> Array:
+def _colour_values(workspace: Workspace, colour: str) -> Array:
     if colour == "reach":
         return np.asarray(np.linalg.norm(workspace.tips - workspace.arm.base[:3, 3], axis=1))
     if colour == "z":
@@ -83,7 +83,7 @@ def _values(workspace: Workspace, colour: str) -> Array:
     return values
 
 
-def _level(tips: Array) -> bool:
+def _is_level(tips: Array) -> bool:
     return bool(np.ptp(tips[:, 2]) < 1e-6 * max(float(np.ptp(tips[:, :2])), 1.0))
 
 
@@ -93,7 +93,7 @@ def _far_to_near(tips: Array, azimuth: float) -> Any:
     return np.argsort(tips @ toward)
 
 
-def _spots(axes: Any, x: Array, y: Array, values: Array, columns: int) -> Any:
+def _draw_spots(axes: Any, x: Array, y: Array, values: Array, columns: int) -> Any:
     """Mean value on a grid of hexagons of the same size along both axes."""
     columns = min(columns, int(np.sqrt(len(x) / _EACH)))
     if columns < 50:
@@ -106,7 +106,7 @@ def _spots(axes: Any, x: Array, y: Array, values: Array, columns: int) -> Any:
     return drawn
 
 
-def _bar(figure: Any, place: Any, drawn: Any, label: str, upright: bool) -> None:
+def _draw_bar(figure: Any, place: Any, drawn: Any, label: str, upright: bool) -> None:
     bar = figure.colorbar(drawn, cax=place, orientation="vertical" if upright else "horizontal")
     bar.outline.set_visible(False)
     bar.set_label(label, labelpad=5)

@@ -18,7 +18,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from armkin.files import ending, write_whole
+from armkin.files import file_ending, write_whole
 from armkin.formula.arrays import Array
 from armkin.model import units
 
@@ -32,7 +32,7 @@ _ENDS = (".csv", ".npz", ".ply")
 
 def check_cloud(path: str) -> str:
     """The kind of cloud that a file's name asks for."""
-    return ending(path, "a cloud is", _ENDS)
+    return file_ending(path, "a cloud is", _ENDS)
 
 
 @contextmanager

@@ -56,11 +56,11 @@ def chunk_tables(
     def read_kept() -> Iterator[tuple[int, Table]]:
         while parts is not None and kept_numbers:
             number = kept_numbers.popleft()
-            yield number, npz.decoded(parts.read(number))
+            yield number, npz.decode_table(parts.read(number))
 
     for number, columns in in_order(engine, work, job, missing_chunks()):
         if parts is not None and parts.held:
-            parts.keep(number, {}, npz.encoded(columns))
+            parts.keep(number, {}, npz.encode_table(columns))
         yield number, columns
         yield from read_kept()
     yield from read_kept()

@@ -296,8 +296,8 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
     """What is answered, kept beside the file until it stands."""
     if out is None:
         return None
-    files.ending(out, "places are", ENDINGS)
-    files.check(os.fspath(out))
+    files.file_ending(out, "places are", ENDINGS)
+    files.check_writable(os.fspath(out))
     robots = [[q.arm.sha256, q.obstacles.sha256, digest(q.targets.tobytes()), *q.ways, *q.values] for q in questions]
     inputs = {"command": "place", "armkin": __version__, "robots, scene and targets": robots, **settings}
     inputs["solve"] = [f"{question.solve.__module__}.{question.solve.__qualname__}" for question in questions]

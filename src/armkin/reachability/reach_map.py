@@ -15,14 +15,14 @@ from armkin import __version__
 from armkin.columns import npz
 from armkin.columns.finished_chunks import Parts
 from armkin.columns.formats import format_of
-from armkin.columns.parquet import require
+from armkin.columns.parquet import require_pyarrow
 from armkin.columns.table import Table
 from armkin.engines.ordered_chunks import Engine
 from armkin.errors import UsageError
-from armkin.files import check, ending, write_whole
+from armkin.files import check_writable, file_ending, write_whole
 from armkin.formula.arrays import Array
 from armkin.inverse.solvers.recognise import solver
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.reachability import kept_chunks
 from armkin.reachability.cell_answers import TURN, Question, cell_columns
 from armkin.reachability.reach_cells import Grid
@@ -170,7 +170,7 @@ def _cost(question: Question) -> int:
     arm, task = question.grid.arm, question.grid.task
     if arm.n > task.constraints:
         return FAMILIES
-    return 1 if solver(actual(arm), task.name)[1].pairs is not None else SLOWER
+    return 1 if solver(actual_arm(arm), task.name)[1].pairs is not None else SLOWER
 
 
 def answer_chunk(question: Question, chunk: Chunk) -> tuple[int, Table]:
@@ -198,10 +198,10 @@ class _Run:
         self.volume = 0.0
         self.parts: Parts | None = None
         if out is not None:
-            end = ending(out, "a map is", (".npz", ".parquet", ".csv"))
-            check(out)
+            end = file_ending(out, "a map is", (".npz", ".parquet", ".csv"))
+            check_writable(out)
             if end == ".parquet":
-                require()
+                require_pyarrow()
             self.parts = Parts(out, _dependencies(question))
 
     def answer_all(self, all_chunks: list[Chunk]) -> dict[str, Array]:
@@ -239,8 +239,8 @@ class _Run:
 
         def tables() -> Iterator[Any]:
             for number in range(count):
-                encoded = parts.read(number) if parts.held else npz.encoded(kept_tables[number])
-                yield io.BytesIO(encoded if format.name == "npz" else format.encoded(npz.decoded(encoded)))
+                encoded = parts.read(number) if parts.held else npz.encode_table(kept_tables[number])
+                yield io.BytesIO(encoded if format.name == "npz" else format.encoded(npz.decode_table(encoded)))
 
         with write_whole(self.out, "wb") as file:
             if format.name == "csv":

@@ -16,7 +16,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import position as position_of
 from armkin.keep_out.clearance import hits_nothing
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.reachability import cloud_file as clouds
 from armkin.reachability.dexterity import MEASURES, measure_function
 from armkin.reachability.sampling import Random, Sampling, joint_grid
@@ -121,7 +121,7 @@ def workspace(
             if progress is not None:
                 progress(tally.samples)
         # Within the block: without its volume there is no result, and then no file either.
-        size = extent(actual(arm), seed, sampling.count) if volume else None
+        size = extent(actual_arm(arm), seed, sampling.count) if volume else None
     return tally.result(measures, size, time.perf_counter() - started)
 
 

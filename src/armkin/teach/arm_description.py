@@ -10,18 +10,18 @@ from armkin.errors import UsageError
 from armkin.inverse.solvers.redundant import redundant_joint
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.motors import joints_per_pulse, motor_names, pulse_units
-from armkin.view.skeleton import shape
+from armkin.view.skeleton import arm_shape
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
 def scene_json(arm: Arm) -> dict[str, Any]:
-    """The arm: links and bodies (see `armkin.view.skeleton.shape`), joints, motors."""
-    form = shape(arm)
-    limits = [[units.finite(end) for end in pair] for pair in units.limits_out(arm)]
+    """The arm: links and bodies (see `armkin.view.skeleton.arm_shape`), joints, motors."""
+    form = arm_shape(arm)
+    limits = [[units.finite_or_none(end) for end in pair] for pair in units.limits_out(arm)]
     return {
         "robot": arm.name,
         "robot_file": arm.path,
@@ -43,7 +43,7 @@ def scene_json(arm: Arm) -> dict[str, Any]:
             }
             for name, unit, (low, high), home, sliding, ratio, offset, step in zip(
                 arm.joint_names,
-                units.names(arm),
+                units.unit_names(arm),
                 limits,
                 units.home_out(arm),
                 arm.prismatic,
@@ -68,7 +68,7 @@ def first_lock(arm: Arm) -> str | None:
         task_for(arm)
     except UsageError:
         return arm.joint_names[(arm.n - 1) // 2 - 1] if arm.n > 6 else None
-    return redundant_joint(actual(arm), None) or None
+    return redundant_joint(actual_arm(arm), None) or None
 
 
 def _joint_steps(arm: Arm) -> list[float]:
@@ -115,7 +115,7 @@ def _gripper_json(arm: Arm) -> dict[str, Any] | None:
     if file is None:
         return None
     # It continues the last straight piece of the arm, which is not always along the tool's z axis.
-    corners = shape(arm).bodies[-1]
+    corners = arm_shape(arm).bodies[-1]
     pieces = [d for d in np.diff(corners, axis=0) if np.linalg.norm(d) > 1e-6 * arm.reach]
     way = pieces[-1] if pieces else np.array([0.0, 0.0, 1.0])
     inside = arm.link[-1][:3, :3].T @ way

@@ -9,7 +9,7 @@ from armkin.errors import UsageError
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.model import units
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.model.target_numbers import label_units
 from armkin.motors import pulse_range
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 def solver_json(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
     """What a page must know of the module: the task, its numbers' names and units, how far the motors go."""
-    spare = redundancy(actual(arm), task_name)
-    task = spare.task if spare else solver(actual(arm), task_name)[0]
+    spare = redundancy(actual_arm(arm), task_name)
+    task = spare.task if spare else solver(actual_arm(arm), task_name)[0]
     return {
         "robot": Path(arm.path).stem if arm.path else arm.name,
         "task": task.name,
         "labels": list(task.labels),
         "units": label_units(task.labels),
         "held": arm.joint_names[spare.joint] if spare else "",
-        "pulse_range": [[units.finite(end) for end in pair] for pair in pulse_range(arm).tolist()],
+        "pulse_range": [[units.finite_or_none(end) for end in pair] for pair in pulse_range(arm).tolist()],
     }
 
 

@@ -18,7 +18,7 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import hits, hits_text
 from armkin.model import units
-from armkin.model.limits import outside, outside_text
+from armkin.model.limits import outside_limits, outside_text
 from armkin.model.rotation import rpy
 from armkin.model.target_numbers import label_units, targets_in, targets_out
 from armkin.motors import best_pulses, motor_names, outside_travel, pulses, rounding
@@ -189,7 +189,7 @@ def _hit_bodies(arm: Arm, q: Array) -> list[int]:
 
 def _warnings(arm: Arm, q: Array) -> list[str]:
     """Each joint outside its limits, and what the pose hits, in words."""
-    complaints = [outside_text(arm, int(i), float(q[i])) for i in np.flatnonzero(outside(arm, q))]
+    complaints = [outside_text(arm, int(i), float(q[i])) for i in np.flatnonzero(outside_limits(arm, q))]
     if arm.keep_out and (hit := hits(arm, q[None])[0][1]):
         complaints.append(f"it {hits_text(hit)}")
     return complaints

@@ -14,7 +14,7 @@ from armkin.forward import fk
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 
 if TYPE_CHECKING:
     from armkin.compiled.compiled_arm import CompiledArm
@@ -36,7 +36,7 @@ class QuickIk:
         if self._arm is not None:
             return
         self._arm = arm
-        if solver(actual(arm), task)[1].pairs is None:
+        if solver(actual_arm(arm), task)[1].pairs is None:
             threading.Thread(target=self._build, args=(arm, task), name="compiler", daemon=True).start()
         else:
             self.ready.set()
@@ -57,7 +57,7 @@ class QuickIk:
 
         with suppress(ArmkinError):  # no compiler, or nowhere to build: Python goes on
             built = compile(arm, task)
-            home = targets_of(solver(actual(arm), task)[0], fk(arm, arm.home)[None], arm.home[None])
+            home = targets_of(solver(actual_arm(arm), task)[0], fk(arm, arm.home)[None], arm.home[None])
             built.ik(home, task, arm.home)  # the task's own library
             self._built = built
         self.ready.set()

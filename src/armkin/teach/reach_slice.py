@@ -12,7 +12,7 @@ from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.inverse.tasks.task import distance
 from armkin.keep_out.clearance import hits_nothing
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.reachability import voxels
 from armkin.reachability.reach_cells import Grid
 from armkin.reachability.reach_map import reach
@@ -33,7 +33,7 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
 
     Raises UsageError for an arm without a task of its own.
     """
-    real_arm = actual(arm)
+    real_arm = actual_arm(arm)
     free = redundancy(real_arm, None)
     step = arm.reach / ACROSS
     if free is None:  # azimuths 0 and 180 degrees alone: the plane

@@ -45,28 +45,28 @@ class Skeleton:
         return np.asarray(self.path[-1])
 
 
-def shape(arm: Arm) -> Shape:
+def arm_shape(arm: Arm) -> Shape:
     """The bodies of an arm.
 
     >>> import armkin
-    >>> [body.round(6)[-1].tolist() for body in shape(armkin.load("robots/yaw_two_link.yaml")).bodies][1:]
+    >>> [body.round(6)[-1].tolist() for body in arm_shape(armkin.load("robots/yaw_two_link.yaml")).bodies][1:]
     [[0.0, 0.0, 660.0], [430.0, 0.0, 0.0], [430.0, 0.0, 0.0]]
     """
     bodies = [np.array([arm.base[:3, 3], arm.link[0][:3, 3]])]
-    at = np.zeros(arm.n)
+    offsets = np.zeros(arm.n)
     for i in range(arm.n):
         link = arm.link[i + 1]
-        foot, meets = (link[2, 3], 0.0) if i + 1 == arm.n else _feet(link)
+        foot, meets = (link[2, 3], 0.0) if i + 1 == arm.n else _normal_feet(link)
         across = link[:3, 3] + meets * link[:3, 2]
-        bodies.append(np.array([[0.0, 0.0, at[i]], [0.0, 0.0, foot], across]))
+        bodies.append(np.array([[0.0, 0.0, offsets[i]], [0.0, 0.0, foot], across]))
         if i + 1 < arm.n:
-            at[i + 1] = meets
-    return Shape(tuple(bodies), at)
+            offsets[i + 1] = meets
+    return Shape(tuple(bodies), offsets)
 
 
 def skeleton(arm: Arm, q: ArrayLike) -> Skeleton:
     """The lines of a pose q (n,) [rad | mm]."""
-    values, form = as_joints(arm, q), shape(arm)
+    values, form = as_joints(arm, q), arm_shape(arm)
     T = arm.link[0]
     path, joints, axes, slides = [*form.bodies[0]], [], [], []
     for i, value in enumerate(values * arm.ratio):
@@ -87,7 +87,7 @@ def skeleton(arm: Arm, q: ArrayLike) -> Skeleton:
     return Skeleton(np.array(path)[keep], np.array(joints), np.array(axes), slides)
 
 
-def _feet(link: Array) -> tuple[float, float]:
+def _normal_feet(link: Array) -> tuple[float, float]:
     """Where the common normal of two joints' axes stands on the one and on the other [mm from their frames].
 
     The axes are the z axes of the frames before and after `link`. Of nearly parallel axes the frames' own

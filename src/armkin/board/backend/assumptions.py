@@ -12,7 +12,7 @@ import numpy as np
 
 from armkin.model.units import DEGREE
 from armkin.motion.joint_moves import missing_rates
-from armkin.motors import undriven
+from armkin.motors import undriven_joints
 from armkin.robot_file import Motor
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def arm_with_assumptions(arm: Arm) -> tuple[Arm, list[str]]:
     'max_speed of q1, q2, q3, q4, q5, q6: 30 deg/s'
     """
     assumptions = []
-    if bare := undriven(arm):
+    if bare := undriven_joints(arm):
         arm = _with_steppers(arm, bare)
         assumptions.append(f"motors of {', '.join(bare)}: steppers of 200 full steps, 16 microsteps, gear {_GEAR:g}")
         if any(arm.prismatic[arm.joint_names.index(name)] for name in bare):

@@ -12,7 +12,7 @@ from armkin import board_catalogue
 from armkin.board_catalogue import BOARDS, DRIVERS
 from armkin.errors import UsageError
 from armkin.motion.joint_moves import missing_rates, rate_lines
-from armkin.motors import joints_per_pulse, undriven
+from armkin.motors import joints_per_pulse, undriven_joints
 
 if TYPE_CHECKING:
     from armkin.board_catalogue import ForeignBoard
@@ -61,7 +61,7 @@ def _without_rates(arm: Arm, board: bool) -> list[Lack]:
     try:
         joints_per_pulse(arm)  # raises if a joint has no motor
     except UsageError as error:
-        still = undriven(arm)
+        still = undriven_joints(arm)
         lacks_found.append(
             (_lack_text(arm, still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), [])
         )
@@ -96,7 +96,7 @@ def _axis_names(arm: Arm) -> tuple[str, ...]:
 def _board_for(arm: Arm) -> str:
     """The first kind that has an axis for every motor, or for every joint of an arm without motors."""
     servos = sum(motor.kind == "servo" for motor in arm.motors)
-    steppers = len(arm.motors) - servos + len(undriven(arm))
+    steppers = len(arm.motors) - servos + len(undriven_joints(arm))
     fits = (b.kind for b in BOARDS.values() if len(b.steppers) >= steppers and len(b.servos) >= servos)
     return next(fits, "pico6")
 
@@ -105,7 +105,7 @@ def without_board(arm: Arm) -> list[Lack]:
     """Missing board, driver, axes: what a board needs."""
     if arm.board is None:
         kind = _board_for(arm)
-        driver = f", driver: {_DRIVER}" if any(m.kind == "stepper" for m in arm.motors) or undriven(arm) else ""
+        driver = f", driver: {_DRIVER}" if any(m.kind == "stepper" for m in arm.motors) or undriven_joints(arm) else ""
         choice = f"kinds: {', '.join(board_catalogue.kind_names())}; drivers: {', '.join(DRIVERS)}"
         return [("it has no board", [f"board: {{kind: {kind}{driver}}}   # for example; {choice}"])]
     foreign = board_catalogue.foreign_board(arm.board.kind)
@@ -141,7 +141,7 @@ def _without_driver(arm: Arm, settings: Board) -> list[Lack]:
 
 
 def _without_drives(arm: Arm) -> list[str]:
-    still = undriven(arm)
+    still = undriven_joints(arm)
     if still:
         return [_lack_text(arm, still, "drive")]
     try:

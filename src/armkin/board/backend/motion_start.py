@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.board.ports import LOG
 from armkin.errors import NoSolutionError, UsageError
-from armkin.model.limits import SLACK, fields, outside_text
+from armkin.model.limits import SLACK, limit_fields, outside_text
 from armkin.motion.plan.trajectory_proof import check_free, free_way
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import joints, legal_with_same_pulses, pulses, resolution
@@ -94,7 +94,7 @@ def _farther_out_error(arm: Arm, joint: int, q: Array) -> NoSolutionError:
     return NoSolutionError(
         f"{outside_text(arm, joint, value)}, where the arm stands, and this takes it farther out: nothing was moved",
         advice=f"move {arm.joint_names[joint]} inside its limits first",
-        **fields(arm, joint, value),
+        **limit_fields(arm, joint, value),
     )
 
 

@@ -19,7 +19,7 @@ from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.session import DeviceError
 from armkin.errors import NoHomingError, UsageError
 from armkin.model.lock_joints import joint_index
-from armkin.model.units import scale
+from armkin.model.units import joint_scale
 from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
@@ -207,11 +207,11 @@ def _switch_value(arm: Arm, joint: int) -> float:
     """Joint value at the switch's edge [rad | mm]."""
     homing = arm.homing[joint]
     assert homing is not None
-    return float(homing.at * scale(arm)[joint])
+    return float(homing.at * joint_scale(arm)[joint])
 
 
 def _search_of(arm: Arm, configuration: Configuration, j: int) -> Search:
-    name, unit, homing = arm.joint_names[j], float(scale(arm)[j]), arm.homing[j]
+    name, unit, homing = arm.joint_names[j], float(joint_scale(arm)[j]), arm.homing[j]
     assert homing is not None
     board = configuration.board
     gain = arm.motor_gain[:, j]

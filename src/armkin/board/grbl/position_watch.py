@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armkin.board.grbl.trajectory_to_gcode import PIECE
 from armkin.errors import LinkError
 from armkin.motion.timing.trajectory import Straight
-from armkin.motors import places, pulses
+from armkin.motors import exact_pulses, pulses
 
 if TYPE_CHECKING:
     from armkin.board.backend.sent_positions import Job
@@ -102,5 +102,7 @@ def _path_samples(job: Job) -> tuple[Array, Array]:
         t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE)), 1) + 1)[1:]
         sampled = stretch.evaluate(t)
         times.append(began + t)
-        points.append(places(arm, sampled) if isinstance(stretch, Straight) else pulses(arm, sampled).astype(float))
+        points.append(
+            exact_pulses(arm, sampled) if isinstance(stretch, Straight) else pulses(arm, sampled).astype(float)
+        )
     return np.concatenate(times), np.concatenate(points)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.klipper.extra_axes import PIECE, RATE, Axis
-from armkin.motors import places, pulses
+from armkin.motors import exact_pulses, pulses
 
 if TYPE_CHECKING:
     from armkin.board.backend.sent_positions import Job
@@ -67,7 +67,7 @@ class Lines:
 
     def _values_at(self, t: Array) -> list[list[float]]:
         """Where the axes are at times (T,) of the plan: T rows of axes, in Klipper's units."""
-        return self._to_units(places(self._job.trajectory.arm, self._job.trajectory.q(t)))
+        return self._to_units(exact_pulses(self._job.trajectory.arm, self._job.trajectory.q(t)))
 
     def _rest_position(self, t: float) -> list[float]:
         """Where the axes come to rest at a time of the plan: on whole steps."""

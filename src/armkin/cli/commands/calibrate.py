@@ -125,7 +125,7 @@ def _print_suggestions(arm: Arm, count: int, rows: Array | None, kinds: list[str
     suggested = units.joints_out(arm, next_poses(arm, count, before, fix=kinds)).round(9).tolist()
     with output.destination(out) as write:
         if json:
-            answer = {**render.head(arm), "joint_units": units.names(arm), "poses": suggested}
+            answer = {**render.head(arm), "joint_units": units.unit_names(arm), "poses": suggested}
             write(f"{render.to_json(answer)}\n")
         else:
             write("\n".join([csv_line(arm.joint_names), *map(csv_line, suggested), ""]))

@@ -90,7 +90,7 @@ class Questions:
         from armkin.columns import fk_columns
 
         T = armkin.compile(self.arm).fk(units.joints_in(self.arm, chunk.values)) if self.compiled else None
-        columns = fk_columns.poses(self.arm, chunk.values, T)
+        columns = fk_columns.pose_columns(self.arm, chunk.values, T)
         return columns, columns["within_limits"]
 
     def objects(self, chunk: Chunk) -> Iterator[Fk]:
@@ -122,7 +122,7 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
     violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
     in_scene = render.scene_and_tool(arm)
     joints = chunk.values.tolist()
-    joint_units, head = units.names(arm), render.head(arm)
+    joint_units, head = units.unit_names(arm), render.head(arm)
     for i, pose in enumerate(T):
         answer: Fk = {
             "robot": head["robot"],

@@ -235,14 +235,16 @@ class Questions:
         rounding = _decimal_rounding(self.request.arm, self.task, chunk.values)
         quick = compiled_ik.nearest if self.request.ik is compiled_ik.ik else None
         numbers = chunk.numbers_array()
-        answered = ik_columns.columns(self.request, targets, numbers, self.all_branches, quick, rounding=rounding)
+        answered = ik_columns.branch_columns(
+            self.request, targets, numbers, self.all_branches, quick, rounding=rounding
+        )
         return answered.table, ~answered.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:
         """By way of an object a row, for what is not asked of each row by itself."""
         import numpy as np
 
-        from armkin.columns.table import of_records
+        from armkin.columns.table import table_of_records
 
         measures = ("within_limits", "residual_mm", "residual_deg", "motion")
         heading = ["row", "status", "branch", *self.request.arm.joint_names, *measures]
@@ -251,7 +253,7 @@ class Questions:
         for number, answer in zip(chunk.numbers, self.objects(chunk, with_closest=False), strict=True):
             records += _csv_records(self.request.arm, int(number), answer)
             solved.append(answer["best"] is not None)
-        return of_records(heading, records), np.array(solved)
+        return table_of_records(heading, records), np.array(solved)
 
     def objects(self, chunk: Chunk, with_closest: bool = True) -> Iterator[Ik]:
         """An object a row."""

@@ -38,7 +38,7 @@ def import_(
     """
     from armkin import robot_file
     from armkin.export import conventions
-    from armkin.model.build_arm import build
+    from armkin.model.build_arm import arm_of_file
     from armkin.robot_file import catalogue, urdf_reader
     from armkin.robot_file.robot_file_text import format_robot_file
 
@@ -53,7 +53,7 @@ def import_(
         if option is None:
             raise
         raise UsageError(f"{error}\ngive it with --{option} LINK") from None
-    arm = build(robot_file.parse_robot_file(format_robot_file(imported.data), f"{file} as a robot file"))
+    arm = arm_of_file(robot_file.parse_robot_file(format_robot_file(imported.data), f"{file} as a robot file"))
     document: dict[str, Any] = conventions.dh(arm) if dh else imported.data
     with output.destination(out) as write:
         write(format_robot_file(document, imported.notes))
@@ -69,11 +69,11 @@ def _snap_gain(raw: bytes, imported: UrdfRobot, arm: Arm) -> str | None:
     import numpy as np
 
     from armkin import robot_file
-    from armkin.model.build_arm import build
+    from armkin.model.build_arm import arm_of_file
     from armkin.robot_file import urdf_reader
     from armkin.robot_file.robot_file_text import format_robot_file
 
-    snapped = build(
+    snapped = arm_of_file(
         robot_file.parse_robot_file(
             format_robot_file(urdf_reader.parse_urdf(raw, base=imported.base, tip=imported.tip, snap=True).data)
         )

@@ -45,7 +45,7 @@ def _answer(arm: Arm, task: str | None) -> Info:
         "description": file.description,
         "source": file.source,
         "convention": file.convention,
-        "joint_units": units.names(arm),
+        "joint_units": units.unit_names(arm),
         "joints": [_joint_json(joint) for joint in file.joints],
         "poses": units.poses_out(arm),
         "base": file.base.model_dump(include={"xyz", "rpy"}),
@@ -103,7 +103,7 @@ def _solving_json(arm: Arm, name: str | None) -> Solving:
     from armkin.inverse.redundant.families import described
     from armkin.inverse.solvers.redundant import redundancy
     from armkin.inverse.tasks.choose_task import task_for
-    from armkin.model.arm import actual
+    from armkin.model.arm import actual_arm
 
     try:
         task = task_for(arm, name)
@@ -118,7 +118,7 @@ def _solving_json(arm: Arm, name: str | None) -> Solving:
         "solver": None,
         "ik_refuses": None,
     }
-    if spare := redundancy(actual(arm), task.name):
+    if spare := redundancy(actual_arm(arm), task.name):
         method, why, complete = described(arm, spare)
         solving["redundant"] = arm.joint_names[spare.joint]
         solving["solver"] = {"method": method, "why": why, "complete": complete}

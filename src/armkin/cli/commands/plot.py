@@ -86,13 +86,13 @@ def _check_canvas(out: str | None) -> None:
     from armkin.plot import canvas
 
     if out is not None:
-        canvas.check(out)
+        canvas.check_picture(out)
     else:
         try:
-            canvas.windows()
+            canvas.window_pyplot()
         except UsageError as error:
             raise UsageError(error.message, advice="for example -o arm.png") from None
-    canvas.require()
+    canvas.require_matplotlib()
 
 
 def _draw_pose(arm: Arm, values: list[float], out: str | None, **style: Any) -> None:

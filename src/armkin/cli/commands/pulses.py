@@ -84,7 +84,7 @@ class Questions:
         """The columns, and which rows are within limits."""
         from armkin.columns import fk_columns
 
-        columns = fk_columns.counts(self.arm, chunk.values, self.best)
+        columns = fk_columns.pulse_columns(self.arm, chunk.values, self.best)
         return columns, columns["within_limits"]
 
     def objects(self, chunk: Chunk) -> Iterator[Pulses]:
@@ -136,7 +136,7 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
         "robot_sha256": arm.sha256,
         "motors": motor_names(arm),
         "pulse_units": pulse_units(arm),
-        "joint_units": units.names(arm),
+        "joint_units": units.unit_names(arm),
         "resolution": units.joints_out(arm, resolution(arm)).tolist(),
         "from": origin,
     }

@@ -1,4 +1,4 @@
-/* Of several branches of many targets, the one that moves the joints least: as armkin.columns.ik_columns.nearest, to the same
+/* Of several branches of many targets, the one that moves the joints least: as armkin.columns.ik_columns.nearest_branches, to the same
    bits. */
 #include <math.h>
 #include <stdint.h>

@@ -19,7 +19,7 @@ from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import held_by_near, redundancy
 from armkin.inverse.tasks.task import LARGEST, ROUNDED
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -46,7 +46,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
 
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
     """
-    turned = actual(arm)  # branches are found, and limits hold, in actual joint values
+    turned = actual_arm(arm)  # branches are found, and limits hold, in actual joint values
     task, geometry, spare, numbered = _class_of(turned, task_name)
     solve, branches = candidates_code(turned, task, geometry, single, held=spare)
     names = branch_names(turned, task, geometry, branches)

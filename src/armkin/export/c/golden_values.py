@@ -13,7 +13,7 @@ from armkin.inverse.numeric.newton import null_space
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.task import targets_of
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.model.lock_joints import lock, unlock
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
 
 def _solve_branches(arm: Arm, task: Task, target: Array) -> tuple[Array, Bool, NDArray[np.int8]]:
     """Branches (N, B, n), which are there and their indices (N, B), a redundant joint held at home."""
-    spare = redundancy(actual(arm), task.name)
+    spare = redundancy(actual_arm(arm), task.name)
     held = {} if spare is None or spare.still else {arm.joint_names[spare.joint]: float(arm.home[spare.joint])}
     solutions = ik(lock(arm, held) if held else arm, target, task.name)
     return unlock(arm, held, solutions.q), solutions.valid, solutions.branch
@@ -76,7 +76,7 @@ def _postures(arm: Arm, task: Task, count: int) -> Array:
     low = np.where(np.isfinite(arm.lower), np.maximum(arm.lower, -turn), -turn)
     high = np.where(np.isfinite(arm.upper), np.minimum(arm.upper, turn), turn)
     q = rng.uniform(low, high, (50 * count, arm.n))
-    if spare := redundancy(actual(arm), task.name):
+    if spare := redundancy(actual_arm(arm), task.name):
         q[:, spare.joint] = arm.home[spare.joint]
     branches, valid, _ = _solve_branches(arm, task, targets_of(task, fk(arm, q), q))
     sigma = _least_singular_values(arm, task, branches, valid)

@@ -21,7 +21,7 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.keep_out.bodies import ends_formula
-from armkin.model.arm import actual
+from armkin.model.arm import actual_arm
 from armkin.model.lock_joints import lock
 from armkin.model.rotation import inverse
 from armkin.model.units import radian_or_reach
@@ -48,13 +48,13 @@ def module(arm: Arm, task_name: str | None = None) -> str:
 
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form without Python.
     """
-    if spare := redundancy(actual(arm), task_name):
-        return _with_one_held(arm, actual(arm), spare)
-    return _module_of_all(arm, task_name, driven=not motors.undriven(arm))
+    if spare := redundancy(actual_arm(arm), task_name):
+        return _with_one_held(arm, actual_arm(arm), spare)
+    return _module_of_all(arm, task_name, driven=not motors.undriven_joints(arm))
 
 
 def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
-    turned = actual(arm)  # branches are found, and limits hold, in actual joint values
+    turned = actual_arm(arm)  # branches are found, and limits hold, in actual joint values
     task, named = solver(turned, task_name)
     geometry = plain_form(turned, task, named)
     if not has_form(geometry):
@@ -89,7 +89,7 @@ def _with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
     inner = _module_of_all(other_joints, task.name, driven=False).replace(part_text("head"), "")
     inner = re.sub("^export ", "", inner, flags=re.MULTILINE)
     way = arm.link[-1] if spare.joint else inverse(arm.link[0])
-    driven = not motors.undriven(arm)
+    driven = not motors.undriven_joints(arm)
     redundant = {
         "joint": spare.joint,
         "before": inverse(way).ravel().tolist(),

@@ -31,7 +31,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task, targets_of
 from armkin.model.arm import Arm
-from armkin.model.joint_chain import Chain, axes
+from armkin.model.joint_chain import Chain, joint_axes
 from armkin.model.rotation import joint_motion
 
 WORDS = {"shoulder": ("left", "right"), "elbow": ("elbow up", "elbow down"), "wrist": ("no flip", "flip")}
@@ -159,7 +159,7 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     shape = q.shape[:2]
     flat = np.nan_to_num(q.reshape(-1, arm.n))
     points = _joint_origins(arm, flat)
-    _, directions = axes(Chain(arm.link, arm.prismatic))
+    _, directions = joint_axes(Chain(arm.link, arm.prismatic))
     if abs(directions[min(arm.n, 3) - 1, 2]) >= 0.9:  # the elbow's axis is along the base's z
         # in the base's plane: to the left of the way from the first joint to the tool
         way = points[:, -1] - points[:, 0]

@@ -13,7 +13,7 @@ from armkin.formula.array_shapes import Joints
 from armkin.formula.arrays import Array, Bool, Truth, wrap_angle
 from armkin.forward import one_pose
 from armkin.inverse.numeric import tolerances as tol
-from armkin.model.arm import Arm, actual
+from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK
 
 TURN = 2 * np.pi
@@ -132,7 +132,7 @@ def nearest_number(  # noqa: C901 - of every joint and branch of a pose alone: a
 
 def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
     """Rows (..., n) with every joint at its nearest legal copy, and whether all are within limits: (...)."""
-    if (turned := actual(arm)) is not arm:
+    if (turned := actual_arm(arm)) is not arm:
         rows, legal = nearest_row(turned, q * arm.ratio, near * arm.ratio)
         return rows / arm.ratio, legal
     copies = q.copy(order="K")  # joint after joint, where q is
@@ -177,7 +177,7 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     """
     row = one_pose(arm, q, "q")
     close = one_pose(arm, arm.home if near is None else near, "near")
-    if (turned := actual(arm)) is not arm:
+    if (turned := actual_arm(arm)) is not arm:
         return turns(turned, row * arm.ratio, close * arm.ratio) / arm.ratio
     choices = []
     for i in range(arm.n):

@@ -38,8 +38,8 @@ from armkin.inverse.closed.wrist import Wrist, meeting_point
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.joint_chain import Chain, is_parallel, reverse
-from armkin.model.rotation import inverse, shrunk
+from armkin.model.joint_chain import Chain, is_parallel, reverse_chain
+from armkin.model.rotation import inverse, shrink_translations
 
 
 def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | None:
@@ -48,7 +48,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
         return None
     chain = Chain(arm.link, arm.prismatic)
     for backward, first in product((False, True), (1, 3)):
-        loop = _Loop.of(reverse(chain) if backward else chain, first, tolerance, arm.reach)
+        loop = _Loop.of(reverse_chain(chain) if backward else chain, first, tolerance, arm.reach)
         if loop is not None and not loop.ends.close:
             geometry = _class_of(loop, range(5, -1, -1) if backward else range(6))
             if backward:  # from the tool to the base
@@ -147,7 +147,7 @@ class _Loop:
         """first: the joint (0..5) of the first axis, 1 or 3; points: where they meet, seen before the first and after
         the last of them [units of the reach], None of parallel axes; tolerance: as in `recognise`."""
         self.unit = 1.0 / reach
-        link = shrunk(chain.link, reach)
+        link = shrink_translations(chain.link, reach)
         self.from_base, self.from_tool = pose.constant(inverse(link[0])), pose.constant(inverse(link[6]))
         self.first = first
         self.joints = [(first + k) % 6 for k in (3, 4, 5)]  # a, b and c

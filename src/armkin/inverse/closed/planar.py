@@ -21,7 +21,7 @@ from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.joint_chain import Chain, axes, reverse
+from armkin.model.joint_chain import Chain, joint_axes, reverse_chain
 from armkin.model.rotation import FLIP, inverse
 
 Solve = Callable[[list[Entry], Prefer], tuple[list[Pair], Doubt]]
@@ -31,7 +31,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     """Planar and SCARA arms with as many joints as constraints."""
     if task.name not in ("xy", "xy_theta", "xyz_yaw") or arm.n != task.constraints:
         return None
-    _, w = axes(Chain(arm.link, arm.prismatic))
+    _, w = joint_axes(Chain(arm.link, arm.prismatic))
     lift = next((i for i in range(arm.n) if arm.prismatic[i] and abs(w[i, 2]) > 0.5), None)
     if (task.name == "xyz_yaw") != (lift is not None) or _leaves_plane(w, arm.prismatic, lift) > tolerance:
         return None
@@ -167,7 +167,7 @@ def _known_first(chain: Chain, task: Task, weights: Array) -> Solve:
     """Joint 3 slides, joint 1 turns: the same walked from the tool to the base."""
     level = np.eye(4)  # the tool's frame when all joints are zero, turned so that z is the plane's normal
     level[:3, :3] = _at_zero(chain)[:3, :3].T
-    back = reverse(Chain(np.array([*chain.link[:3], chain.link[3] @ level]), chain.prismatic))
+    back = reverse_chain(Chain(np.array([*chain.link[:3], chain.link[3] @ level]), chain.prismatic))
     two = _two_joints(Chain(back.link[:3], back.prismatic[:2]))
     axis = [float(v) for v in chain.link[0][:2, 3]]
 

@@ -23,7 +23,7 @@ from armkin.inverse.closed.wrist import Wrist, meeting_point
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.joint_chain import Chain, is_parallel, reverse
+from armkin.model.joint_chain import Chain, is_parallel, reverse_chain
 from armkin.model.rotation import inverse
 
 Place = Callable[..., tuple[list[Pair], Doubt]]
@@ -36,7 +36,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     chain = Chain(arm.link, arm.prismatic)
     centre, shoulder = wrist_centre(chain, tolerance * arm.reach), False
     if centre is None:
-        chain, shoulder = reverse(chain), True
+        chain, shoulder = reverse_chain(chain), True
         centre = wrist_centre(chain, tolerance * arm.reach)
     if centre is None or (wrist := SphericalWrist(chain, *centre, tolerance)).close:
         return None

@@ -23,7 +23,7 @@ from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, lin
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
-from armkin.model.joint_chain import Chain, is_parallel, reverse
+from armkin.model.joint_chain import Chain, is_parallel, reverse_chain
 from armkin.model.rotation import inverse
 
 
@@ -36,7 +36,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
         why = "axes 2, 3 and 4 are parallel, axes 5 and 6 meet"
         labels = ("shoulder", "elbow", "wrist")
         return Geometry("three parallel axes", why, True, ThreeParallel(chain).solve, labels=labels)
-    chain = reverse(chain)
+    chain = reverse_chain(chain)
     if not fits(chain, tolerance, arm.reach):
         return None
     solve = walked_back(ThreeParallel(chain).solve)

@@ -17,7 +17,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import tolerances as tol
-from armkin.model.rotation import inverse, shrunk
+from armkin.model.rotation import inverse, shrink_translations
 
 NO_LENGTH = 300.0  # unit [mm] of a chain whose links have no length of their own
 _X = 5  # index of the link of the loop that carries the pose
@@ -42,7 +42,7 @@ class Loop(NamedTuple):
 
     def goal(self, T: Array) -> Array:
         """Targets (N, 4, 4) [mm] as poses of `chain`."""
-        return inverse(self.base) @ shrunk(T, self.length) @ inverse(self.tool)
+        return inverse(self.base) @ shrink_translations(T, self.length) @ inverse(self.tool)
 
 
 def close(link: Array, prismatic: Bool) -> Loop:
@@ -69,7 +69,7 @@ def close(link: Array, prismatic: Bool) -> Loop:
         moved[i + 1, :3, 3] -= move
     size = float(np.linalg.norm(moved[1:6, :3, 3], axis=1).sum()) / 3
     length = size if size > tol.RANK * (1 + float(np.abs(link[:, :3, 3]).max())) else NO_LENGTH
-    moved = shrunk(moved, length)
+    moved = shrink_translations(moved, length)
     return Loop(np.array(prismatic, dtype=np.bool_), moved[0], moved[1:6], moved[6], length)
 
 

@@ -22,7 +22,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
 from armkin.model.arm import Arm
 from armkin.model.joint_chain import is_parallel
-from armkin.model.rotation import inverse, rotation_about, shrunk
+from armkin.model.rotation import inverse, rotation_about, shrink_translations
 
 DEGREE = 8
 Z = np.array([0.0, 0.0, 1.0])
@@ -73,7 +73,7 @@ def boundaries(arm: Arm) -> Boundaries | None:
     """What is constant of an arm of seven joints with such a shoulder and wrist, else None."""
     if arm.n != 7 or arm.prismatic.any():
         return None
-    L = shrunk(arm.link, arm.reach)
+    L = shrink_translations(arm.link, arm.reach)
     shoulder = meeting_point(L[1], L[2], tol.EXACT)
     if shoulder is None or is_parallel(L[5], tol.PARALLEL):
         return None
@@ -108,7 +108,7 @@ class _Held:
 
     def __init__(self, of: Boundaries, target: Array, t: Complex) -> None:
         self.of, self.t = of, t
-        self.target = shrunk(target, of.arm.reach)
+        self.target = shrink_translations(target, of.arm.reach)
         base = of.link[0] @ [*of.shoulder, 1.0]
         shoulder = (of.link[7] @ inverse(self.target) @ base)[:, :3]
         self.to = self.turned(shoulder) + (of.link[6][:3, 3] - of.wrist)[:, None, None]  # the shoulder

@@ -34,8 +34,8 @@ from armkin.inverse.solvers.redundant import Redundancy, moved, nearly_closed
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets
 from armkin.keep_out.clearance import hits_nothing
 from armkin.model import units
-from armkin.model.arm import Arm, actual
-from armkin.model.limits import outside
+from armkin.model.arm import Arm, actual_arm
+from armkin.model.limits import outside_limits
 
 AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 256  # targets whose arm angles are worked on together
@@ -64,7 +64,7 @@ def families(
     angle_class = arm_angle(arm) if free.joint else None
     numbers = (flat_targets(task, values)[0], defect)
     roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
-    stands = (newton.missing(arm, task, nears, goal) <= most) & ~outside(arm, nears).any(axis=1)
+    stands = (newton.missing(arm, task, nears, goal) <= most) & ~outside_limits(arm, nears).any(axis=1)
     rows = _Rows(arm, free.joint, nears, stands)
     chunk = CIRCLES if angle_class else AT_ONCE // SAMPLES if free.by_formula else TRACED
     for k in range(0, len(goal), chunk):
@@ -121,7 +121,7 @@ def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     if free.still:
         why = f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: "
         return f"families of {joint}", why + free.geometry.why, free.geometry.complete
-    turned, complete = actual(arm), False
+    turned, complete = actual_arm(arm), False
     if free.joint and arm_angle(turned) is not None:
         how, complete = "in closed form by the arm angle", True
     elif free.joint and free.by_formula and boundaries(turned) is not None:

@@ -30,7 +30,7 @@ from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_near, read_targets
 from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import Arm
-from armkin.model.limits import outside
+from armkin.model.limits import outside_limits
 
 POOL = 32_768  # postures within limits
 ON_LIMIT = 0.25  # share of their joints that are on a limit
@@ -126,7 +126,7 @@ def _sorted_minima(arm: Arm, task: Task, q: Array, exact: int, target: Array, ne
         return q
     missing = residual(task, fk(arm, q), q, np.broadcast_to(target, (len(q), 4, 4)))
     angle, searched = np.linalg.norm(missing[:, 3:], axis=1), np.arange(len(q)) >= exact
-    good = (np.linalg.norm(missing[:, :3], axis=1) <= tol.SOLUTION * arm.reach) & ~outside(arm, q).any(axis=1)
+    good = (np.linalg.norm(missing[:, :3], axis=1) <= tol.SOLUTION * arm.reach) & ~outside_limits(arm, q).any(axis=1)
     q, angle, searched = q[good], angle[good], searched[good]
     motion = (np.abs(q - near) * np.where(arm.prismatic, 1.0, 180 / np.pi)).sum(axis=1)
     by_angle = np.argsort(angle, kind="stable")

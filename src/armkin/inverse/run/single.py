@@ -25,7 +25,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.near_itself import COARSE, ROOM
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
-from armkin.model.arm import Arm, actual
+from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
@@ -33,7 +33,7 @@ from armkin.model.units import radian_or_reach
 @lru_cache(maxsize=64)
 def short_way(arm: Arm, task: str | None) -> OneTarget | None:
     """The short way of an arm and task, prepared at its first use; None if there is none."""
-    if actual(arm) is not arm or solver(arm, task)[1].pairs is None:
+    if actual_arm(arm) is not arm or solver(arm, task)[1].pairs is None:
         return None
     return OneTarget(arm, task)
 

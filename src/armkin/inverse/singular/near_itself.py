@@ -58,7 +58,7 @@ def take(goals: Goals, batch: Batch, rows: Int) -> Int:
 
 def _taken(goals: Goals, batch: Batch, rows: Int) -> Int:
     arm, task = goals.arm, goals.task
-    rows = rows[~limits.outside(arm, goals.near[rows]).any(axis=1)]
+    rows = rows[~limits.outside_limits(arm, goals.near[rows]).any(axis=1)]
     if not len(rows):
         return rows
     near, target = goals.near[rows], goals.target[rows]
@@ -91,7 +91,7 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> I
         return np.flatnonzero(rounded)
     close = np.broadcast_to(near, (len(target), arm.n))
     rows = reached(arm, task, target, position(arm, near), room=np.where(rounded, most, -1.0))
-    rows = rows[~limits.outside(arm, close[rows]).any(axis=1)]
+    rows = rows[~limits.outside_limits(arm, close[rows]).any(axis=1)]
     return np.asarray(rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]])
 
 

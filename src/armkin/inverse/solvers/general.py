@@ -24,7 +24,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm, from_links
-from armkin.model.joint_chain import Chain, is_parallel, reverse
+from armkin.model.joint_chain import Chain, is_parallel, reverse_chain
 from armkin.model.rotation import inverse, rotation_about
 
 PHASE = 0.7321  # [rad]
@@ -79,10 +79,10 @@ def _with_wrist(arm: Arm, task: Task) -> Geometry | None:
     """Five joints, axes 4 and 5 or 1 and 2 meeting: the closed form with a virtual joint through that point."""
     chain = Chain(arm.link, arm.prismatic)
     for first in (False, True):
-        longer = _lengthened(reverse(chain) if first else chain, tol.EXACT * arm.reach)
+        longer = _lengthened(reverse_chain(chain) if first else chain, tol.EXACT * arm.reach)
         if longer is None:
             continue
-        six = reverse(longer) if first else longer
+        six = reverse_chain(longer) if first else longer
         inner = spherical.recognise(from_links(six.link, six.prismatic.tolist()), _POSE)
         if inner is not None and inner.pairs is not None:
             axes = "1 and 2" if first else "4 and 5"

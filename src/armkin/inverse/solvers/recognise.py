@@ -16,7 +16,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.solvers import general, nearly_special, tool_axis
 from armkin.inverse.tasks.choose_task import default_task, rank, redundant_error, task_for
 from armkin.inverse.tasks.task import Task
-from armkin.model.arm import Arm, actual
+from armkin.model.arm import Arm, actual_arm
 
 
 @lru_cache(maxsize=256)
@@ -71,7 +71,7 @@ def method(arm: Arm, task: str | None = None) -> tuple[str, str, bool]:
     >>> armkin.method(armkin.load("three_dof"))
     ('elbow', 'joints 2 and 3 are parallel', True)
     """
-    geometry = solver(actual(arm), task)[1]
+    geometry = solver(actual_arm(arm), task)[1]
     return geometry.name, geometry.why, geometry.complete
 
 

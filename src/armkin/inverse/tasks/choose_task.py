@@ -12,7 +12,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.tasks.residuals import task_jacobian
 from armkin.inverse.tasks.task import LABELS, Task
 from armkin.model.arm import Arm
-from armkin.model.joint_chain import Chain, axes
+from armkin.model.joint_chain import Chain, joint_axes
 from armkin.model.units import radian_or_reach
 
 NEARLY_PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
@@ -96,7 +96,7 @@ def _free_task(arm: Arm, name: str) -> Task:
 
 
 def _axis_directions(arm: Arm) -> Array:
-    return axes(Chain(arm.link, arm.prismatic))[1]
+    return joint_axes(Chain(arm.link, arm.prismatic))[1]
 
 
 def _parallel_signs(directions: Array, reference: Array) -> NDArray[np.float64]:

@@ -15,8 +15,8 @@ from armkin.inverse.numeric.newton import correct
 from armkin.inverse.numeric.tolerances import CONVERGING
 from armkin.inverse.solve import isolated_branches as ik
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.model.arm import actual
-from armkin.model.limits import outside
+from armkin.model.arm import actual_arm
+from armkin.model.limits import outside_limits
 from armkin.motion.branches.joint_steps import joint_change
 
 if TYPE_CHECKING:
@@ -152,11 +152,11 @@ class Samples:
         arm, task = self.arm, task_for(self.arm, self.task)
         start, loose = q[rows, b], free[rows]
         postures, miss = correct(
-            actual(arm), task, np.where(loose, self.near, start) * arm.ratio, target[rows], steps=_STEPS
+            actual_arm(arm), task, np.where(loose, self.near, start) * arm.ratio, target[rows], steps=_STEPS
         )
         postures /= arm.ratio
         same = np.where(loose, 0.0, np.abs(joint_change(arm, start, postures))).max(axis=1) < _STAYS
-        good = same & (miss <= CONVERGING) & ~outside(arm, postures).any(axis=1)
+        good = same & (miss <= CONVERGING) & ~outside_limits(arm, postures).any(axis=1)
         q[rows[good], b[good]] = postures[good]
         return q
 

@@ -18,7 +18,7 @@ from armkin.board.firmware.segments.counts_to_segments import Counts, Cutter, sp
 from armkin.board.firmware.wire.protocol import STEP, Segment
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian
-from armkin.motors import motor_accel, places
+from armkin.motors import exact_pulses, motor_accel
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -79,8 +79,8 @@ class CurveSegments:
         _SETTLING of the motors' accelerations allow, so that in between nothing is off but the steps themselves.
         """
         duration = self.stretch.duration
-        ends = places(self.arm, self.stretch.evaluate(np.array([0.0, duration])))
-        counts = places(self.arm, self.stretch.evaluate(t))
+        ends = exact_pulses(self.arm, self.stretch.evaluate(np.array([0.0, duration])))
+        counts = exact_pulses(self.arm, self.stretch.evaluate(t))
         for offset, since in ((self.start - ends[0], t), (self.end - ends[1], duration - t)):
             span = np.sqrt(6 * np.abs(offset) / (_SETTLING * motor_accel(self.arm)))  # of f^2 (3 - 2 f)
             f = np.clip(since[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)

@@ -12,7 +12,7 @@ import numpy as np
 from armkin.board.firmware.wire.protocol import STEP
 from armkin.motion.remaining_stretch import remainder
 from armkin.motion.timing.trajectory import Trajectory
-from armkin.motors import joints, places
+from armkin.motors import exact_pulses, joints
 
 if TYPE_CHECKING:
     from armkin.board.firmware.segments.trajectory_to_counts import Cut
@@ -86,7 +86,7 @@ def _refine_time(part: Cut, number: int, guess: float, counts: np.ndarray) -> fl
     t = guess
     for _ in range(8):
         when = np.array([t])
-        distance = counts - places(arm, stretch.evaluate(when))[0]
+        distance = counts - exact_pulses(arm, stretch.evaluate(when))[0]
         speed = stretch.evaluate(when, 1)[0] @ arm.motor_gain.T
         if speed @ speed < 1.0:  # slower than a step a second: at rest, or all but
             break

@@ -163,7 +163,7 @@ def _too_fast(arm: Arm, stretch: Stretch, rates: Array, allowed: float) -> RateE
     k = int(rates.argmax())
     top = stretch.top_speed
     joint = int(np.argmax(np.abs(arm.motor_gain[k]) * top))
-    unit, word = float(units.scale(arm)[joint]), f"{units.names(arm)[joint]}/s"
+    unit, word = float(units.joint_scale(arm)[joint]), f"{units.unit_names(arm)[joint]}/s"
     return RateError(
         f"joint {arm.joint_names[joint]} at {top[joint] / unit:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
         f"{motor_names(arm)[k]}; the board makes {allowed:,.0f}",
