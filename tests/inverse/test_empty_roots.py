@@ -51,7 +51,7 @@ def test_no_root_of_a_branch_is_called_empty(name: int | str, monkeypatch: pytes
     branches = method.solve(elimination, T).q
     count = 0
     for pencil in elimination.plans[:3]:
-        seed, joint = roots.seeds(pencil, inverse(closed.goal(T)), 0.02), pencil.hidden_joint
+        seed, joint = roots.root_seeds(pencil, inverse(closed.goal(T)), 0.02), pencil.hidden_joint
         unit = closed.length if arm.prismatic[joint] else 1.0
         away = np.abs(branches[seed.pose, :, joint] / unit - seed.q[:, None, joint])
         away = np.where(np.isnan(away), np.inf, away if arm.prismatic[joint] else np.abs(np.angle(np.exp(1j * away))))

@@ -12,7 +12,7 @@ from test_every_branch import shipped
 import armkin
 from armkin import Status
 from armkin.inverse.numeric import newton
-from armkin.inverse.numeric.newton import missing as missed
+from armkin.inverse.numeric.newton import misses as missed
 
 CASES = [
     # joint 4 is outside its limits where joint 1 is closest to home, and not where it is turned

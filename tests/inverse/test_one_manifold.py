@@ -82,7 +82,7 @@ def test_manifolds_on_both_sides_of_a_straight_wrist_are_rows_of_their_own() -> 
         r, J = newton.scaled(arm, solutions.task, across, goals)
         step = np.linalg.pinv(np.delete(J, 3, axis=2), rcond=1e-10) @ r[:, :, None]
         across += np.insert(step[:, :, 0], 3, 0.0, axis=1)
-    size = newton.missing(arm, solutions.task, across, goals)
+    size = newton.misses(arm, solutions.task, across, goals)
     assert (size[:181].max() > 2e-9) & (size[180:].max() > 2e-9)
     assert np.median(size) < 5e-10
 
@@ -93,7 +93,7 @@ def test_nothing_is_sought_that_crosses_a_manifold_of_which_all_is_known(monkeyp
     T = armkin.fk(arm, SHORT)
     before = armkin.ik(arm, T)
     assert before.status == armkin.Status.SINGULAR
-    monkeypatch.setattr(crossings, "beside", None)
+    monkeypatch.setattr(crossings, "postures_beside", None)
     np.testing.assert_array_equal(armkin.ik(arm, T).q, before.q)
 
 

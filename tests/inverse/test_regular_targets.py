@@ -13,7 +13,7 @@ from test_every_branch import shipped
 import armkin
 from armkin import Status
 from armkin.inverse.answers.batch import Examined, Goals
-from armkin.inverse.closed.candidates import recorded
+from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.numeric import newton
 from armkin.inverse.singular import components
 from armkin.inverse.solvers.recognise import solver
@@ -124,7 +124,7 @@ def test_no_targets_have_no_candidates(name: str) -> None:
     """A compiled batch may leave none to ask the formulas about; every target has as many columns."""
     arm = armkin.load(name)
     task, geometry = solver(arm, None)
-    formula = recorded(arm, task, geometry)
+    formula = recorded_formula(arm, task, geometry)
     target = targets_of(task, armkin.fk(arm, np.zeros((2, arm.n))), np.zeros((2, arm.n)))
     two, none = formula.rows(target), formula.rows(target[:0])
     assert [x.shape for x in none] == [(0, *x.shape[1:]) for x in two]

@@ -98,8 +98,8 @@ def test_a_wide_pencil_has_the_joints_of_its_pose(hidden: int) -> None:
     for wide in (False, True):
         errors = []
         for role in roles(closed.prismatic, 0, (hidden,), wide):
-            built = pencil.build(role, closed.links, closed.prismatic, choose_variable.PSI[0])
-            seed = roots.seeds(built, inverse(goal), 0.02, part=True)
+            built = pencil.build_pencil(role, closed.links, closed.prismatic, choose_variable.PSI[0])
+            seed = roots.root_seeds(built, inverse(goal), 0.02, part=True)
             for pose, q in enumerate(known_q):
                 step = q[~np.isnan(q[:, 0])][:, None] - seed.q[seed.pose == pose]
                 errors += np.abs(np.angle(np.exp(1j * step))).max(axis=2).min(axis=1, initial=9.0).tolist()
@@ -113,9 +113,10 @@ def test_only_what_stands_so_is_special() -> None:
     elimination = method.prepare(arm.link, arm.prismatic)
     for kind, expected in (("parallel", choose_variable.Kind.PARALLEL), ("meeting", choose_variable.Kind.MEETING)):
         assert (
-            choose_variable.kinds(elimination.loop, elimination.loop.goal(targets(arm, kind, 50))) == expected
+            choose_variable.pose_kinds(elimination.loop, elimination.loop.goal(targets(arm, kind, 50))) == expected
         ).all()
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (500, 6))
     assert (
-        choose_variable.kinds(elimination.loop, elimination.loop.goal(armkin.fk(arm, q))) == choose_variable.Kind.PLAIN
+        choose_variable.pose_kinds(elimination.loop, elimination.loop.goal(armkin.fk(arm, q)))
+        == choose_variable.Kind.PLAIN
     ).mean() > 0.95

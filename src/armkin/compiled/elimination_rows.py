@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.closed.geometry import Rows
-from armkin.inverse.solvers.nearly_special import named
+from armkin.inverse.solvers.nearly_special import name_branches
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -31,7 +31,7 @@ class InC:
         """unnamed: the elimination without names; branches, joints: those that a row of C has room for."""
         self._complete, self._slow = unnamed.complete, geometry.unmoved or unnamed.rows
         self._call, self._shape = call, (branches, joints)
-        rows = named(self._rows, geometry) if geometry.places else self._rows
+        rows = name_branches(self._rows, geometry) if geometry.places else self._rows
         self.geometry = replace(geometry, rows=rows, unmoved=None)
 
     def settles(self, target: Array) -> Bool:

@@ -256,7 +256,6 @@ def _descend_by_damped_steps(arm: Arm, task: Task, q: Array, target: Array, step
 
 def _cost(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Squared weighted residual (M,)."""
-    r = residual(task, fk(arm, q), q, target)
-    r[:, : task.position] /= arm.reach
+    r = newton.residuals(arm, task, q, target)
     r[:, task.position :] *= 0.25
     return np.asarray(np.einsum("mr,mr->m", r, r))

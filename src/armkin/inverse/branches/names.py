@@ -140,7 +140,7 @@ def _sample_postures(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, A
     values = np.broadcast_arrays(*cast("list[Array]", candidates.values()))
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
     # branch by branch, by the formulas of a small batch: those of a large one would be recorded for this alone
-    missing = np.stack([newton.missing(arm, task, branch, goal) for branch in q.swapaxes(0, 1)], axis=1)
+    missing = np.stack([newton.misses(arm, task, branch, goal) for branch in q.swapaxes(0, 1)], axis=1)
     edge = np.broadcast_to(candidates.doubt.edge, values[0].shape).reshape(q.shape[1], -1).T
     return postures, q, (missing < tol.SOLUTION) & ~edge
 

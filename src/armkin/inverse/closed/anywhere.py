@@ -132,12 +132,12 @@ class _Ends:
         constant, cosine, sine = _combination(self.alone, sides)
         right = arrays.mul(-1.0, constant)
         last, doubt = sub.linear(cosine, sine, right, 0, 1.0, prefer[2], sub.one_root(cosine, sine, right))
-        last = sub.normalised(last)
+        last = sub.on_unit_circle(last)
         fx, fy = (self.main @ self.A).tolist()
         a = arrays.add(arrays.mul(fx, e[0]), arrays.mul(fy, e[1]))
         b = arrays.sub(arrays.mul(fx, e[1]), arrays.mul(fy, e[0]))
         first, doubt_a = sub.linear(a, b, _affine_at(_combination(self.main, sides), last), 1, 1.0, prefer[0])
-        return sub.normalised(first), last, doubt | doubt_a
+        return sub.on_unit_circle(first), last, doubt | doubt_a
 
 
 class _Loop:

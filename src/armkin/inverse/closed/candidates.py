@@ -56,7 +56,7 @@ class Recorded:
     def _of(self, candidates: Candidates, goal: list[Entry]) -> list[Entry]:
         miss = candidates.miss
         if miss is None:
-            miss, *turns = _misses(self.arm, self.task, self.link, candidates.pairs, goal)
+            miss, *turns = _squared_misses(self.arm, self.task, self.link, candidates.pairs, goal)
             for turn in turns:
                 miss = miss + turn
         values = candidates.values()
@@ -69,7 +69,7 @@ class Recorded:
         assert self.geometry.pairs is not None
         candidates = self.geometry.pairs(goal, prefer)
         *values, miss, edge, free = self._of(candidates, goal)
-        length, *turns = _misses(self.arm, self.task, self.link, candidates.pairs, goal, every=True)
+        length, *turns = _squared_misses(self.arm, self.task, self.link, candidates.pairs, goal, every=True)
         angle: Entry = 0.0
         for turn in turns:  # three axes are a turn's square off twice over
             angle = arrays.add(angle, arrays.mul(1.0 / max(len(turns) - 1, 1), turn))
@@ -93,7 +93,7 @@ class Recorded:
     def with_values(self, target: Array, values: Array) -> Array:
         """Candidates of targets N for values (N, n) of the joints that are free, (N, B, n + 1): the last their squared
         residuals."""
-        flat = entries(self.task, target)
+        flat = target_entries(self.task, target)
         for v, slides in zip(np.ascontiguousarray(values.T), self.arm.prismatic, strict=True):
             flat += [v] if slides else [np.cos(v), np.sin(v)]
         columns = list(self._preferring.run(flat, self._preferring.workspace(len(target))))
@@ -102,14 +102,14 @@ class Recorded:
     def in_numbers(self, target: Array) -> list[Array]:
         """`candidates` to the last digit the same, whatever a target is asked together with."""
         if len(target) > FEW:
-            return self.code.run_exactly(entries(self.task, target))
+            return self.code.run_exactly(target_entries(self.task, target))
         full = self.task.orientation == "full"
         return self.code.one_by_one([pose.read_one(row) if full else row.tolist() for row in target])
 
     def rows(self, target: Array) -> tuple[Array, Array, Bool]:
         """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
         N = len(target)
-        columns = list(self.code.run(entries(self.task, target), self.code.workspace(N)))
+        columns = list(self.code.run(target_entries(self.task, target), self.code.workspace(N)))
         *_, miss, edge, _ = rows = np.moveaxis(as_rows(columns, N), 2, 0)
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
@@ -131,7 +131,7 @@ class Recorded:
         chosen = np.where(linkage[:, None, None], chosen & of_linkage[:, None], miss < tol.HOPELESS**2)
         more = [_each_once(np.where((chosen & lost[:, None, None])[..., None], q, np.nan))]
         solving = np.where((miss < tol.SEED**2)[..., None], q, np.nan)
-        meeting = crossings.beside(self.arm, self.task, solving, target)
+        meeting = crossings.postures_beside(self.arm, self.task, solving, target)
         apart = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
         same = np.where(np.isnan(apart), 0.0, apart).max(axis=3) < tol.TURNED
         meeting[np.any(same & of_linkage[:, None], axis=2)] = np.nan  # on a self-motion of which all circuits are known
@@ -204,7 +204,7 @@ def _each_once(q: Array) -> Array:
 def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
     """Whether a closed form gives random postures back without a correction: its quartic may be ill-conditioned."""
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 8, 1.0)
-    _, miss, _ = recorded(arm, task, geometry).rows(fk(arm, q))
+    _, miss, _ = recorded_formula(arm, task, geometry).rows(fk(arm, q))
     return int((miss.min(axis=1) <= tol.ACCEPTED**2).sum()) >= 15
 
 
@@ -218,17 +218,17 @@ def as_rows(values: Sequence[ArrayLike], count: int) -> Array:
 
 
 @lru_cache(maxsize=256)
-def recorded(arm: Arm, task: Task, geometry: Geometry) -> Recorded:
+def recorded_formula(arm: Arm, task: Task, geometry: Geometry) -> Recorded:
     """The same for all calls of one solver."""
     return Recorded(arm, task, geometry)
 
 
-def entries(task: Task, goal: Array) -> list[Entry]:
+def target_entries(task: Task, goal: Array) -> list[Entry]:
     """Targets (N, m) or (N, 4, 4) as arrays of length N."""
     return pose.read_pose(goal) if task.orientation == "full" else list(np.ascontiguousarray(goal.T))
 
 
-def _misses(
+def _squared_misses(
     arm: Arm, task: Task, link: list[pose.Pose], pairs: list[Pair], goal: list[Entry], every: bool = False
 ) -> list[Entry]:
     """Squared distances of every branch: of the tool's point, in units of the reach, and of its axes.

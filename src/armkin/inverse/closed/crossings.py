@@ -23,7 +23,7 @@ ONE = 0.13  # [rad, reaches] places closer than this are one: half a step of a j
 STEP = 1.0  # [rad, reaches] joints that move farther from one step to the next are not on one curve
 
 
-def beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Postures (N, M, n) beside the crossings of B self-motions, q (N, steps, B, n) all round; nan where there is none.
 
     A step off, in the plane of the two null directions, leads onto the other self-motion.

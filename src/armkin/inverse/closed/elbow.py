@@ -93,7 +93,7 @@ class Elbow:
         first, second, third = pairs
         v = pose.turn_direction(self.from_base, v)
         v = pose.turn_back(self.shoulder, v if first.s is None else spin(first.c, -first.s, v))
-        c, s = together(second, third, self.two_link.sense)
+        c, s = added_angles(second, third, self.two_link.sense)
         return pose.turn_back(self.to_fore, spin(c, -s, v))
 
 
@@ -131,7 +131,7 @@ class TwoLink:
         return [arrays.add(self.lx, x), arrays.add(self.ly, y), 0.0]
 
 
-def together(first: Pair, second: Pair, sense: float) -> Pair:
+def added_angles(first: Pair, second: Pair, sense: float) -> Pair:
     """Two angles about one direction: their sum, or with sense -1 their difference."""
     s2 = arrays.mul(sense, second.s)
     return Pair(first.c * second.c - first.s * s2, first.s * second.c + first.c * s2)
@@ -161,7 +161,7 @@ class ThreeLink:
         # x = Rz(q2 +- q3 +- q4) turned
         tx, ty = self.turned
         c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
-        c23, s23 = together(second, third, self.sense3)
+        c23, s23 = added_angles(second, third, self.sense3)
         fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
         # its angle is what is left of the sum: one arctangent for both elbows
         q2, q3 = (arrays.arctan2(pair.s, pair.c) for pair in (second, third))

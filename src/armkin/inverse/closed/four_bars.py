@@ -87,9 +87,9 @@ def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
     side[i, s] = sides(arm, q[k[i], s, b[i]], joints[k[i], b[i]], joint[i])
     motion = np.abs(newton.difference(arm, q[k, :, b], near[k, None])).sum(axis=2)
     motion = np.where(solved, motion, np.inf)
-    nearest = [np.where(side == way, motion, np.inf) for way in (False, True)]
     chosen[k, :, b] = False
-    for part in nearest:
+    for way in (False, True):
+        part = np.where(side == way, motion, np.inf)
         rows = np.isfinite(part).any(axis=1)
         chosen[k[rows], part[rows].argmin(axis=1), b[rows]] = True
     return chosen, held

@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry, Truth
-from armkin.inverse.closed.elbow import together
+from armkin.inverse.closed.elbow import added_angles
 from armkin.inverse.closed.geometry import ClosedForm
 from armkin.inverse.closed.precision import precision
 from armkin.inverse.closed.subproblems import Candidates, Pair, spin
@@ -75,12 +75,12 @@ class NewtonSteps:
         pairs = self._turned(pairs, -1.0)
         if self.absent is not None:
             left = left & (arrays.dot(first, first) < self.absent)
-        return Candidates(pairs, seeds.doubt | (_merged(pairs, self.unit) & solving) | left, miss)
+        return Candidates(pairs, seeds.doubt | (_merged_branches(pairs, self.unit) & solving) | left, miss)
 
     def _turned(self, pairs: list[Pair], sense: float) -> list[Pair]:
         """Joints as the links without their turns have them, or with sense -1 back."""
         joints = zip(pairs, self.offset, strict=True)
-        return [pair if pair.s is None else together(pair, offset, sense) for pair, offset in joints]
+        return [pair if pair.s is None else added_angles(pair, offset, sense) for pair, offset in joints]
 
     def _linear(self, pairs: list[Pair], point: list[Entry]) -> tuple[list[Entry], list[list[Entry]]]:
         """What the point still misses, and its change with each of the first joints [reaches a radian or reach].
@@ -128,7 +128,7 @@ class NewtonSteps:
             for k, turn in enumerate(turns):
                 sense = float(k == i) if i < self.size else self.follow[i - self.size][k]
                 if sense:
-                    turned = together(turned, turn, sense)
+                    turned = added_angles(turned, turn, sense)
             moved.append(turned)
         return moved
 
@@ -158,7 +158,7 @@ def _links_without_turns(arm: Arm) -> tuple[Array, list[float]]:
     return link, turns
 
 
-def steps(arm: Arm, task: Task, distance: float, seeds: ClosedForm) -> tuple[ClosedForm, bool] | None:
+def corrected_form(arm: Arm, task: Task, distance: float, seeds: ClosedForm) -> tuple[ClosedForm, bool] | None:
     """A closed form of an arm that misses a class by so much, and whether it counts all roots; None where it has none.
 
     seeds: the closed form of the class.
@@ -172,7 +172,7 @@ def steps(arm: Arm, task: Task, distance: float, seeds: ClosedForm) -> tuple[Clo
     return (lambda goal, prefer: newton.corrected(seeds(goal, prefer), goal)), newton.counted
 
 
-def _merged(pairs: list[Pair], unit: list[float]) -> Truth:
+def _merged_branches(pairs: list[Pair], unit: list[float]) -> Truth:
     """Whether a branch is one with another, on any of the branch axes."""
     merged: Truth = False
     for axes in ((0,), (1,), (0, 1)):

@@ -150,7 +150,7 @@ def linear(
     cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
     sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
     nearly = h2 < close.nearly_free * scale * scale
-    return _prefer(Pair(cos, sin), h2 < least, prefer), Doubt(edge | nearly, free)
+    return _with_preferred(Pair(cos, sin), h2 < least, prefer), Doubt(edge | nearly, free)
 
 
 def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
@@ -161,7 +161,7 @@ def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
     return discriminant
 
 
-def normalised(pair: Pair) -> Pair:
+def on_unit_circle(pair: Pair) -> Pair:
     """The pair on the unit circle: the closest angle where `linear` found no real root."""
     size = arrays.sqrt(arrays.maximum(pair.c * pair.c + pair.s * pair.s, tol.TINY))
     return Pair(pair.c / size, pair.s / size)
@@ -189,10 +189,10 @@ def rotation_between(
         free, nearly = h2 < least * least, h2 < (close.nearly_free * scale * scale) ** 2
         inverse = 1.0 / arrays.sqrt(arrays.maximum(h2, least * least))
         c, s = c * inverse, s * inverse
-    return _prefer(Pair(c, s), free, prefer), Doubt(nearly, free)
+    return _with_preferred(Pair(c, s), free, prefer), Doubt(nearly, free)
 
 
-def _prefer(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
+def _with_preferred(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
     """The pair, with the preferred angle where it is free."""
     if prefer is None or not np.any(free):
         return pair
@@ -264,14 +264,13 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
         [u * M[1][1] - b * v, M[0][0] * v - b * u, b * b - M[0][0] * M[1][1]],
     ]
     squares = [columns[i][i] for i in range(3)]
-    column = _longest(squares, columns)
-    down = 1.0 / arrays.sqrt(
-        arrays.maximum(arrays.maximum(squares[0], arrays.maximum(squares[1], squares[2])), tol.ROUNDING)
-    )
+    column = _longest_vector(squares, columns)
+    largest = arrays.maximum(squares[0], arrays.maximum(squares[1], squares[2]))
+    down = 1.0 / arrays.sqrt(arrays.maximum(largest, tol.ROUNDING))
     px, py, pz = (down * value for value in column)
     rows = [[M[0][0], b - pz, u + py], [b + pz, M[1][1], v - px], [u - py, v + px, M[2][2]]]
     flipped = [list(row) for row in zip(*rows, strict=True)]
-    lines = [_longest([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
+    lines = [_longest_vector([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
     lx, ly, lz = (arrays.where(signs(0) > 0.0, *entries) for entries in zip(*lines, strict=True))
     # a line at infinity has no direction
     lx = lx + tol.UNDERFLOW
@@ -282,7 +281,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     root, slope = _on_conic(pair, real, a, b, u, v, w)
     merging = (real & (arrays.absolute(slope) < tol.MERGING)) | ((disc < 0.0) & (-disc < tol.TOUCHING**2 * h2))
     free = conic_size * size < tol.NO_SIZE * scale
-    return _prefer(root, free, prefer), Doubt(merging | triple | free, free)
+    return _with_preferred(root, free, prefer), Doubt(merging | triple | free, free)
 
 
 def _on_conic(pair: Pair, real: Truth, a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Pair, Entry]:
@@ -323,9 +322,8 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     c, s = arrays.cos_sin(arrays.arctan2(root, -q) / 3.0)
     most = size * c
     least = -0.5 * size * (c + np.sqrt(3.0) * s)
-    span = (
-        arrays.sqrt(h) + tol.NO_SIZE
-    )  # at an end, where two roots are double, rounding must not choose the double one
+    # at an end, where two roots are double, rounding must not choose the double one
+    span = arrays.sqrt(h) + tol.NO_SIZE
     above = arrays.maximum(most + third - span, 0.0)
     below = arrays.maximum(-span - least - third, 0.0)
     # the middle root is -(most + least): the wider gap is at the largest if most + least > 0 ... and the reverse
@@ -338,7 +336,7 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     return x, arrays.absolute(slope) < tol.LEVEL_ROOT
 
 
-def _longest(sizes: Sequence[Entry], vectors: Sequence[Sequence[Entry]]) -> list[Entry]:
+def _longest_vector(sizes: Sequence[Entry], vectors: Sequence[Sequence[Entry]]) -> list[Entry]:
     """That of three vectors whose size is the largest."""
     later = sizes[1] > sizes[0]
     size = arrays.maximum(sizes[0], sizes[1])

@@ -184,7 +184,7 @@ class Position:
             a, b, c = alone[1], alone[2], arrays.mul(-1.0, alone[0])
             # rounding parts a double root by 1e-8; where the tip is then on axis 2, joint 2 must be seen to be free
             third, doubt = sub.linear(a, b, c, 0, size, prefer[2], sub.one_root(a, b, c))
-            third = sub.normalised(third)
+            third = sub.on_unit_circle(third)
         y = self._tip(third)
         main = self._affine(self.main, sides)
         right = _at_joint(main, third)
@@ -193,7 +193,7 @@ class Position:
         b = arrays.sub(arrays.mul(ay, y[0]), arrays.mul(ax, y[1]))
         second, doubt2 = sub.linear(a, b, right, 1, size, prefer[1])
         # without a real third joint, the nearest one may well bring the tip onto axis 2: nothing is free there
-        return third, sub.normalised(second), doubt | doubt2.where(_solves(alone, third, size))
+        return third, sub.on_unit_circle(second), doubt | doubt2.where(_is_root(alone, third, size))
 
     def _slide(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         """Joint 2 prismatic: g = y + d2 z."""
@@ -245,7 +245,7 @@ class Position:
                 raise UsageError("the three joints cannot place a point: they slide in one plane")
             return Pair(arrays.mul(-1.0 / slope, constant), None), Doubt(np.zeros(1, bool))
         third, doubt = sub.linear(slope, sine, arrays.mul(-1.0, constant), 0, size, prefer[2])
-        return sub.normalised(third), doubt
+        return sub.on_unit_circle(third), doubt
 
 
 def _at_joint(terms: list[Entry], joint: Pair) -> Entry:
@@ -256,7 +256,7 @@ def _at_joint(terms: list[Entry], joint: Pair) -> Entry:
     return total if len(terms) < 6 else arrays.add(total, arrays.mul(terms[3], joint.c * joint.c))
 
 
-def _solves(six: list[Entry], third: Pair, length: Entry) -> Truth:
+def _is_root(six: list[Entry], third: Pair, length: Entry) -> Truth:
     """Whether joint 3 is a root of its equation, or nearly one; length: of the arm, as at zero all terms vanish."""
     third_power = third.s if third.s is not None else third.c * third.c
     terms = [six[0], arrays.mul(six[1], third.c), arrays.mul(six[2] if third.s is not None else six[3], third_power)]

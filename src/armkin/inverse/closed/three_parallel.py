@@ -32,28 +32,28 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     if task.name != "pose" or arm.n != 6 or arm.prismatic.any():
         return None
     chain = Chain(arm.link, arm.prismatic)
-    if fits(chain, tolerance, arm.reach):
+    if has_three_parallel(chain, tolerance, arm.reach):
         why = "axes 2, 3 and 4 are parallel, axes 5 and 6 meet"
         labels = ("shoulder", "elbow", "wrist")
         return Geometry("three parallel axes", why, True, ThreeParallel(chain).solve, labels=labels)
     chain = reverse_chain(chain)
-    if not fits(chain, tolerance, arm.reach):
+    if not has_three_parallel(chain, tolerance, arm.reach):
         return None
     solve = walked_back(ThreeParallel(chain).solve)
     return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve)
 
 
-def fits(chain: Chain, tolerance: float, reach: float) -> bool:
+def has_three_parallel(chain: Chain, tolerance: float, reach: float) -> bool:
     """Whether axes 2, 3 and 4 are parallel, axes 1 and 5 are not, and axes 5 and 6 meet."""
     L1, L2, L3, L4, L5 = chain.link[1:6]
     if not (is_parallel(L2, tolerance) and is_parallel(L3, tolerance)):
         return False
     if any(is_parallel(L, max(tolerance, tol.PARALLEL)) for L in (L1, L4, L5)):
         return False
-    return float(np.hypot(*_meeting(L5)[1])) <= tolerance * reach
+    return float(np.hypot(*_meeting_of_axes(L5)[1])) <= tolerance * reach
 
 
-def _meeting(L5: Array) -> tuple[float, Array]:
+def _meeting_of_axes(L5: Array) -> tuple[float, Array]:
     """Height on axis 6 of its point nearest to axis 5, and that point's distance from axis 5 (2,)."""
     t, b = L5[:2, 3], L5[:2, 2]
     height = -float(t @ b) / float(b @ b)
@@ -70,7 +70,7 @@ class ThreeParallel:
         self.shoulder = pose.constant(L1)
         self.to_joint2 = pose.constant(inverse(L1))
         self.back5, self.back4 = pose.constant(inverse(L5)), pose.constant(inverse(L4))
-        self.height6, _ = _meeting(L5)
+        self.height6, _ = _meeting_of_axes(L5)
         self.scale = max(float(np.abs(chain.link[1:6, :3, 3]).max()), tol.NO_LENGTH)
         # common direction of the parallel axes, along joint 2's, seen from joint 5
         self.three_link = ThreeLink(L2, L3)

@@ -13,7 +13,7 @@ from armkin.model.joint_chain import is_parallel
 from armkin.model.rotation import inverse
 
 
-def foot(L: Array) -> Array:
+def perpendicular_foot(L: Array) -> Array:
     """The foot, on the axis before a link, of its common perpendicular with the axis behind, not parallel: (3,)."""
     # the axis before is the z axis, the one behind the line t + s w
     t, w = L[:3, 3], L[:3, 2]
@@ -24,7 +24,7 @@ def meeting_point(L4: Array, L5: Array, tolerance: float) -> tuple[Array, Array]
     """Where the axes on both sides of two links meet: seen before the first joint and after the last one, or None."""
     if is_parallel(L4, tol.PARALLEL) or is_parallel(L5, tol.PARALLEL):
         return None
-    at4 = foot(L4)
+    at4 = perpendicular_foot(L4)
     at5 = (inverse(L4) @ [*at4, 1.0])[:3]
     at6 = (inverse(L5) @ [*at5, 1.0])[:3]
     if np.hypot(*at5[:2]) > tolerance or np.hypot(*at6[:2]) > tolerance:

@@ -18,8 +18,8 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination import closed_loop, roots
 from armkin.inverse.elimination.closed_loop import Loop, Role, roles
-from armkin.inverse.elimination.passes import TILT, attempt
-from armkin.inverse.elimination.pencil import Pencil, build
+from armkin.inverse.elimination.passes import TILT, run_pass
+from armkin.inverse.elimination.pencil import Pencil, build_pencil
 from armkin.inverse.elimination.polish import jacobian, refine, tip
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import inverse
@@ -69,7 +69,7 @@ class Elimination:
         return {Kind.PLAIN: self.plans}
 
 
-def kinds(closed: Loop, goal: Array) -> Int:
+def pose_kinds(closed: Loop, goal: Array) -> Int:
     """The `Kind` of poses (N, 4, 4) of the loop's chain, (N,): all but parallel counts as parallel."""
     kind = np.zeros(len(goal), np.int64)
     if closed.prismatic[[0, 5]].any():
@@ -89,30 +89,30 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
         link: (7, 4, 4) [mm].
         prismatic: (6,): Z is a shift along z instead of a turn about it.
     """
-    closed = closed_loop.close(link, prismatic)
+    closed = closed_loop.close_loop(link, prismatic)
     if np.sum(prismatic) >= 3:
         return Elimination(closed, (), -np.inf)
     rng = np.random.default_rng(5)
     q = rng.uniform(-np.pi, np.pi, (SAMPLES, 6))
     q[:, prismatic] = rng.uniform(-1, 1, (SAMPLES, int(np.sum(prismatic))))
-    goal, size = poses(closed, q)
+    goal, size = sample_poses(closed, q)
     # Collinear axes, say: no solution is isolated and no role can do better.
     redundant = bool(np.all(size < tol.RANK))
     rated: list[_Rating] = []
     # The first slots nearly always do; some arms with two prismatic joints need the others.
     for slot, hidden in _SEARCH:
         rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden)]
-        if _enough(rated, redundant, len(hidden) > 1):
+        if _enough_roles(rated, redundant, len(hidden) > 1):
             break
     rated.sort(key=lambda rating: rating.cost)
     if not redundant and (rated[0].error >= HEALTHY or rated[0].left_open > MANY):  # beside a spherical wrist, say
         for slot, hidden in _WIDE:
             rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden, wide=True)]
         rated.sort(key=lambda rating: rating.cost)
-    return Elimination(closed, _sequence(closed, rated), rated[0].error)
+    return Elimination(closed, _pencil_sequence(closed, rated), rated[0].error)
 
 
-def poses(closed: Loop, q: Array) -> tuple[Array, Array]:
+def sample_poses(closed: Loop, q: Array) -> tuple[Array, Array]:
     """Poses (N, 4, 4) of the loop's chain at q (N, 6), and their Jacobians' smallest singular values (N,)."""
     frame, joints = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
     goal = np.tile(np.eye(4), (len(q), 1, 1))
@@ -121,14 +121,14 @@ def poses(closed: Loop, q: Array) -> tuple[Array, Array]:
     return goal, np.asarray(size[:, -1], np.float64)
 
 
-def _sequence(closed: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
+def _pencil_sequence(closed: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
     """The pencils of all passes, from ratings in their order."""
     first = rated[0].pencil
     alternatives = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
     # Equal roots of one joint are rarely equal in another: hide another joint early.
     hidden_joint = first.hidden_joint
     alternatives.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
-    again = build(first.role, closed.links, closed.prismatic, PSI[1])
+    again = build_pencil(first.role, closed.links, closed.prismatic, PSI[1])
     plans = [first, *alternatives[:1], again, *alternatives[1:]]
     while len(plans) < len(tol.SHAKES):
         plans.append(plans[-2])
@@ -138,10 +138,10 @@ def _sequence(closed: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
 def _of_special_poses(elimination: Elimination, kind: Kind) -> tuple[Pencil, ...]:
     """Pencils for poses of a kind: those of all others if they do, else the best of these and of wide ones."""
     closed = elimination.loop
-    q = _postures(closed, kind)
+    q = _special_postures(closed, kind)
     if len(q) < SAMPLES:  # the arm cannot stand there
         return elimination.plans
-    goal = poses(closed, q)[0]
+    goal = sample_poses(closed, q)[0]
     usual = list({id(pencil): pencil for pencil in elimination.plans}.values())
     rated = [_rate(closed, pencil.role, q, goal) for pencil in usual if pencil.psi == PSI[0]]
     if rated[0].error < HEALTHY:
@@ -151,16 +151,16 @@ def _of_special_poses(elimination: Elimination, kind: Kind) -> tuple[Pencil, ...
         if len([rating for rating in rated if rating.error < EXCELLENT]) >= 3:
             break
     rated.sort(key=lambda rating: rating.cost)
-    return _sequence(closed, rated)
+    return _pencil_sequence(closed, rated)
 
 
-def _postures(closed: Loop, kind: Kind) -> Array:
+def _special_postures(closed: Loop, kind: Kind) -> Array:
     """Regular postures (N, 6) at random poses of a kind, at most `SAMPLES`."""
     rng = np.random.default_rng(7)
     count = SAMPLES * STARTS
     q = rng.uniform(-np.pi, np.pi, (2, count, 6))
     q[:, :, closed.prismatic] /= np.pi
-    goal = poses(closed, q[0])[0]
+    goal = sample_poses(closed, q[0])[0]
     if kind is Kind.PARALLEL:
         c, s = np.cos(q[0, :, 0]), np.sin(q[0, :, 0])
         up = np.where(rng.random(count) < 0.5, 1.0, -1.0)
@@ -192,7 +192,7 @@ _SEARCH: list[tuple[int, tuple[int, ...]]] = [
 _WIDE = _SEARCH[:6]
 
 
-def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
+def _enough_roles(rated: list[_Rating], redundant: bool, last: bool) -> bool:
     """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
     quick ones are all known, any that is healthy."""
     sound = [one for one in rated if one.error < EXCELLENT and one.left_open < MANY and one.pencil.size <= 16]
@@ -204,8 +204,8 @@ def _enough(rated: list[_Rating], redundant: bool, last: bool) -> bool:
 
 def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
     """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
-    pencil = build(role, closed.links, closed.prismatic, PSI[0])
-    seeds = roots.seeds(pencil, inverse(goal), TILT[0], part=pencil.role.wide)
+    pencil = build_pencil(role, closed.links, closed.prismatic, PSI[0])
+    seeds = roots.root_seeds(pencil, inverse(goal), TILT[0], part=pencil.role.wide)
     apart = np.abs(seeds.q - q[seeds.pose])
     turned = np.abs(np.mod(apart + np.pi, 2 * np.pi) - np.pi)
     distance = np.where(closed.prismatic, apart, turned).max(axis=1, initial=0.0)
@@ -214,7 +214,7 @@ def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
     if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
         return _Rating(20.0 + pencil.size, 0.0, 1.0, pencil)
     error = float(np.quantile(np.log10(nearest + tol.ERROR_FLOOR), 0.9))
-    left_open = float(np.mean(attempt(closed, pencil, goal, 0)[1])) if error < HEALTHY else 1.0
+    left_open = float(np.mean(run_pass(closed, pencil, goal, 0)[1])) if error < HEALTHY else 1.0
     # Below 1e-11 accuracy buys nothing; size and open poses cost time; a constant N (slot Lb) saves some.
     cost = max(error, -11.0) + 0.15 * pencil.size + 4 * left_open - 0.5 * (role.slot == 1)
     return _Rating(cost, error, left_open, pencil)

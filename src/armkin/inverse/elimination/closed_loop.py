@@ -45,7 +45,7 @@ class Loop(NamedTuple):
         return inverse(self.base) @ shrink_translations(T, self.length) @ inverse(self.tool)
 
 
-def close(link: Array, prismatic: Bool) -> Loop:
+def close_loop(link: Array, prismatic: Bool) -> Loop:
     """The loop of a chain ``link[0] Z1(q1) link[1] ... Z6(q6) link[6]``, (7, 4, 4) [mm].
 
     A joint's frame may be moved along its axis (anywhere, if the joint is prismatic) without a change

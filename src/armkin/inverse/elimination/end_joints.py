@@ -73,7 +73,7 @@ def prepare(role: Role, part: Bool, links: Array) -> Ends:
     return Ends(role.slot, rank, (), basis[:, rank:].T, np.linalg.pinv(Q, rcond=tol.RANK)[_READ:])
 
 
-def eliminate(ends: Ends, Y: Array) -> tuple[Array, Array]:
+def eliminate_ends(ends: Ends, Y: Array) -> tuple[Array, Array]:
     """N (n or 1, 15 - rank, 15) and recover (n or 1, 5, 15) for the links Y (n, 4, 4) that carry the pose."""
     if not ends.factors:
         return ends.N[None], ends.recover[None]

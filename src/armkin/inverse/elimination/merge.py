@@ -46,7 +46,7 @@ def difference(prismatic: Bool, end: Array, start: Array) -> Array:
     return np.where(prismatic, step, step - 2 * np.pi * np.round(step / (2 * np.pi)))
 
 
-def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple[Answers, Bool]:
+def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple[Answers, Bool]:
     """Sort answers by pose and keep one of each set of equal ones.
 
     Two answers are one if the point halfway between them is an answer too, to the accuracy that both
@@ -93,7 +93,7 @@ def merge(chain: Array, prismatic: Bool, goal: Array, answers: Answers) -> tuple
     return rows_of(answers, keep), merged
 
 
-def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
+def pack_by_pose(answers: Answers, count: int) -> tuple[Array, Bool]:
     """Answers, poses ascending, as (N, B, 6) with NaN past a pose's last one; and which poses are near singular (N,).
 
     Near singular are poses with an answer near a singularity or with more answers than can be isolated; of
@@ -109,7 +109,7 @@ def pack(answers: Answers, count: int) -> tuple[Array, Bool]:
     return _table(answers, count, MOST), near_singular
 
 
-def best(answers: Answers, count: int, most: int) -> Array:
+def best_answers(answers: Answers, count: int, most: int) -> Array:
     """Of every pose (N = count) at most so many answers, those of the smallest residual: (N, B, 6), NaN past them."""
     return _table(rows_of(answers, np.lexsort((answers.residual, answers.pose))), count, most)
 

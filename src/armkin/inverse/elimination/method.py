@@ -43,10 +43,10 @@ import numpy as np
 from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.elimination import three_prismatic
-from armkin.inverse.elimination.choose_variable import Elimination, Kind, kinds, poses, prepare
+from armkin.inverse.elimination.choose_variable import Elimination, Kind, pose_kinds, prepare, sample_poses
 from armkin.inverse.elimination.closed_loop import Loop
-from armkin.inverse.elimination.merge import Answers, best, merge, pack
-from armkin.inverse.elimination.passes import answers_of, attempt, none
+from armkin.inverse.elimination.merge import Answers, best_answers, merge_equal, pack_by_pose
+from armkin.inverse.elimination.passes import answers_of, none, run_pass
 from armkin.inverse.elimination.polish import refine
 from armkin.inverse.numeric import tolerances as tol
 
@@ -68,10 +68,10 @@ def left_open(elimination: Elimination, samples: int = 48) -> float:
         return 0.0
     rng = np.random.default_rng(6)
     q = np.where(closed.prismatic, rng.uniform(-1, 1, (samples, 6)), rng.uniform(-np.pi, np.pi, (samples, 6)))
-    goal, _ = poses(closed, q)
+    goal, _ = sample_poses(closed, q)
     for number in range(2):
         if len(goal):
-            goal = goal[attempt(closed, elimination.plans[number], goal, number)[1]]
+            goal = goal[run_pass(closed, elimination.plans[number], goal, number)[1]]
     return len(goal) / samples
 
 
@@ -112,26 +112,26 @@ def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:
     finite: Bool = np.all(np.isfinite(T), axis=(1, 2))
     goal = closed.goal(np.where(finite[:, None, None], T, np.eye(4)))
     if not elimination.plans:
-        answers, touching, settled = _slides(closed, goal)
+        answers, touching, settled = _solve_slides(closed, goal)
         shaken = ~settled
         near = none()
     else:
-        answers, near, touching, settled, shaken = _passes(elimination, goal, moved)
+        answers, near, touching, settled, shaken = _run_passes(elimination, goal, moved)
     answers = rows_of(answers, finite[answers.pose])
-    answers, merged = merge(closed.chain, closed.prismatic, goal, answers)
-    q, weak = pack(answers, count)
+    answers, merged = merge_equal(closed.chain, closed.prismatic, goal, answers)
+    q, weak = pack_by_pose(answers, count)
     unit = np.where(closed.prismatic, closed.length, 1.0)
-    guesses = best(rows_of(near, (finite & shaken)[near.pose]), count, GUESSES)
+    guesses = best_answers(rows_of(near, (finite & shaken)[near.pose]), count, GUESSES)
     return Branches(q * unit, (weak | merged | touching) & finite, settled, shaken & finite, guesses * unit)
 
 
-def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers, Answers, Bool, Bool, Bool]:
+def _run_passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers, Answers, Bool, Bool, Bool]:
     """Answers of all passes, each over the poses that the last one left open, and what is close to answers; then (N,)
     poses with touching pairs, settled ones, and those that went to a pass which moves them."""
     parts, guesses = [none()], [none()]
     touching, shaken = np.zeros((2, goal.shape[0]), dtype=np.bool_)
     settled = np.ones(goal.shape[0], dtype=np.bool_)
-    kind = kinds(elimination.loop, goal)
+    kind = pose_kinds(elimination.loop, goal)
     for chosen_kind in Kind:
         open_poses = np.flatnonzero(kind == chosen_kind)
         for number, pencil in enumerate(elimination.of_kind(chosen_kind) if open_poses.size else ()):
@@ -141,7 +141,7 @@ def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers
             still = np.zeros(open_poses.size, dtype=np.bool_)
             for begin in range(0, open_poses.size, CHUNK):
                 part = open_poses[begin : begin + CHUNK]
-                answers, unsettled, touch, near = attempt(elimination.loop, pencil, goal[part], number)
+                answers, unsettled, touch, near = run_pass(elimination.loop, pencil, goal[part], number)
                 parts.append(answers._replace(pose=part[answers.pose]))
                 if number > 0:
                     guesses.append(near._replace(pose=part[near.pose]))
@@ -154,7 +154,7 @@ def _passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers
     return stack_rows(parts), stack_rows(guesses), touching, settled, shaken
 
 
-def _slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
+def _solve_slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
     """Both answers of a chain with three prismatic joints; and whether roots touch, and whether they are all, (N,)."""
     parts, touching, full = [none()], np.zeros(goal.shape[0], dtype=np.bool_), np.ones(goal.shape[0], dtype=np.bool_)
     if np.sum(closed.prismatic) > 3:

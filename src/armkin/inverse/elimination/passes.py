@@ -19,17 +19,14 @@ TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main p
 REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
 
 
-def attempt(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:
+def run_pass(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:
     """Answers of one pass for goals (N, 4, 4), the poses it leaves open, those with touching roots, and guesses."""
     careful, shake = number > 0, tol.SHAKES[number]
-    seed = roots.seeds(pencil, inverse(shaken_goal(goal, shake)), TILT[careful], part=careful or pencil.role.wide)
+    seed = roots.root_seeds(pencil, inverse(shaken_goal(goal, shake)), TILT[careful], part=careful or pencil.role.wide)
     if shake == 0:
         seed = _without_empty(closed, seed, goal, careful)
     target = goal[seed.pose]
-    if careful:
-        moved = refine(closed.chain, closed.prismatic, seed.q, target, 12, damped=True)
-    else:
-        moved = refine(closed.chain, closed.prismatic, seed.q, target, 4)
+    moved = refine(closed.chain, closed.prismatic, seed.q, target, 12 if careful else 4, damped=careful)
     # In later passes also what is nearly an answer, at a double root: such poses are said to be near singular.
     good = moved.residual < (10 * tol.GRAZING if careful else tol.ELIMINATED)
     unsettled, touching = seed.rough, np.zeros(goal.shape[0], dtype=np.bool_)

@@ -97,7 +97,7 @@ class Pencil:
         return int(self.W.shape[0])
 
 
-def build(role: Role, arm: Array, prismatic: Bool, psi: float) -> Pencil:
+def build_pencil(role: Role, arm: Array, prismatic: Bool, psi: float) -> Pencil:
     """Prepare a role of the arm with the links ``arm`` (5, 4, 4) between its joints for the offset psi."""
     links, part = links_by_part(role, arm), prismatic[list(role.order)]
     cut = end_joints.prepare(role, part, links)

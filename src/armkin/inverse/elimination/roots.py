@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination import equal_roots, line_features
-from armkin.inverse.elimination.end_joints import eliminate
+from armkin.inverse.elimination.end_joints import eliminate_ends
 from armkin.inverse.elimination.pencil import Pencil
 from armkin.inverse.elimination.polish import advance, turn
 from armkin.inverse.numeric import tolerances as tol
@@ -28,7 +28,7 @@ class Seeds(NamedTuple):
     pose: (M,) index of the pose.  q: (M, 6) joint values in the arm's order.  hidden: (M,) value of q_h.
     tilt: (M,) imaginary part of the root as an angle.  rough: (N,) poses whose pencil was badly scaled.
     defect: (M,) squared sine of the angle between the eigenvector and the product that a solution's is; 0 where slides
-    move.  gap: (M,) distance from the pose's nearest other root but for a twin (see `_gaps`), as an angle; inf of a
+    move.  gap: (M,) distance from the pose's nearest other root but for a twin, see `_root_gaps`, as an angle; inf of a
     multiple root whose solutions are all known; 0 where the pencil is not well scaled.
     """
 
@@ -46,7 +46,7 @@ class Seeds(NamedTuple):
         return (self.defect > tol.NO_PRODUCT) & (self.gap < tol.ALONE) & (self.tilt < tol.ALONE)
 
 
-def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> Seeds:
+def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> Seeds:
     """All roots of the pencil for the pose links ``X`` (N, 4, 4) whose tilt is below ``tolerance``.
 
     part: whether roots are taken apart that several solutions share.
@@ -74,7 +74,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
     x, u = roots[pose, index].real, vectors.real[pose, :, index]
     candidates = _Candidates(pose, index, x, tilt[pose, index], u, np.zeros(len(pose), np.bool_))
     if part and not pencil.prismatic[2:5].any():
-        candidates = _parted(pencil, candidates, vectors)
+        candidates = _part_equal_roots(pencil, candidates, vectors)
     pose, index, x, slant, u, parted = candidates
     middle, defect = _middle_joints(pencil, x, u)
     near = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
@@ -87,7 +87,7 @@ def seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> See
         q[:, joint] = -value if pencil.role.backward else value
     gap = np.where(parted & steady[pose], np.inf, 0.0)
     unsure = np.flatnonzero((defect > tol.NO_PRODUCT) & steady[pose] & ~parted)
-    gap[unsure] = _gaps(roots[pose[unsure]], vectors[pose[unsure]], index[unsure])
+    gap[unsure] = _root_gaps(roots[pose[unsure]], vectors[pose[unsure]], index[unsure])
     return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
 
 
@@ -99,7 +99,7 @@ def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
     Y = inverse(X) if pencil.role.backward else X
     sign = -1.0 if pencil.role.backward else 1.0
     part = sign * q[:, list(pencil.role.order)].T  # a, b, m1, m2, m3, e
-    _, recover = eliminate(pencil.ends, Y)
+    _, recover = eliminate_ends(pencil.ends, Y)
     a, b, e = _other_joints(pencil, part[2:5], Y, np.arange(len(q)), recover)
     away = np.stack([a, b, e]) - part[[0, 1, 5]]
     turning = ~pencil.prismatic[[0, 1, 5]][:, None]
@@ -120,7 +120,7 @@ class _Candidates(NamedTuple):
     parted: Bool
 
 
-def _parted(pencil: Pencil, single: _Candidates, vectors: NDArray[np.complex128]) -> _Candidates:
+def _part_equal_roots(pencil: Pencil, single: _Candidates, vectors: NDArray[np.complex128]) -> _Candidates:
     """The same, a root that several solutions share with the vectors of these: see `equal_roots`."""
     count = len(single.pose)
     # rounding made a complex pair of some
@@ -144,7 +144,7 @@ def _parted(pencil: Pencil, single: _Candidates, vectors: NDArray[np.complex128]
     return _Candidates(pose[order], index[order], x[order], tilt[order], u[order], parted[order])
 
 
-def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], index: Int) -> Array:
+def _root_gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], index: Int) -> Array:
     """Distance (M,) of one of each row's roots (M, size) from the others, on the sphere of complex numbers.
 
     Not from its twin, the other half of a double root that has one vector (M, size, size): rounding parts the two. Nor
@@ -169,7 +169,7 @@ def _gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], index:
 
 def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
     """The rows of (4), (N, p, c), and the factors (N or 1, 5, 15) of back substitution."""
-    N, recover = eliminate(pencil.ends, Y)
+    N, recover = eliminate_ends(pencil.ends, Y)
     if pencil.role.at_an_end:
         rows = N @ pencil.columns
     else:
@@ -209,10 +209,7 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
         value[pencil.role.hidden] = pencil.psi + 1 / np.where(np.abs(x) < tol.UNDERFLOW, tol.UNDERFLOW, x)
     else:
         value[pencil.role.hidden] = pencil.psi + 2 * np.arctan(x)
-    if pencil.prismatic[dialytic]:
-        value[pencil.role.dialytic] = _ratio(four)
-    else:
-        value[pencil.role.dialytic] = 2 * np.arctan2(four[:, 3], four[:, 2])
+    value[pencil.role.dialytic] = _ratio(four) if pencil.prismatic[dialytic] else 2 * np.arctan2(four[:, 3], four[:, 2])
     if pencil.prismatic[third]:
         value[pencil.role.third] = _ratio(three)
     elif pencil.role.wide:

@@ -33,12 +33,12 @@ def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]
     return r, J
 
 
-def missed(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+def residuals(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Residual (M, r) alone, lengths in units of the arm's reach."""
     return residual(task, fk(arm, q), q, target, arm.reach)
 
 
-def missing(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+def misses(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Size of the residual (M,), lengths in units of the arm's reach; infinite where it is not known."""
     r = residual(task, fk(arm, q), q, target, arm.reach)
     size: Array = np.sqrt((r * r).sum(axis=1))
@@ -57,7 +57,7 @@ def correct(
 ) -> tuple[Array, Array]:
     """Gauss-Newton with steps of least norm: q (M, n) moved onto its targets.
 
-    Returns the best q met and its `missing`. Singular values below `least` are left out of a step,
+    Returns the best q met and its `misses`. Singular values below `least` are left out of a step,
     so that a singular posture is approached without running away. patience: steps in a row that take less than a
     tenth away after which a start is given up; one at a root of sixth order takes two thirds. stalled: residual
     below which such steps count.
@@ -70,7 +70,7 @@ def correct(
         if k < steps:
             r, J = scaled(arm, task, q[active], target[active])
         else:
-            r = missed(arm, task, q[active], target[active])
+            r = residuals(arm, task, q[active], target[active])
         size = np.sqrt((r * r).sum(axis=1))
         size[np.isnan(size)] = np.inf
         before = best_size[active]
@@ -104,7 +104,7 @@ def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
     slow = np.flatnonzero((size > tol.CONVERGING) & (size < tol.SEED))
     if len(slow):
         even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
-        better = missing(arm, task, even, target[row[slow]]) < size[slow]
+        better = misses(arm, task, even, target[row[slow]]) < size[slow]
         q[slow[better]] = even[better]
     postures[row, index] = np.where((size < tol.SEED)[:, None], q, np.nan)
     return postures

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, numbers_within
-from armkin.inverse.closed.wrist import foot, meeting_point
+from armkin.inverse.closed.wrist import meeting_point, perpendicular_foot
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
 from armkin.model.arm import Arm
@@ -77,7 +77,7 @@ def boundaries(arm: Arm) -> Boundaries | None:
     shoulder = meeting_point(L[1], L[2], tol.EXACT)
     if shoulder is None or is_parallel(L[5], tol.PARALLEL):
         return None
-    on5 = foot(L[5])
+    on5 = perpendicular_foot(L[5])
     wrist = (inverse(L[5]) @ [*on5, 1.0])[:3]
     upper, fore = (inverse(L[3]) @ [*shoulder[1], 1.0])[:3], (L[4] @ [*on5, 1.0])[:3]
     along, across = upper[:2] @ fore[:2], upper[1] * fore[0] - upper[0] * fore[1]
@@ -94,11 +94,8 @@ def _in_line(L: Array, upper: Array, fore: Array, middle: float) -> float | None
     axis3, axis5 = L[3][:3, :3].T @ Z, L[4][:3, 2]
     along, across = axis3[:2] @ axis5[:2], axis3[1] * axis5[0] - axis3[0] * axis5[1]
     for q4 in (np.arctan2(across, along), np.arctan2(-across, -along)):
-        back = rotation_about(2, -q4)
-        if (
-            max(np.abs(np.cross(back @ v, axis5)).max() for v in (axis3, upper - rotation_about(2, q4) @ fore))
-            <= tol.EXACT
-        ):
+        back, line = rotation_about(2, -q4), upper - rotation_about(2, q4) @ fore
+        if max(np.abs(np.cross(back @ v, axis5)).max() for v in (axis3, line)) <= tol.EXACT:
             return float(np.cos(q4 - middle))
     return None
 

@@ -99,4 +99,4 @@ class Ways(NamedTuple):
 
     def follow(self, find: Follower, row: Int) -> Bool:
         """Which lie on the curves of their targets row (M,), as their middles tell."""
-        return newton.missing(find.arm, find.free.task, self.at(find, 0.5), find.target[row]) < tol.ROUGHLY
+        return newton.misses(find.arm, find.free.task, self.at(find, 0.5), find.target[row]) < tol.ROUGHLY

@@ -64,7 +64,7 @@ def families(
     angle_class = arm_angle(arm) if free.joint else None
     numbers = (flat_targets(task, values)[0], defect)
     roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
-    stands = (newton.missing(arm, task, nears, goal) <= most) & ~outside_limits(arm, nears).any(axis=1)
+    stands = (newton.misses(arm, task, nears, goal) <= most) & ~outside_limits(arm, nears).any(axis=1)
     rows = _Rows(arm, free.joint, nears, stands)
     chunk = CIRCLES if angle_class else AT_ONCE // SAMPLES if free.by_formula else TRACED
     for k in range(0, len(goal), chunk):
@@ -181,7 +181,7 @@ class _Rows:
             if not self.stands[k]:
                 q = newton.many_starts(self.arm, task, goal, np.ones(1, bool))[0]
                 q = q[~np.isnan(q[:, 0])]
-                q = q[newton.missing(self.arm, task, q, np.repeat(goal, len(q), axis=0)) <= tol.SOLUTION]
+                q = q[newton.misses(self.arm, task, q, np.repeat(goal, len(q), axis=0)) <= tol.SOLUTION]
             if len(q):
                 q, legal = nearest_row(self.arm, q, np.broadcast_to(self.near[k], q.shape))
                 best = int(np.lexsort((motion(self.arm, q, self.near[k]), ~legal))[0])

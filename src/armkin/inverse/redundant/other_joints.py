@@ -19,7 +19,7 @@ from armkin.formula.arrays import Array, Bool, Entry, Int, slices
 from armkin.formula.trace import StraightLineCode
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
-from armkin.inverse.closed.candidates import entries, recorded
+from armkin.inverse.closed.candidates import recorded_formula, target_entries
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import motion_of_joint, within_limits
@@ -64,7 +64,7 @@ class Sampled(NamedTuple):
 @lru_cache(maxsize=64)
 def _recorded(arm: Arm, free: Redundancy) -> tuple[StraightLineCode, tuple[int, ...]]:
     """The closed form of the others with the redundant joint as an argument: of a target's entries and its pair."""
-    rest_form = recorded(free.rest, solver(free.rest, free.task.name)[0], free.geometry)
+    rest_form = recorded_formula(free.rest, solver(free.rest, free.task.name)[0], free.geometry)
     inputs = 12 if free.task.orientation == "full" else len(free.task.labels)
 
     def formula(x: list[Entry]) -> list[Entry]:
@@ -123,7 +123,7 @@ class Follower(NamedTuple):
         code, _ = _recorded(self.arm, self.free)
         if not room or room[0].shape[-1] != len(t):
             room = code.workspace(len(t))
-        goal = [np.asarray(x)[rows] for x in entries(self.free.task, self.target)]
+        goal = [np.asarray(x)[rows] for x in target_entries(self.free.task, self.target)]
         *values, miss, _, _ = code.run([*goal, np.cos(t), np.sin(t)], room)
         values.insert(self.free.joint, t)
         return [*values, miss, room]

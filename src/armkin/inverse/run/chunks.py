@@ -17,7 +17,7 @@ from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty_batch, pack_branches
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
-from armkin.inverse.closed.candidates import entries, recorded
+from armkin.inverse.closed.candidates import recorded_formula, target_entries
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.run.edges import AT_ONCE, decide_edges
@@ -38,7 +38,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
     near: (N, n), common: (n,) if it serves all; workers: threads. Also how many branch columns the class has, the
     targets as they were solved, their `rounding`, and those on an edge, of a class that has another way for them.
     """
-    runner, N = recorded(arm, task, geometry), len(raw)
+    runner, N = recorded_formula(arm, task, geometry), len(raw)
     step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts: one set of buffers serves all
     batch = empty_batch(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(raw), np.zeros(N)
@@ -59,7 +59,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
             else:
                 workspace = workspace or runner.code.workspace(len(goal))
                 room = [buffer[..., : len(goal)] for buffer in workspace]
-                values = list(runner.code.run(entries(task, goal) if columns is None else columns, room))
+                values = list(runner.code.run(target_entries(task, goal) if columns is None else columns, room))
             first = goal[:, 0] if columns is None else cast("Array", columns[9])
             hits = np.empty(0, np.intp)
             if examine:
@@ -160,7 +160,7 @@ def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool 
 
     A target that is not `left` has the branches that `armkin.ik` finds; `left` are for `armkin.ik`.
     """
-    runner = recorded(arm, task, geometry)
+    runner = recorded_formula(arm, task, geometry)
     step, B, tip = runner.code.at_once(), math.prod(runner.axes), position(arm, arm.home)
     workspace: list[NDArray[Any]] = []
     for start in range(0, len(target), step):
@@ -168,7 +168,7 @@ def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool 
         N = len(goal)
         if kept or not workspace or workspace[-1].shape[-1] != N:
             workspace = runner.code.workspace(N)
-        *outputs, doubt, _ = runner.code.run(entries(task, goal), workspace)
+        *outputs, doubt, _ = runner.code.run(target_entries(task, goal), workspace)
         shape = (*runner.axes, N)
         *values, miss = (np.broadcast_to(column, shape).reshape(B, N) for column in outputs)
         valid: Bool = np.asarray(miss <= tol.ACCEPTED**2)

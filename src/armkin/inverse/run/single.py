@@ -20,7 +20,7 @@ from armkin.forward import point_numbers
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.whole_turns import TURN, nearest_number
-from armkin.inverse.closed.candidates import recorded
+from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.near_itself import COARSE, ROOM
 from armkin.inverse.solvers.recognise import solver
@@ -46,7 +46,7 @@ class OneTarget:
         self._complete = geometry.complete
         self.orientation, self.position = definition.orientation, definition.position
         self.shape = (4, 4) if self.orientation == "full" else (len(definition.labels),)
-        runner = recorded(arm, definition, geometry)
+        runner = recorded_formula(arm, definition, geometry)
         self._run, self._off = runner.code.numbers(), rotation_check().numbers()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
         self._point, self._home, self._room = point_numbers(arm), arm.home, ROOM * arm.reach

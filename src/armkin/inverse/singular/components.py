@@ -336,7 +336,7 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     simple = np.concatenate([np.zeros((K, 1), bool), (seeds.simple & there)[each, order]], axis=1)
     flat, goal = q.reshape(-1, n).copy(), np.repeat(np.arange(K), q.shape[1])
     size, some = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
-    size[some] = newton.missing(arm, task, flat[some], target[goal[some]])
+    size[some] = newton.misses(arm, task, flat[some], target[goal[some]])
     beyond, first = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
     free = np.flatnonzero(~(first | sure.reshape(-1, n).any(axis=1) | (size < tol.CLOSED)))
     if len(free):

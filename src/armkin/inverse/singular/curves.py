@@ -113,7 +113,7 @@ def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> 
     back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):
         q = q + (back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
-        r = newton.missed(arm, task, q, target)
+        r = newton.residuals(arm, task, q, target)
     return q, V, np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))
 
 

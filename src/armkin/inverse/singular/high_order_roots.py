@@ -28,7 +28,7 @@ def joined(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array
     Steps back onto the curve leave out directions weaker than `HIGH`.
     """
     halfway = q + 0.5 * way * radian_or_reach(arm)
-    solves = newton.missing(arm, task, halfway, target) <= tol.SOLUTION
+    solves = newton.misses(arm, task, halfway, target) <= tol.SOLUTION
     far = np.abs(way).max(axis=1)
     doubtful = np.flatnonzero(~solves & (sigma < tol.HIGH) & (miss > ROOT * far * sigma))
     if len(doubtful):

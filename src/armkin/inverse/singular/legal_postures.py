@@ -42,7 +42,7 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
         if ((exact[0] >= arm.lower) & (exact[0] <= arm.upper)).all():
             legal = exact[0]
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
-        miss, *listed = newton.missing(arm, task, np.concatenate([legal[None], q]), goal)
+        miss, *listed = newton.misses(arm, task, np.concatenate([legal[None], q]), goal)
         # of a self-motion as exact as what was listed; with a margin, for it has to be taken as a branch
         if miss > (0.9 * tol.SOLUTION if at_limit else min(max(2.0 * min(listed), tol.ACCEPTED), 0.9 * tol.SOLUTION)):
             continue

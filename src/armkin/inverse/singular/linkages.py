@@ -58,8 +58,8 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     K, S, B, n = q.shape
     tried = ~np.isnan(q[..., 0]) & loose[:, None]
     size = np.full(tried.shape, np.inf)
-    size[tried] = newton.missing(arm, task, q[tried], np.repeat(target, tried.sum(axis=(1, 2)), axis=0))
-    solving, near_miss = size < tol.CLOSED, newton.missing(arm, task, near, target)
+    size[tried] = newton.misses(arm, task, q[tried], np.repeat(target, tried.sum(axis=(1, 2)), axis=0))
+    solving, near_miss = size < tol.CLOSED, newton.misses(arm, task, near, target)
     decided, motions = _motions(goals, q, solving, loose)
     lacking = np.asarray((loose & (solving.sum(axis=1) < 2)).any(axis=1))
     decided &= ~lacking & ~((near_miss > tol.CLOSED) & (near_miss <= tol.SOLUTION))
@@ -106,7 +106,7 @@ def _motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[Bool, 
     k, b = np.nonzero(line)
     if len(k):
         places = (q[k, 0, b][:, None] + PLACES * d[k, b][:, None]).reshape(-1, arm.n)
-        miss = newton.missing(arm, task, places, np.repeat(target[k], len(PLACES), axis=0)).reshape(-1, len(PLACES))
+        miss = newton.misses(arm, task, places, np.repeat(target[k], len(PLACES), axis=0)).reshape(-1, len(PLACES))
         line[k, b] = (miss < tol.CLOSED).all(axis=1)
     joint = np.full(line.shape, -1)
     k, b = np.nonzero(loose & (count == 4))

@@ -166,7 +166,7 @@ def _second_order(
         """The pose's way f (2, M, rows) along away (2, M, n), in directions of U."""
         ends = (q + away * unit).reshape(-1, n)
         goals = np.concatenate([target, target])
-        f = r - newton.missed(arm, task, ends, goals).reshape(2, *r.shape)
+        f = r - newton.residuals(arm, task, ends, goals).reshape(2, *r.shape)
         return np.asarray((f[..., None] * U).sum(axis=2))
 
     along = both_ways(SIGNS * tol.FOLD_WAY * v).sum(axis=0) / tol.FOLD_WAY**2
@@ -379,7 +379,7 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     u, way = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
     both = np.concatenate([q + way, q - way])
     goals = np.concatenate([target, target])
-    ahead, behind = np.split(newton.missed(arm, task, both, goals), 2)
+    ahead, behind = np.split(newton.residuals(arm, task, both, goals), 2)
     bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
     lost = (u * r).sum(axis=1)
     rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)

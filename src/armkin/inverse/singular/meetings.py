@@ -54,7 +54,7 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost)
     shape = len(q), int(place.max(initial=-1)) + 1
     more, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, OWN), np.full(shape, np.inf)
     more[row, place], labels[row, place] = ends, whose
-    sizes[row, place] = newton.missing(arm, task, ends, target[row])
+    sizes[row, place] = newton.misses(arm, task, ends, target[row])
     resting = np.zeros((len(q), q.shape[1] + shape[1]), bool)
     resting[k, b] = rests[same.reshape(-1)]
     return np.concatenate([q, more], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1), resting
@@ -97,7 +97,7 @@ def _tangents(
         push = np.stack([V[:, i] if i == j else V[:, i] + V[:, j] for i, j in pairs])
         ends = (q[rows] + np.multiply.outer([tol.FOLD_WAY, -tol.FOLD_WAY], push * radian_or_reach(arm))).reshape(-1, n)
         goal = np.concatenate([target[rows]] * (2 * len(pairs)))
-        r = newton.missed(arm, task, ends, goal).reshape(2, len(pairs), len(rows), n)
+        r = newton.residuals(arm, task, ends, goal).reshape(2, len(pairs), len(rows), n)
         bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / tol.FOLD_WAY**2
         diag = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
         forms = np.stack([b if i == j else b - diag[i] - diag[j] for b, (i, j) in zip(bent, pairs, strict=True)])

@@ -63,7 +63,7 @@ def _taken(goals: Goals, batch: Batch, rows: Int) -> Int:
         return rows
     near, target = goals.near[rows], goals.target[rows]
     if not batch.valid.shape[1]:  # an elimination that found nothing at all
-        return np.asarray(rows[newton.missing(arm, task, near, target) <= tol.SOLUTION])
+        return np.asarray(rows[newton.misses(arm, task, near, target) <= tol.SOLUTION])
     away = newton.wrapped_distance(arm, batch.q[rows], near[:, None])
     away = np.where(batch.valid[rows], away, np.inf)
     place = away.argmin(axis=1)
@@ -71,11 +71,11 @@ def _taken(goals: Goals, batch: Batch, rows: Int) -> Int:
     stays, solves = least <= tol.THERE, np.ones(len(rows), bool)
     unsure = np.flatnonzero(~stays)
     if len(unsure):
-        solves[unsure] = newton.missing(arm, task, near[unsure], target[unsure]) <= tol.SOLUTION
+        solves[unsure] = newton.misses(arm, task, near[unsure], target[unsure]) <= tol.SOLUTION
         unsure = unsure[solves[unsure] & ((away[unsure] < tol.CLOSE_BY).sum(axis=1) == 1)]
         way = newton.difference(arm, batch.q[rows[unsure], place[unsure]], near[unsure])
         between = near[unsure] + 0.5 * way * radian_or_reach(arm)
-        stays[unsure] = newton.missing(arm, task, between, target[unsure]) <= tol.SOLUTION
+        stays[unsure] = newton.misses(arm, task, between, target[unsure]) <= tol.SOLUTION
     batch.q[rows[stays], place[stays]] = near[stays]
     batch.within[rows[stays], place[stays]] = True
     return np.asarray(rows[solves & ~stays])
@@ -92,7 +92,7 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> I
     close = np.broadcast_to(near, (len(target), arm.n))
     rows = reached(arm, task, target, position(arm, near), room=np.where(rounded, most, -1.0))
     rows = rows[~limits.outside_limits(arm, close[rows]).any(axis=1)]
-    return np.asarray(rows[newton.missing(arm, task, close[rows], target[rows]) <= most[rows]])
+    return np.asarray(rows[newton.misses(arm, task, close[rows], target[rows]) <= most[rows]])
 
 
 def stand(goals: Goals, batch: Batch, most: Array) -> Batch:

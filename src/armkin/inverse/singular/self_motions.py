@@ -70,7 +70,7 @@ def _grows_from(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, tar
     landed, size = newton.correct(arm, task, q + np.concatenate([apart, ahead]) * unit, goal, steps=6, least=tol.WEAK)
     way = newton.difference(arm, landed, q)
     near = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(way).max(axis=1) < tol.CLOSE_BY))
-    miss, joined = newton.missing(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
+    miss, joined = newton.misses(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
     joined[near] = high_order_roots.joined(arm, task, q[near], way[near], miss, sigma[near], goal[near])
     return np.asarray(joined.reshape(2, -1).any(axis=0))
 
@@ -157,7 +157,7 @@ def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Arr
     unit = radian_or_reach(arm)
     landed, size = follow(arm, task, q + step[:, None] * push * unit, target)
     far = (np.abs(landed - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
-    return landed, size, np.where(far, size - newton.missing(arm, task, q, target), np.inf) / step
+    return landed, size, np.where(far, size - newton.misses(arm, task, q, target), np.inf) / step
 
 
 def _equally_long(away: Array, push: Array) -> Bool:
@@ -203,7 +203,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     start = q[row] + ways * push * unit
     landed, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[row]] * 8), steps=20)
     away, size = (landed.reshape(start.shape)[:, :, 0] - q[row]) / unit, size.reshape(start.shape[:4])
-    grown = size.max(axis=(1, 2)) - newton.missing(arm, task, q, target)[row]  # (2, m)
+    grown = size.max(axis=(1, 2)) - newton.misses(arm, task, q, target)[row]  # (2, m)
     short, long = (grown <= tol.GROWTH * STEPS) & _equally_long(away, push)
     # where the residual grows at all, it must do so slowly as far as the long step: near a fold the first tenth of a
     # radian costs nothing

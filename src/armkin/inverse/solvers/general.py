@@ -18,7 +18,7 @@ from armkin.inverse.closed import spherical
 from armkin.inverse.closed.candidates import is_sound
 from armkin.inverse.closed.geometry import ClosedForm, Geometry, Rows
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer, distance2
-from armkin.inverse.closed.wrist import foot
+from armkin.inverse.closed.wrist import perpendicular_foot
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -39,11 +39,11 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     if arm.n == 6:
         prepared = method.prepare(arm.link, arm.prismatic)
         why = "no axes meet or run parallel as a closed form would need: numeric elimination, up to 16 branches"
-        every, unmoved = (partial(_six, prepared, moved=moved) for moved in (True, False))
+        every, unmoved = (partial(_solve_six, prepared, moved=moved) for moved in (True, False))
         return Geometry(NAME, why, prepared.complete, None, every, unmoved, ordered=False, elimination=prepared)
     if arm.n == 5 and (wrist := _with_wrist(arm, task)) is not None:
         return wrist
-    link, prismatic = _padded(arm)
+    link, prismatic = _with_virtual_joints(arm)
     prepared = method.prepare(link, prismatic)
 
     def rows(T: Array) -> Rows:
@@ -66,7 +66,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     return Geometry(NAME, why, prepared.complete, rows=rows, ordered=False)
 
 
-def _six(prepared: method.Elimination, T: Array, *, moved: bool) -> Rows:
+def _solve_six(prepared: method.Elimination, T: Array, *, moved: bool) -> Rows:
     """Branches of six joints; complete where the elimination settled the pose as it stands, by a regular pencil.
 
     Of a target that had to be moved, self-motions and double roots are not where they were.
@@ -79,7 +79,7 @@ def _with_wrist(arm: Arm, task: Task) -> Geometry | None:
     """Five joints, axes 4 and 5 or 1 and 2 meeting: the closed form with a virtual joint through that point."""
     chain = Chain(arm.link, arm.prismatic)
     for first in (False, True):
-        longer = _lengthened(reverse_chain(chain) if first else chain, tol.EXACT * arm.reach)
+        longer = _with_sixth_joint(reverse_chain(chain) if first else chain, tol.EXACT * arm.reach)
         if longer is None:
             continue
         six = reverse_chain(longer) if first else longer
@@ -109,7 +109,7 @@ def _of_five(solve: ClosedForm, first: bool) -> ClosedForm:
     return pairs
 
 
-def _lengthened(chain: Chain, tolerance: float) -> Chain | None:
+def _with_sixth_joint(chain: Chain, tolerance: float) -> Chain | None:
     """Five joints with a sixth one behind, where axes 4 and 5 meet; None if they do not.
 
     The virtual axis stands across axis 5, turned by `PHASE` from where an axis of a built arm would stand, so that
@@ -118,7 +118,7 @@ def _lengthened(chain: Chain, tolerance: float) -> Chain | None:
     L = chain.link[4]
     if chain.prismatic[3:].any() or is_parallel(L, tol.PARALLEL):
         return None
-    meeting = (inverse(L) @ [*foot(L), 1.0])[:3]
+    meeting = (inverse(L) @ [*perpendicular_foot(L), 1.0])[:3]
     if np.hypot(*meeting[:2]) > tolerance:
         return None
     axis = np.eye(4)
@@ -127,7 +127,7 @@ def _lengthened(chain: Chain, tolerance: float) -> Chain | None:
     return Chain(np.array([*chain.link[:5], axis, inverse(axis) @ chain.link[5]]), np.append(chain.prismatic, False))
 
 
-def _padded(arm: Arm) -> tuple[Array, Bool]:
+def _with_virtual_joints(arm: Arm) -> tuple[Array, Bool]:
     """The arm's chain with virtual revolute joints after its tool, up to six joints."""
     rng = np.random.default_rng(7)
     links = list(arm.link)

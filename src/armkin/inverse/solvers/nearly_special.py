@@ -25,13 +25,13 @@ from armkin.formula.array_tuples import stack_rows, widen_columns
 from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.forward import fk
 from armkin.inverse.closed import elbow, newton_steps, planar, spherical, three_joints, three_parallel
-from armkin.inverse.closed.candidates import Recorded, recorded
+from armkin.inverse.closed.candidates import Recorded, recorded_formula
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.solvers import general, pairs, position_pencil
-from armkin.inverse.solvers.pairs import AROUND, around
+from armkin.inverse.solvers.pairs import AROUND, targets_around
 from armkin.inverse.tasks.choose_task import NEARLY_PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.arm import Arm
@@ -49,7 +49,7 @@ def _nearest_class(arm: Arm, task: Task) -> tuple[float, Geometry] | None:
     limit = tol.NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
     classes = [*((module, limit) for module in wide), *((module, tol.NEAR) for module in narrow)]
     fitting = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
-    return min(((_distance(arm, task, alike), alike) for alike in fitting), key=lambda pair: pair[0], default=None)
+    return min(((_class_gap(arm, task, alike), alike) for alike in fitting), key=lambda pair: pair[0], default=None)
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
@@ -72,8 +72,8 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         complete = _has_four_roots(arm, solved.q) if counted else solved.complete
         return solved._replace(doubt=solved.doubt & ~complete, complete=complete)  # four roots apart are simple ones
 
-    source = recorded(arm, task, alike)
-    steps = newton_steps.steps(arm, task, gap, alike.pairs) if alike.pairs is not None else None
+    source = recorded_formula(arm, task, alike)
+    steps = newton_steps.corrected_form(arm, task, gap, alike.pairs) if alike.pairs is not None else None
     corrected, counted = steps or (None, False)
     why = f"{alike.why}, but for {gap:.0e} of the reach: closed-form seeds, corrected on the true arm"
     name, width = f"near {alike.name}", _named_columns(alike)
@@ -95,18 +95,18 @@ def _by_elimination(arm: Arm, task: Task, alike: Geometry, gap: float, general_:
         return None
     if method.left_open(general_.elimination) > SICK:
         return None
-    source = recorded(arm, task, alike)
+    source = recorded_formula(arm, task, alike)
 
     def places(q: Array, target: Array) -> Int:
         parts = slices(max(len(target), 1), NAMED_AT_ONCE)
-        return np.concatenate([_places(source, gap, q[part], target[part]) for part in parts])
+        return np.concatenate([_branch_places(source, gap, q[part], target[part]) for part in parts])
 
     why = f"{alike.why}, but for {gap:.0e} of the reach: numeric elimination, up to 16 branches, named after that class"
     geometry = replace(alike, name=general_.name, why=why, pairs=None, branches=_named_columns(alike), places=places)
-    return replace(geometry, rows=named(general_.rows, geometry))
+    return replace(geometry, rows=name_branches(general_.rows, geometry))
 
 
-def named(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array], Rows]:
+def name_branches(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array], Rows]:
     """The rows of an elimination, branches in the columns of the class that `geometry` names them after."""
     places = geometry.places
     assert places is not None
@@ -123,7 +123,7 @@ def named(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array
     return rows
 
 
-def _places(source: Recorded, gap: float, q: Array, target: Array) -> Int:
+def _branch_places(source: Recorded, gap: float, q: Array, target: Array) -> Int:
     """Indices (N, M) of branches (N, M, n): the similar arm's that each is nearest to, others count on, -1 of none."""
     seed, miss, _ = source.rows(target)
     B = seed.shape[1]
@@ -141,13 +141,13 @@ def _places(source: Recorded, gap: float, q: Array, target: Array) -> Int:
     return np.where(unnamed, B - 1 + unnamed.cumsum(axis=1), numbers)
 
 
-def _distance(arm: Arm, task: Task, alike: Geometry) -> float:
+def _class_gap(arm: Arm, task: Task, alike: Geometry) -> float:
     """How far the arm is from its class: residual of the seeds for postures of its own, lengths in reaches."""
     q = np.random.default_rng(2).uniform(-2.5, 2.5, (64, arm.n)) * np.where(arm.prismatic, arm.reach / 5, 1.0)
     target = targets_of(task, fk(arm, q), q)
-    seed, _, _ = recorded(arm, task, alike).rows(target)
+    seed, _, _ = recorded_formula(arm, task, alike).rows(target)
     B = seed.shape[1]
-    rough = newton.missing(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
+    rough = newton.misses(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
     return float(np.quantile(rough.min(axis=1), 0.8)) + tol.ROUNDED_ANSWER
 
 
@@ -156,7 +156,7 @@ def _solve(source: Recorded, gap: float, elimination: Callable[[], Geometry | No
     # the error grows with the slide's extension
     gaps = gap * np.maximum(1.0, distance(source.arm, source.task, target))
     if elimination is None:
-        settled, open_ = pairs.settled(source, gaps, target)
+        settled, open_ = pairs.settle_pairs(source, gaps, target)
         if len(rows := np.flatnonzero(open_)):
             more, settled.doubt[rows] = _by_neighbours(source, gap, gaps[rows], None, target[rows])
             settled = settled._replace(q=widen_columns(settled.q, more.shape[1]))
@@ -171,7 +171,7 @@ def _by_neighbours(
 ) -> tuple[Array, Bool]:
     """Branches and doubts by the elimination, or by the similar arm's branches at targets around."""
     arm, task = source.arm, source.task
-    seeds, good, doubt = _correct(source, gap, gaps, target)
+    seeds, good, doubt = _correct_seeds(source, gap, gaps, target)
     q = np.where(good[:, :, None], seeds, np.nan)
     rows = np.flatnonzero(doubt)
     if not len(rows):
@@ -183,7 +183,7 @@ def _by_neighbours(
         assert solver.rows is not None
         seeds_around = [solver.rows(goals).q]
     else:
-        rings = (around(arm, task, goals, size * gaps[rows]) for size in RINGS)
+        rings = (targets_around(arm, task, goals, size * gaps[rows]) for size in RINGS)
         seeds_around = [source.rows(moved)[0] for ring in rings for moved in ring]
     more = _corrected_seeds(arm, task, np.concatenate([seeds[rows], *seeds_around], axis=1), goals, seeds.shape[1])
     filled = widen_columns(q, more.shape[1])
@@ -195,7 +195,7 @@ def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, places: int)
     """Seeds (N, B, n) moved onto the arm: the first `places` in their places, then what else they lead to, once."""
     N, B, n = q.shape
     flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
-    close = np.flatnonzero(newton.missing(arm, task, flat, goals) < tol.HOPELESS)
+    close = np.flatnonzero(newton.misses(arm, task, flat, goals) < tol.HOPELESS)
     size = np.full(len(flat), np.inf)
     flat[close], size[close] = newton.correct(arm, task, flat[close], goals[close], steps=20, patience=4)
     flat[size > tol.SOLUTION] = np.nan
@@ -220,7 +220,7 @@ def _filled_columns(q: Array, places: int) -> Array:
     return np.concatenate([q[:, :places], np.take_along_axis(q, order[:, :, None], axis=1)], axis=1)
 
 
-def _correct(source: Recorded, gap: float, gaps: Array, target: Array) -> tuple[Array, Bool, Bool]:
+def _correct_seeds(source: Recorded, gap: float, gaps: Array, target: Array) -> tuple[Array, Bool, Bool]:
     """Seeds moved onto the arm (N, B, n), which are branches (N, B), and for which poses (N,) that may not be all.
 
     gaps: `gap` at each target (N,). The true arm reaches a target as the similar one, `source`, reaches
@@ -233,13 +233,13 @@ def _correct(source: Recorded, gap: float, gaps: Array, target: Array) -> tuple[
     weak = min(tol.STEADY, 1.5 * np.sqrt(gap)) + tol.AT_LEAST
     limit = 9.0 * gaps[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
-    for moved in around(arm, task, target, AROUND * gaps):
+    for moved in targets_around(arm, task, target, AROUND * gaps):
         q, miss, doubt_there = source.rows(moved)
         steady = newton.wrapped_distance(arm, q, seed) < AROUND * gaps[:, None] / weak
         doubt = doubt | doubt_there | (((miss < limit) | real) & ~steady).any(axis=1)
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)
-    rough = newton.missing(arm, task, flat, goals)
+    rough = newton.misses(arm, task, flat, goals)
     close = np.flatnonzero(rough < tol.HOPELESS)
     q, size = flat.copy(), np.full(N * B, np.inf)
     q[close], size[close] = newton.correct(arm, task, flat[close], goals[close])

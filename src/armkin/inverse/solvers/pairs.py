@@ -29,15 +29,14 @@ from armkin.model.rotation import rotation_about
 from armkin.model.units import radian_or_reach
 
 AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
-TOUCHING = (
-    tol.APART_ROOTS**2
-)  # square of half of what lies between complex roots, up to which they may be one real root
+# square of half of what lies between complex roots, up to which they may be one real root
+TOUCHING = tol.APART_ROOTS**2
 MOVED = 0.3  # [rad, reaches] a pair may stand from the class's
 STEPS = 8  # of Newton's method for a pair,
 LARGEST = 0.3  # [rad, reaches] and of each
 
 
-def around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
+def targets_around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
     """The targets (N, m) or (N, 4, 4) moved by size (N,) [reaches, rad] both ways along each of their coordinates."""
     for way in (size, -size):
         if task.orientation == "full":
@@ -55,7 +54,7 @@ def around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
                 yield moved
 
 
-def settled(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bool]:
+def settle_pairs(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bool]:
     """The branches of an arm that is close to a class; gaps (N,): how close, at each target [reaches].
 
     source: the class. Targets in doubt are those of which two roots are one, or nearly; guesses (N, B, n): where these
@@ -71,10 +70,10 @@ def settled(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bool]:
     # what moves farther than half the way to its neighbour may not continue it
     beside = (newton.distances(arm, seed, seed) + np.diag(np.full(seed.shape[1], np.inf))).min(axis=2)
     jumped = newton.wrapped_distance(arm, q, seed) > 0.5 * beside
-    bad = (np.isnan(q[:, :, 0]) & tried) | jumped | _merged(arm, q)
+    bad = (np.isnan(q[:, :, 0]) & tried) | jumped | _merged_branches(arm, q)
     doubt, complete = np.zeros((2, len(target)), bool)
     left = np.flatnonzero(bad.any(axis=1) & ~open_)
-    partners = _partners(source)
+    partners = _branch_partners(source)
     if not len(left) or task.constraints != arm.n or not len(partners):
         open_[left] = True
         return Rows(q, doubt, complete, None, guesses), open_
@@ -82,7 +81,7 @@ def settled(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bool]:
     row = left[k]
     apart = newton.difference(arm, seed[row, first], seed[row, second]) * radian_or_reach(arm)
     middle = seed[row, first] - 0.5 * apart
-    pair = _meet(arm, task, middle, target[row])
+    pair = _find_pairs(arm, task, middle, target[row])
     accepted = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < MOVED)
     open_[row[~accepted]] = True
     sense = np.where(_keep_sense(source, (row, first, second), gaps, target, pair.way), 1.0, -1.0)[:, None]
@@ -92,7 +91,7 @@ def settled(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bool]:
         better, size = newton.correct(arm, task, guess, target[row])
         q[row, place] = np.where((accepted & (pair.square > 0.0) & (size <= tol.ANSWERED))[:, None], better, np.nan)
         doubt[row] |= np.isnan(q[row, place, 0]) & (pair.square > -TOUCHING)
-    doubt |= _merged(arm, q).any(axis=1)
+    doubt |= _merged_branches(arm, q).any(axis=1)
     return Rows(q, doubt & ~open_, complete, None, guesses), open_
 
 
@@ -106,13 +105,13 @@ def _pairs(arm: Arm, seed: Array, bad: Bool, partners: Int) -> tuple[Int, Int, I
     return k, first, partner[k, first]
 
 
-def _merged(arm: Arm, q: Array) -> Bool:
+def _merged_branches(arm: Arm, q: Array) -> Bool:
     """Which branches (N, B, n) all but meet another one: (N, B)."""
     near = newton.distances(arm, q, q) < tol.APART_ROOTS
     return np.asarray(near.sum(axis=2) > 1)
 
 
-def _partners(source: Recorded) -> Int:
+def _branch_partners(source: Recorded) -> Int:
     """The branches' partners along each axis of two: (A, B)."""
     number = np.arange(np.prod(source.axes)).reshape(source.axes)
     flipped = [np.flip(number, axis).ravel() for axis, size in enumerate(source.axes) if size == 2]
@@ -126,7 +125,7 @@ def _keep_sense(source: Recorded, branches: tuple[Int, ...], gaps: Array, target
     M = np.arange(len(row))
     way = way / radian_or_reach(arm)
     widest, apart = np.zeros(len(row)), way.copy()
-    for moved in around(arm, source.task, target[row], AROUND * gaps[row]):
+    for moved in targets_around(arm, source.task, target[row], AROUND * gaps[row]):
         q = source.rows(moved)[0]
         between = newton.difference(arm, q[M, first], q[M, second])
         size = np.nan_to_num(np.abs(between).max(axis=1))
@@ -145,7 +144,7 @@ class _RootPair(NamedTuple):
     found: Bool
 
 
-def _meet(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
+def _find_pairs(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
     """The pairs of roots about postures q (M, n), whose weakest direction is the pairs', on targets.
 
     Of tasks with as many residuals as joints. Complex pairs are found to the second order of what lies between them.

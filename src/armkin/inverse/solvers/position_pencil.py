@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import stack_rows
 from armkin.formula.arrays import Array, Bool, Int, slices
-from armkin.inverse.closed.candidates import recorded
+from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
 from armkin.inverse.numeric import newton
@@ -120,19 +120,19 @@ def _imaginary(c: NDArray[Any], s: NDArray[Any]) -> Array:
 def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | None:
     """All roots of three turning joints near the class of `alike`, whose branches' places they take."""
     pencil = Pencil(arm, task)
-    seeds = recorded(arm, task, alike)
+    seeds = recorded_formula(arm, task, alike)
     if pencil.tight < tol.NO_SECOND or np.prod(seeds.axes) != 4:
         return None
 
     def rows(target: Array) -> Rows:
-        roots = stack_rows([_solved(pencil, target[part]) for part in slices(max(len(target), 1), CHUNK)])
-        order = _order(newton.distances(arm, seeds.rows(target)[0], roots.q))
+        roots = stack_rows([_solve_chunk(pencil, target[part]) for part in slices(max(len(target), 1), CHUNK)])
+        order = _root_order(newton.distances(arm, seeds.rows(target)[0], roots.q))
         return roots._replace(q=np.take_along_axis(roots.q, order[:, :, None], axis=1))
 
     return Geometry(f"near {alike.name}", why, True, rows=rows, labels=alike.labels, ordered=alike.ordered, branches=4)
 
 
-def _solved(pencil: Pencil, target: Array) -> Rows:
+def _solve_chunk(pencil: Pencil, target: Array) -> Rows:
     """Branches (N, 4, 3), nan where a root is not real; guesses are complex roots that all but are."""
     arm, task, roots = pencil.arm, pencil.task, pencil.roots(target)
     row, place = np.nonzero(roots.real)
@@ -147,7 +147,7 @@ def _solved(pencil: Pencil, target: Array) -> Rows:
     return Rows(q, doubt, np.ones(len(target), bool), None, np.where(beside[:, :, None], roots.q, np.nan))
 
 
-def _order(away: Array) -> Int:
+def _root_order(away: Array) -> Int:
     """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
     away = np.where(np.isnan(away), np.pi, away)
     cost = away[:, np.arange(4), ALL].sum(axis=2)
