@@ -44,7 +44,7 @@ def test_notes_lie_in_a_folder_of_the_user_alone(tmp_path: Path, monkeypatch: py
 def test_a_service_without_folders_has_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
-    assert user_folders.of_port("abc") == f"{tempfile.gettempdir()}/armkin-{os.getuid()}-abc"
+    assert user_folders.port_file_stem("abc") == f"{tempfile.gettempdir()}/armkin-{os.getuid()}-abc"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="what the environment says there")
@@ -54,6 +54,6 @@ def test_no_folder_is_where_somebody_happens_to_stand(tmp_path: Path, monkeypatc
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setenv("XDG_STATE_HOME", "state")
     monkeypatch.setenv("XDG_CACHE_HOME", "cache")
-    assert Path(user_folders.of_port("abc")).is_absolute()
+    assert Path(user_folders.port_file_stem("abc")).is_absolute()
     assert (user_folders.compiled_folder() or tmp_path / "home").is_relative_to(tmp_path / "home")
     assert not (tmp_path / "state").exists()

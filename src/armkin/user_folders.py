@@ -21,7 +21,7 @@ def compiled_folder() -> Path | None:
     return folder if folder.is_absolute() else None  # a relative one would be whatever folder somebody stands in
 
 
-def of_port(key: str) -> str:
+def port_file_stem(key: str) -> str:
     """The beginning of the names of a port's files: its lock, and what is noted of the board behind it.
 
     They outlive a login, as the arm does. Where the user has no folder, as a service, they lie among temporary files.

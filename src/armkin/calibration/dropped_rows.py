@@ -22,12 +22,12 @@ def weights(r: Array | None, scale: float) -> Array:
     """The weights (M,) of residuals (M, 3); 1 for all where nothing was measured."""
     if r is None:
         return np.ones(1)
-    return np.asarray((1.0 + _squared(r, scale) / K**2) ** -2)
+    return np.asarray((1.0 + _squared_norms(r, scale) / K**2) ** -2)
 
 
 def loss(r: Array, scale: float) -> float:
     """The sum of rho over residuals (M, 3): what `weights` are the slopes of."""
-    u2 = _squared(r, scale)
+    u2 = _squared_norms(r, scale)
     return float((u2 / (1.0 + u2 / K**2)).sum())
 
 
@@ -49,5 +49,5 @@ def dropped_row_numbers(weights: Array) -> NDArray[np.intp]:
     return np.flatnonzero(weights < DROPPED)
 
 
-def _squared(r: Array, scale: float) -> Array:
+def _squared_norms(r: Array, scale: float) -> Array:
     return np.asarray(np.einsum("mi,mi->m", r, r) / scale**2)

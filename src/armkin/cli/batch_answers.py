@@ -261,7 +261,7 @@ class _ToFile:
         if not self.batch.resume:
             self.parts.refuse_begun()
         pool = self.batch.engine.uses_pool
-        if pool or self.parts.begun:
+        if pool or self.parts.is_begun:
             self.parts.begin()
         job = self.job._replace(parts=self.parts) if pool else self.job
         try:

@@ -100,14 +100,14 @@ def _arrow_texts(pa: Any, column: Column, quoted: Callable[[Any], str], missing:
     texts = pa.array(values).cast(pa.string())
     if values.dtype.kind != "f":
         return texts
-    odd = _printed_otherwise(values)
+    odd = _needs_python_digits(values)
     if odd.any():
         words = [missing if value != value else repr(value) for value in values[odd].tolist()]
         texts = pa.compute.replace_with_mask(texts, pa.array(odd), pa.array(words, pa.string()))
     return texts
 
 
-def _printed_otherwise(values: NDArray[np.floating]) -> NDArray[np.bool_]:
+def _needs_python_digits(values: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Where pyarrow's digits are not laid out as Python's: 1 for 1.0, 1e-7 for 1e-07, 1e+10 for 10000000000.0, nan."""
     size = np.abs(values)
     plain = (values != np.rint(values)) & (((size >= 1e-3) & (size < 1e9)) | ((size < 1e-10) & (size > 1e-99)))

@@ -34,7 +34,7 @@ class Parts:
         self._lock: Any = None
 
     @property
-    def begun(self) -> bool:
+    def is_begun(self) -> bool:
         """Whether there is such a folder."""
         return self.folder.is_dir()
 
@@ -50,7 +50,7 @@ class Parts:
 
     def refuse_begun(self) -> None:
         """Raise UnfinishedError if an earlier run has left its parts."""
-        if self.begun:
+        if self.is_begun:
             raise UnfinishedError(
                 f"{self.path}.parts holds what an earlier run has finished", file=self.path, parts=str(self.folder)
             )

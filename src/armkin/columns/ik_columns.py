@@ -196,7 +196,7 @@ def _branch_table(
     if every:
         return table
     numbers = (*request.arm.joint_names, "residual_mm", "residual_deg", "motion")
-    return table | {name: _with_gaps(np.asarray(table[name]), present) for name in numbers}
+    return table | {name: _fill_gaps(np.asarray(table[name]), present) for name in numbers}
 
 
 def _residuals(request: choose_branch.Request, s: Solutions, part: slice, lines: _Lines) -> tuple[Array, Array]:
@@ -216,7 +216,7 @@ def _row_norms(values: Array) -> Array:
     return np.asarray(np.sqrt(total))
 
 
-def _with_gaps(values: Array, present: Bool) -> Array:
+def _fill_gaps(values: Array, present: Bool) -> Array:
     """Values where they are `present`, nan elsewhere."""
     padded = np.full(len(present), np.nan)
     padded[present] = values

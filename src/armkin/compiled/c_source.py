@@ -88,7 +88,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         accepted = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
             accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(BLOCK)  # its own criteria have been met
-        fields |= _of_task(arm, task, branches, accepted)
+        fields |= _task_fields(arm, task, branches, accepted)
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
@@ -108,7 +108,7 @@ def _fold_code(
     if geometry is None or not _can_judge_folds(arm, task, geometry) or branches > LANES:
         return [], _part_text("no_folds")
     text = _part_text("folds").replace("@followed@", _part_text("branch_to_fold") + "\n")
-    return [c_functions.jacobian_code(arm)], c_program.fill_fields(text, _of_folds(arm, task) | fields)
+    return [c_functions.jacobian_code(arm)], c_program.fill_fields(text, _fold_fields(arm, task) | fields)
 
 
 def has_rows(task: Task, geometry: Geometry | None) -> bool:
@@ -116,7 +116,7 @@ def has_rows(task: Task, geometry: Geometry | None) -> bool:
     return geometry is not None and geometry.pairs is None and task.orientation == "full"
 
 
-def _of_task(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, str]:
+def _task_fields(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, str]:
     """What the parts of `ik` are filled in with."""
     most = ["ARM_FARTHEST"] * task.position + ["ARM_WILD"] * len(task.sums)
     if task.orientation == "axis":
@@ -148,7 +148,7 @@ def _can_judge_folds(arm: Arm, task: Task, geometry: Geometry) -> bool:
     return plain and geometry.pairs is not None and not geometry.ends and geometry.doubts is None
 
 
-def _of_folds(arm: Arm, task: Task) -> dict[str, str]:
+def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     """What parts/folds.c is filled in with."""
     values = {
         "reach": arm.reach, "solution": SOLUTION, "closed": CLOSED, "folded": FOLDED, "lost": WEAK, "seed": SEED,

@@ -203,7 +203,7 @@ class _CompiledTask:
     ) -> Solutions:
         """All branches of targets in the task's shape; said: how far the caller says that they are rounded."""
         if not self.branches:
-            return self._without_a_form(targets, near, stated)
+            return self._solve_without_form(targets, near, stated)
         alone = self._single is not None and stated is None
         if (
             alone
@@ -242,7 +242,7 @@ class _CompiledTask:
         rounding, most = target_rounding.of_targets(self.arm, self.task, target, shown, single, stated, lead)
         rows = near_itself.standing(self.arm, self.task, target, near_rows, most)
         if len(rows):
-            self._by_python(batch, rows, target, near_rows.reshape(-1, self.n), most - SOLUTION)
+            self._solve_by_python(batch, rows, target, near_rows.reshape(-1, self.n), most - SOLUTION)
         self._finish(batch, target)
         target = target.copy() if np.may_share_memory(target, array) else target  # the caller's arrays may change
         close = close.copy()
@@ -273,10 +273,10 @@ class _CompiledTask:
         if not self.geometry.ordered:
             batch.branch[...] = follow_branches(self.arm, self.task, batch.q, target)
 
-    def _without_a_form(self, targets: ArrayLike, near: ArrayLike | None, stated: ArrayLike | None) -> Solutions:
+    def _solve_without_form(self, targets: ArrayLike, near: ArrayLike | None, stated: ArrayLike | None) -> Solutions:
         """As `armkin.ik`; of an arm with a redundant joint the others by machine code."""
         if (spare := redundancy(self.arm, self.name)) is not None:
-            return families(_of_others, self.arm, spare, targets, near, stated)
+            return families(_solve_others, self.arm, spare, targets, near, stated)
         return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)
 
     def _single_solver(self, call: Any) -> Single | None:
@@ -311,7 +311,7 @@ class _CompiledTask:
         step = self.n if near.size != self.n or len(target) == 1 else 0
         near_rows = near.reshape(-1, self.n)
 
-        def part(rows: slice) -> int:
+        def solve_part(rows: slice) -> int:
             arrays_ = (batch.q, batch.valid, batch.within, batch.branch, batch.status, batch.free, batch.state)
             pointers = (a[rows].ctypes.data for a in arrays_)
             close = near_rows[rows] if step else near_rows
@@ -319,7 +319,7 @@ class _CompiledTask:
             return int(self._batch(count, target[rows].ctypes.data, close.ctypes.data, step, read, *pointers))
 
         least = WORTH if self.geometry.pairs is not None else WORTH // 64
-        left = sum(share_rows(part, len(target), workers, least))
+        left = sum(share_rows(solve_part, len(target), workers, least))
         if left and not read and (batch.state == UNREAD).any():
             return None
         batch.complete[...] = self.geometry.complete
@@ -329,10 +329,10 @@ class _CompiledTask:
             rows = np.flatnonzero(
                 batch.state.view(np.bool_)
             )  # all targets have been read: 0 or 1, which is quicker told
-            self._by_python(batch, rows, target, near_rows)
+            self._solve_by_python(batch, rows, target, near_rows)
         return batch
 
-    def _by_python(
+    def _solve_by_python(
         self, batch: Results, rows: NDArray[np.intp], target: Array, near: Array, rounding: Array | None = None
     ) -> None:
         """Write the answers of some targets, all of which have been read; near: (1, n) or (N, n)."""
@@ -378,7 +378,7 @@ class _CompiledTask:
         return solve._as_commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=stated))
 
 
-def _of_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = True, **options: Any) -> Solutions:
+def _solve_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = True, **options: Any) -> Solutions:
     """`armkin.ik` of an arm whose redundant joint is held, from machine code."""
     return compile(arm, task).ik(targets, task, **options)
 

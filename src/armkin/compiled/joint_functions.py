@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from armkin import forward
 from armkin.formula.arrays import Array
 from armkin.inverse.run.workers import share_rows
-from armkin.keep_out.clearance import Clearance, clearance, least_clearances, named_clearance
+from armkin.keep_out.clearance import Clearance, clearance, least_clearances, name_clearances
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -44,7 +44,7 @@ class JointFunctions:
         if self._clearances is None or not np.isfinite(values).all():
             return clearance(self.arm, values)
         least = self._run(self._clearances, least_clearances, (2,), values, 1).reshape(-1, 2)
-        return named_clearance(self.arm, least[:, 0], least[:, 1].astype(np.intp), values.shape[:-1])
+        return name_clearances(self.arm, least[:, 0], least[:, 1].astype(np.intp), values.shape[:-1])
 
     def _run(
         self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int
@@ -54,11 +54,11 @@ class JointFunctions:
         flat = np.ascontiguousarray(values.reshape(-1, self.arm.n))
         results, wild = np.empty((len(flat), *shape)), np.empty(len(flat), np.uint8)
 
-        def part(rows: slice) -> int:
+        def run_part(rows: slice) -> int:
             pointers = (a[rows].ctypes.data for a in (flat, results, wild))
             return int(call(rows.stop - rows.start, *pointers))
 
-        if sum(share_rows(part, len(flat), workers, WORTH)):
+        if sum(share_rows(run_part, len(flat), workers, WORTH)):
             far = np.flatnonzero(wild)
             results[far] = python(self.arm, flat[far])
         return results.reshape(*values.shape[:-1], *shape)

@@ -197,7 +197,7 @@ def _file_keys(
         ]
     }
     file_keys |= tail
-    return _same_pitch(arm, file_keys)
+    return _keep_pitch(arm, file_keys)
 
 
 def _unchanged_parts(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
@@ -226,7 +226,7 @@ def _joints_without_a_file(arm: Arm) -> list[dict[str, Any]]:
     return joints
 
 
-def _same_pitch(arm: Arm, robot: dict[str, Any]) -> dict[str, Any]:
+def _keep_pitch(arm: Arm, robot: dict[str, Any]) -> dict[str, Any]:
     """The pitch of targets counts from where it did: another table's constant angles go to `pitch_offset`."""
     for name in ("xyz_pitch", "xyz_pitch_roll"):
         try:

@@ -63,10 +63,10 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
         return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], nothing[()], nothing[()])
     held = _guard(full_arm)
     mm, pairs = held.least_clearances(full)
-    return named_clearance(full_arm, mm, pairs, lead)
+    return name_clearances(full_arm, mm, pairs, lead)
 
 
-def named_clearance(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
+def name_clearances(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
     """Clearances (N,) of pairs (N,) with their names, in the shape of a batch."""
     held = _guard(arm)
     bodies, partners = (np.array([held.pair_names(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))

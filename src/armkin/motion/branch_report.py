@@ -9,7 +9,7 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
-from armkin.motion.branches.branch_chains import Chain, why_ended
+from armkin.motion.branches.branch_chains import Chain, end_reason
 from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.plan.path_plan import Branch, Passed, PathPlan, PathRun, Reconfiguration
 from armkin.motion.plan.trajectory_proof import hit_text
@@ -85,7 +85,7 @@ def _branch_name(c: Columns, label: int) -> str:
 
 def _reconfiguration_at(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Reconfiguration:
     """Where and why a run from a sample ends."""
-    why, joint, value, beyond = why_ended(c, chain, first)
+    why, joint, value, beyond = end_reason(c, chain, first)
     e = max(chain.carries(first), 0)
     q = chain.q[min(e + 1, chain.last) - chain.first].copy() if why == "hit" else None
     hit = "" if q is None else hit_text(arm, q)

@@ -60,7 +60,7 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
     most = max(int(min(LONGEST * abs(share) * top, np.pi * 0.9 if turns else 2 * arm.reach) / abs(step)), 1)
     count, why = _steps_carried(arm, task, q, axis, frame, step, most)
     while count:
-        target = _shifted_target(arm, task, q, axis, frame, step * count)
+        target = _shift_target(arm, task, q, axis, frame, step * count)
         [line] = targets_out(task.labels, target[None])
         try:
             speed = {"speed": 100 * abs(share)} if turns else {"tool_speed": abs(share) * TOP}
@@ -79,7 +79,7 @@ def _steps_carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step
     stuck = bool(arm.keep_out) and float(clearance(arm, q).mm) < 0
     before, leaving = np.inf, False  # an arm that stands near a singularity may leave it
     for k in range(1, most + 1):
-        goal = _shifted_target(arm, task, q, axis, frame, step * k)[None]
+        goal = _shift_target(arm, task, q, axis, frame, step * k)[None]
         r, J = scaled(arm, task, posture[None], goal)
         move = np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0]
         blocked = np.linalg.norm(J[0] @ move - r[0]) > 0.1 * np.linalg.norm(r[0])  # no joint speed leads there
@@ -94,12 +94,12 @@ def _steps_carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step
             posture = posture + np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0] * unit
         if not float(np.abs(scaled(arm, task, posture[None], goal)[0]).max()) < 1e-7:
             return k - 1, "it is out of reach" if k > 1 else "a singularity is near"
-        if why := _why_not_there(arm, posture, stuck):
+        if why := _stop_reason(arm, posture, stuck):
             return k - 1, why
     return most, ""
 
 
-def _why_not_there(arm: Arm, q: Array, stuck: bool) -> str:
+def _stop_reason(arm: Arm, q: Array, stuck: bool) -> str:
     """The limit or the hit at a posture, in words; stuck: the arm touches something to begin with."""
     outside = (q < arm.lower) | (q > arm.upper)
     if outside.any():
@@ -111,7 +111,7 @@ def _why_not_there(arm: Arm, q: Array, stuck: bool) -> str:
     return ""
 
 
-def _shifted_target(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, distance: float) -> Array:
+def _shift_target(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, distance: float) -> Array:
     """The target that is `distance` [mm | rad] away along an axis from where joint values (n,) are."""
     T = fk(arm, q)
     target = np.array(targets_of(task, T[None], q[None])[0])

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
-from armkin.motion.timing.profile import at_rest, seven_phases, trapezoid
+from armkin.motion.timing.profile import rest_profile, seven_phases, trapezoid
 from armkin.motion.timing.trajectory import Straight, Trajectory
 from armkin.motors import motor_accel, pulses, undriven_joints
 
@@ -67,7 +67,7 @@ def straight_move(
     change = np.abs(end - start)
     moving = change > 1e-12
     if not moving.any():
-        return Straight(start, end, at_rest(0.0))
+        return Straight(start, end, rest_profile(0.0))
     top = float((arm.max_speed[moving] / change[moving]).min()) * speed
     accel = float((arm.max_accel[moving] / change[moving]).min())
     turned = np.abs(arm.motor_gain @ (end - start))

@@ -19,28 +19,28 @@ if TYPE_CHECKING:
 
 
 def _do_joint_move(walk: Walk, move: Move, value: Any) -> None:
-    walk.close()
+    walk.close_group()
     walk.untried_postures, walk.refused = (), None
     goal = path_numbers.joint_values(walk.arm, walk.q, value)
     walk.append_joint_move(goal, move)
-    walk.clear(None)
+    walk.begin_group(None)
 
 
 def _do_point(walk: Walk, move: Move, value: list[float]) -> None:
     goal = walk.target(value)
-    walk.close()
+    walk.close_group()
     walk.leads, walk.untried_postures, walk.refused = move, (), None
-    walk.clear(goal, move.branch)
+    walk.begin_group(goal, move.branch)
 
 
 def _add_line(walk: Walk, move: Move, value: list[float], inner: bool = False) -> None:
     corner = walk.corner_blend(move, inner)
     if corner is not None and walk.dense is None:
-        walk.add(move, path_pieces.line(walk.task, walk.spot, walk.target(value)))
+        walk.add_piece(move, path_pieces.line(walk.task, walk.spot, walk.target(value)))
         return
     _gather_points(walk, move, [value])
     if corner is not None:
-        walk.lay_dense(corner)
+        walk.fit_dense(corner)
 
 
 def _add_polyline(walk: Walk, move: Move, value: list[list[float]]) -> None:
@@ -66,7 +66,7 @@ def _gather_points(walk: Walk, move: Move, targets: list[list[float]]) -> None:
 
 def _add_arc(walk: Walk, move: Move, value: Any) -> None:
     via = path_numbers.coordinates(walk.task, value.via)
-    walk.add(move, path_pieces.arc(walk.task, walk.spot, via, walk.target(value.to)))
+    walk.add_piece(move, path_pieces.arc(walk.task, walk.spot, via, walk.target(value.to)))
 
 
 def _add_circle(walk: Walk, move: Move, value: Any) -> None:
@@ -77,11 +77,11 @@ def _add_circle(walk: Walk, move: Move, value: Any) -> None:
     if np.linalg.norm(normal) < 1e-9:
         raise UsageError("circle: its normal has no length")
     centre, angle = path_numbers.coordinates(walk.task, value.centre), 2 * np.pi * value.turns
-    walk.add(move, path_pieces.circle(walk.task, walk.spot, centre, normal, angle, value.rise, None))
+    walk.add_piece(move, path_pieces.circle(walk.task, walk.spot, centre, normal, angle, value.rise, None))
 
 
 def _add_spline(walk: Walk, move: Move, value: list[list[float]]) -> None:
-    walk.add(move, path_pieces.spline(walk.task, walk.spot, [walk.target(target) for target in value]))
+    walk.add_piece(move, path_pieces.spline(walk.task, walk.spot, [walk.target(target) for target in value]))
 
 
 def _add_offset(walk: Walk, move: Move, value: Any) -> None:
@@ -93,10 +93,10 @@ def _add_offset(walk: Walk, move: Move, value: Any) -> None:
         else:  # the tool's axes are known once the joints are
             typed = walk.spot.sums
             walk.take_posture()
-            walk.clear(None)
+            walk.begin_group(None)
             walk.keep_typed_turns(typed)
             d = (fk(walk.arm, walk.q)[:3, :3] @ np.append(d, 0.0)[:3])[: len(d)]
-    walk.add(move, path_pieces.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + d)))
+    walk.add_piece(move, path_pieces.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + d)))
 
 
 def _queue_wait(walk: Walk, move: Move, value: float) -> None:

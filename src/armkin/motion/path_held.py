@@ -69,7 +69,7 @@ def path_held(
 def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
     """What is known of a plan's branches, with the values of all joints; without its motion."""
 
-    def whole(q: Array) -> Array:
+    def unlocked(q: Array) -> Array:
         return unlock(arm, held, q)
 
     worst = plan.nearest_singularity
@@ -77,12 +77,12 @@ def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> 
         plan,
         arm=arm,
         held=dict(held),
-        runs=[replace(r, start_joints=whole(r.start_joints), end_joints=whole(r.end_joints)) for r in plan.runs],
-        branches=[replace(b, start_joints=whole(b.start_joints)) for b in plan.branches],
+        runs=[replace(r, start_joints=unlocked(r.start_joints), end_joints=unlocked(r.end_joints)) for r in plan.runs],
+        branches=[replace(b, start_joints=unlocked(b.start_joints)) for b in plan.branches],
         reconfigurations=[
             replace(r, index=None if r.joint is None else arm.joint_names.index(r.joint)) for r in plan.reconfigurations
         ],
-        nearest_singularity=None if worst is None else (*worst[:2], whole(worst[2])),
+        nearest_singularity=None if worst is None else (*worst[:2], unlocked(worst[2])),
         markers=[],
         trajectory=None,
         approach=None,

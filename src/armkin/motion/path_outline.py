@@ -10,7 +10,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.motion.branches.branch_path import Pace
 from armkin.motion.move_kinds import MOVES
-from armkin.motion.path_planner import TOLERANCE, corners_wished
+from armkin.motion.path_planner import TOLERANCE, default_corner_blend
 from armkin.motion.plan_moves import PathOptions, Walk
 from armkin.motion.tool_path.path_pieces import line
 from armkin.motion.tool_path.route import join_pieces
@@ -27,7 +27,7 @@ def route_targets(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Arr
     Between them are joint moves, which may change the branch; a point without a way has one target. Raises UsageError
     for a way that begins where joint values leave the tool: it would move with the arm.
     """
-    corner = corners_wished(file, None, None)
+    corner = default_corner_blend(file, None, None)
     pace = Pace(tolerance=file.tolerance or TOLERANCE)
     outline = _Outline(arm, file, pace, arm.home, PathOptions(file.task, corner, None, None, False, None))
     outline.step, outline.targets_per_route = step, []
@@ -46,7 +46,7 @@ class _Outline(Walk):
     def _begin(self) -> None:
         start = self.file.start
         if start is not None and not isinstance(start, str) and start.joints is None:
-            self.clear(self.target(start.point))  # type: ignore[arg-type]
+            self.begin_group(self.target(start.point))  # type: ignore[arg-type]
         self.begun = self.q
 
     def take_posture(self) -> None:

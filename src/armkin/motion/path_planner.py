@@ -63,7 +63,7 @@ def plan_path(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
     if arm.motors and not undriven_joints(arm):
         standing = legal_with_same_pulses(arm, standing)
     near = None if request.near is None else np.asarray(request.near, dtype=float)
-    wish = corners_wished(file, request.corners, request.blend)
+    wish = default_corner_blend(file, request.corners, request.blend)
     options = PathOptions(request.task, wish, near, request.branch, request.split, request.samples)
     return prove_plan(Walk(arm, file, pace, standing, options).plan_all(MOVES))
 
@@ -89,7 +89,7 @@ def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:
     )
 
 
-def corners_wished(file: PathFile, corners: str | None, blend: float | None) -> float | Literal["default"] | None:
+def default_corner_blend(file: PathFile, corners: str | None, blend: float | None) -> float | Literal["default"] | None:
     """The blend of corners without their own [mm], None: by the tolerance; "default": nothing is said of them."""
     if corners is not None and blend is not None:
         raise UsageError("corners and blend both say how corners are passed: give one of them")

@@ -49,12 +49,12 @@ def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, request: PathReq
     fixed = _redundant_start(arm, file, spare.joint, standing)
     stands = standing if begin is None else begin
     close = stands if request.near is None else np.asarray(request.near, dtype=float)
-    others = _path_of_other_joints(arm, file, spare.joint)
+    path_of_others = _path_of_other_joints(arm, file, spare.joint)
     refused: NoSolutionError | None = None
     near = float(close[spare.joint]), float(stands[spare.joint])
     for value in _values_to_try(arm, file, request.task, *near) if fixed is None else [fixed]:
         try:
-            return path_held(arm, others, {name: value}, request, begin)
+            return path_held(arm, path_of_others, {name: value}, request, begin)
         except NoSolutionError as error:
             refused = refused or error
     assert refused is not None

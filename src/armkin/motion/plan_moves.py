@@ -23,12 +23,12 @@ from armkin.model.limits import check_limits, outside_limits, outside_text
 from armkin.motion import branch_report
 from armkin.motion.branches.branch_path import Pace, carry_route, run_stretches, starts_at
 from armkin.motion.branches.route_grid import Missed, largest_miss, route_deviation
-from armkin.motion.branches.wrist_window import with_detours
+from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.joint_moves import approach_move, straight_move
 from armkin.motion.plan.path_plan import Marker, PathPlan
 from armkin.motion.timing.curved_stretch import Curve
-from armkin.motion.timing.limit_jerk import Smoothed, way_of, ways_of
-from armkin.motion.timing.profile import at_rest
+from armkin.motion.timing.limit_jerk import Smoothed, joint_way, joint_ways
+from armkin.motion.timing.profile import rest_profile
 from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import path_numbers, path_pieces
 from armkin.motion.tool_path.dense_points import FIT, PLAN, Polyline
@@ -75,7 +75,7 @@ class Walk:
         self.q = start  # where the joints are when all so far is done
         self.stretches: list[Stretch] = []
         self.markers: list[Marker] = []  # what happens between stretches
-        self.clear(None)
+        self.begin_group(None)
 
     @property
     def task(self) -> Task:
@@ -91,7 +91,7 @@ class Walk:
             self._spot = split_target(self.task, targets_of(self.task, fk(self.arm, self.q)[None], self.q[None])[0])
         return self._spot
 
-    def clear(self, goal: Spot | None, branch: str | None = None) -> None:
+    def begin_group(self, goal: Spot | None, branch: str | None = None) -> None:
         """Begin a group: at a target whose branch is free, or where the joints are."""
         self.goal, self.goal_branch, self.group = goal, branch, self.current_moves
         self._spot = goal
@@ -122,7 +122,7 @@ class Walk:
         """Do a move; behind the last one, what has gathered."""
         if number == len(self.file.moves):
             with _errors_of_moves(self):
-                self.close()
+                self.close_group()
             return
         move = self.file.moves[number]
         self.current_moves = number, number
@@ -132,7 +132,7 @@ class Walk:
     def take_posture(self) -> None:
         """Go to the target that has gathered alone, in a posture; the others are tried if what follows is refused."""
         if self.goal is None or self.pieces:
-            self.close()
+            self.close_group()
             return
         postures = self.untried_postures or _postures(self, self.goal, self.goal_branch)
         self.goal_branch, self.untried_postures = None, postures[1:]
@@ -146,9 +146,9 @@ class Walk:
 
     def _restore(self) -> int:
         """Be again where a posture was taken, with the others left; the number of that move."""
-        others, refused, (state, plan) = self.untried_postures, self.refused, self.saved_state
+        untried, refused, (state, plan) = self.untried_postures, self.refused, self.saved_state
         vars(self).update(
-            {**_copy_state(state), "untried_postures": others, "refused": refused, "saved_state": self.saved_state}
+            {**_copy_state(state), "untried_postures": untried, "refused": refused, "saved_state": self.saved_state}
         )
         vars(self.plan).update(_copy_state(plan))
         return self.current_moves[0]
@@ -160,15 +160,15 @@ class Walk:
         if start is not None and value is None:
             goal = self.target(start.point)  # type: ignore[union-attr, arg-type]
             _nearest_posture(self, goal, None)  # refused here, of this key
-            self.clear(goal)
+            self.begin_group(goal)
             self.opening = True
         elif value is not None:
             self.q = path_numbers.joint_values(self.arm, self.q, value)
             check_limits(self.arm, self.q[None])
-            self.clear(None)
+            self.begin_group(None)
         self.begun = self.q
 
-    def lay_dense(self, corner: float | None = None) -> None:
+    def fit_dense(self, corner: float | None = None) -> None:
         """Make the points that have gathered pieces; corner: how their last one is passed."""
         if self.dense is None:
             return
@@ -194,7 +194,7 @@ class Walk:
 
     def queue_event(self, kind: str, value: Any) -> None:
         """Something that happens where the tool is then: behind the moves that have gathered, if there are some."""
-        self.lay_dense()
+        self.fit_dense()
         if self.goal is None and not self.pieces:
             self.emit_event(kind, value)
         else:
@@ -205,16 +205,16 @@ class Walk:
         if kind == "wait" and value == "enter":
             self.markers.append(Marker(len(self.stretches), "pause", None))
         elif kind == "wait":
-            self.stretches.append(Straight(self.q, self.q, at_rest(float(value))))
+            self.stretches.append(Straight(self.q, self.q, rest_profile(float(value))))
         else:
             self.markers.append(Marker(len(self.stretches), kind, value))
 
-    def add(self, move: Move, piece: Piece) -> None:
+    def add_piece(self, move: Move, piece: Piece) -> None:
         """Gather a piece of the tool's way; move: whose speed and blend it has."""
         speed = None if move.speed is None else move.speed / 100 * self.pace.speed
         first = (self.group if self.goal is not None or self.pieces else self.current_moves)[0]
         self.group = first, self.current_moves[1]
-        self.lay_dense()
+        self.fit_dense()
         self.pieces.append(replace(piece, speed=speed, tool_speed=move.tool_speed or piece.tool_speed))
         self.blends.append(self.corner_blend(move))
         self._spot = piece.last
@@ -225,10 +225,10 @@ class Walk:
 
     # Groups
 
-    def close(self) -> None:
+    def close_group(self) -> None:
         """Plan the group of tool moves that has gathered; what is wrong with it is said of its moves."""
         moves_now, self.current_moves = self.current_moves, self.group
-        self.lay_dense()
+        self.fit_dense()
         self._plan_group()
         self.current_moves = moves_now
 
@@ -253,7 +253,7 @@ class Walk:
             curves, misses = _timed_curves(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
                 self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
-            self.append_curves(with_detours(route, run.chain.windows), curves, order, misses)
+            self.append_curves(add_detours(route, run.chain.windows), curves, order, misses)
             near = self.q
         for kind, value in self.pauses.get(len(self.pieces), ()):
             self.emit_event(kind, value)
@@ -269,7 +269,7 @@ class Walk:
             fixed=None if free else self.q, branch=branch, count=self.options.samples,
         )  # fmt: skip
         branch_report.note_runs(self.plan, carried, near)
-        if not carried.whole and not (self.options.split and carried.covered):
+        if not carried.in_one_run and not (self.options.split and carried.covered):
             raise branch_report.path_refusal(self.plan, carried, branch)
         return carried.columns.s, carried.moving_runs
 
@@ -281,13 +281,13 @@ class Walk:
             round(float(route.ends[number_of_curve[k]]), 6): self.pauses[k] for k in self.pauses if k in number_of_curve
         }
         for curve in curves:
-            path_ = way_of(curve)
+            path_ = joint_way(curve)
             for kind, value in events.pop(round(float(path_.s[0]), 6), ()):
                 self.emit_event(kind, value)
             self.plan.note_stretch(len(self.stretches), curve, self.plan.length)
             self.stretches.append(curve)
             self.q = curve.end
-        _note_deviation(self.plan, route, ways_of(curves), misses)
+        _note_deviation(self.plan, route, joint_ways(curves), misses)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
@@ -312,7 +312,7 @@ def _timed_curves(
     for share in PLAN:
         tight = replace(pace, tolerance=share * pace.tolerance)
         made = run_stretches(arm, route, s, run, near, tight, fixed=fixed)
-        misses = largest_miss(arm, route, ways_of(made))
+        misses = largest_miss(arm, route, joint_ways(made))
         largest = 0.0 if misses is None else misses[0]
         if largest <= pace.tolerance:
             return made, misses

@@ -10,7 +10,7 @@ from armkin.formula.arrays import Array
 from armkin.motion.joint_moves import straight_move
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
-from armkin.motion.timing.profile import at_rest, trapezoid
+from armkin.motion.timing.profile import rest_profile, trapezoid
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import motor_accel, pulses
 
@@ -32,7 +32,7 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stre
     left = stretch.duration - begin
     if np.array_equal(stretch.start, stretch.end):
         if np.array_equal(pulses(arm, standing), pulses(arm, stretch.end)):
-            return Straight(stretch.end, stretch.end, at_rest(max(left, 0.0)))  # a pause
+            return Straight(stretch.end, stretch.end, rest_profile(max(left, 0.0)))  # a pause
         return straight_move(arm, standing, stretch.end)
     if isinstance(stretch, Straight) and stretch.law.is_trapezoid:
         share = max(1.0 - float(stretch.law.evaluate(np.array([begin]))[0]), 1e-9)

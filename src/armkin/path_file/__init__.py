@@ -146,9 +146,9 @@ def _is_same_robot(stated: str, robot_file: str, folder: str) -> bool:
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema of a path file, for editors (`robots/path.schema.json`)."""
-    from armkin.robot_file.robot_schema import made_from
+    from armkin.robot_file.robot_schema import schema_of_model
 
-    return made_from(PathFile, "armkin path file")
+    return schema_of_model(PathFile, "armkin path file")
 
 
 def _similar_files_text(name: str) -> str:

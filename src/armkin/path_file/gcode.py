@@ -117,7 +117,7 @@ class _Program:
         if 4.0 in codes:
             self._dwell(values, gripped)
         self._set_modes(codes)
-        self._passed_over(codes, values)
+        self._pass_over(codes, values)
         self._offsets_and_motion(codes, values)
         if values:
             letter = next(iter(values))
@@ -132,7 +132,7 @@ class _Program:
             if self.feed < 0:
                 raise self._error("F below 0 is no feed")
 
-    def _passed_over(self, codes: list[float], values: dict[str, float]) -> None:
+    def _pass_over(self, codes: list[float], values: dict[str, float]) -> None:
         """G codes without a meaning for an arm, and the words that belong to them."""
         for code in codes:
             if code in _IGNORED_G:

@@ -72,17 +72,17 @@ def free_at_place(
 @lru_cache(maxsize=4)
 def _arm_among_obstacles(arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, among what stands with the targets."""
-    return replace(_moved_arm(arm, position, turn), keep_out=obstacles.keep_out, clearance=obstacles.clearance)
+    return replace(_move_arm(arm, position, turn), keep_out=obstacles.keep_out, clearance=obstacles.clearance)
 
 
 def arm_at_place(arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float) -> Arm:
     """The arm at a place, in the targets' frame, with its own keep-outs, which move with it, and what stands there."""
-    mine = tuple(_moved_entry(entry, position, turn) for entry in arm.keep_out)
+    mine = tuple(_move_entry(entry, position, turn) for entry in arm.keep_out)
     clearance = max(arm.clearance, obstacles.clearance)
-    return replace(_moved_arm(arm, position, turn), keep_out=mine + obstacles.keep_out, clearance=clearance)
+    return replace(_move_arm(arm, position, turn), keep_out=mine + obstacles.keep_out, clearance=clearance)
 
 
-def _moved_arm(arm: Arm, position: tuple[float, float, float], turn: float) -> Arm:
+def _move_arm(arm: Arm, position: tuple[float, float, float], turn: float) -> Arm:
     P = np.eye(4)
     P[:3, :3], P[:3, 3] = rotation_about(2, turn), position
     link, base = arm.link.copy(), P @ arm.base
@@ -92,17 +92,17 @@ def _moved_arm(arm: Arm, position: tuple[float, float, float], turn: float) -> A
     return replace(arm, link=link, base=base)
 
 
-def _moved_entry(entry: Entry, position: tuple[float, float, float], turn: float) -> Entry:
+def _move_entry(entry: Entry, position: tuple[float, float, float], turn: float) -> Entry:
     """A keep-out that stands with an arm, where the arm stands at a place."""
 
-    def there(point: Sequence[float]) -> tuple[float, float, float]:
+    def placed(point: Sequence[float]) -> tuple[float, float, float]:
         x, y, z = (rotation_about(2, turn) @ np.array(point) + position).tolist()
         return x, y, z
 
     if entry.floor is not None:
         return entry.model_copy(update={"floor": entry.floor + position[2]})
     if entry.capsule is not None:
-        ends = {"begin": there(entry.capsule.begin), "end": there(entry.capsule.end)}
+        ends = {"begin": placed(entry.capsule.begin), "end": placed(entry.capsule.end)}
         return entry.model_copy(update={"capsule": entry.capsule.model_copy(update=ends)})
     if entry.box is not None:
         box = entry.box
@@ -112,6 +112,6 @@ def _moved_entry(entry: Entry, position: tuple[float, float, float], turn: float
                 update={"size": tuple(high - low), "xyz": tuple(0.5 * (low + high)), "min": None, "max": None}
             )
         roll, pitch, yaw = box.rpy
-        put = {"xyz": there(box.xyz), "rpy": (roll, pitch, yaw + turn / DEGREE)}
+        put = {"xyz": placed(box.xyz), "rpy": (roll, pitch, yaw + turn / DEGREE)}
         return entry.model_copy(update={"box": box.model_copy(update=put)})
     return entry

@@ -63,7 +63,7 @@ def joint_to_hold(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
     return ("", ()) if spare is None else (arm.joint_names[spare.joint], values_to_hold(arm, file, spare))
 
 
-def rates_lacking(arm: Arm) -> str:
+def missing_rates_text(arm: Arm) -> str:
     """Why no path of an arm can be planned: the joints' rates that its file lacks; "" where it has them."""
     from armkin.motion.joint_moves import check_rates
 

@@ -236,10 +236,10 @@ def _place_result(
     best = _best_place(room, reached, margin)
     goals, none = positions_of(question.task, question.targets), np.zeros((0, question.arm.n))
     place = Place(question.arm, x, y, yaws, question.z, reached, margin, len(question.targets), best, goals, none)
-    return _with_postures(question, place if file is None else _plan_best_places(question, place, file, room))
+    return _add_postures(question, place if file is None else _plan_best_places(question, place, file, room))
 
 
-def _with_postures(question: Question, place: Place) -> Place:
+def _add_postures(question: Question, place: Place) -> Place:
     """The same with, for each target reached from the best place, the legal posture that is nearest to home."""
     position, turn = place.xyz[:2], float(place.yaw[place.best[2]])
     plan = next((path.plan for path in place.planned if path.index == place.best and path.plan is not None), None)
@@ -257,7 +257,7 @@ def _with_postures(question: Question, place: Place) -> Place:
 
 def _plan_best_places(question: Question, place: Place, file: PathFile, room: Room) -> Place:
     """The same with the best places planned; one that cannot be planned does not reach all."""
-    if why := place_path.rates_lacking(question.arm):
+    if why := place_path.missing_rates_text(question.arm):
         return replace(place, unplanned=why)
     tried: list[PathFromPlace] = []
     left = place.reached.copy()

@@ -60,16 +60,16 @@ class Question(NamedTuple):
     def by_arcs(self) -> bool:
         """Whether a yaw adds to joint 1 alone, and the yaws divide the circle."""
         on_axis = np.abs(self.arm.link[0][:2, 3]).max() <= STRAIGHT * self.arm.reach
-        return self._upright and bool(on_axis) and abs(self.yaws * self.step - TURN) < STRAIGHT
+        return self._stands_upright and bool(on_axis) and abs(self.yaws * self.step - TURN) < STRAIGHT
 
     @property
     def by_distance_alone(self) -> bool:
         """Whether what joints behind joint 1 are asked depends on the target's distance from that alone."""
         turning = self.task.orientation != "none" or self.task.name in TURNING
-        return self._upright and not turning and not self.by_arcs
+        return self._stands_upright and not turning and not self.by_arcs
 
     @property
-    def _upright(self) -> bool:
+    def _stands_upright(self) -> bool:
         """Whether joint 1 turns about a line upright, as it is commanded, and nothing is kept out."""
         arm = self.arm
         free = not arm.keep_out and not self.obstacles.keep_out
@@ -90,20 +90,20 @@ def positions_of(task: Task, targets: Array) -> Array:
 def reached_counts(question: Question, positions: Array) -> NDArray[np.int64]:
     """How many targets are reached from positions (P, 2) at each yaw: (P, K); of values to hold, at the best one."""
     if question.values:
-        return _most_of_values(question, positions)
+        return _greatest_counts(question, positions)
     at_once = len(positions) if question.by_distance_alone else max(BLOCK // len(question.targets), 1)
     blocks = [positions[start : start + at_once] for start in range(0, len(positions), at_once)]
-    return np.concatenate([_counted_targets(question, block, _legal_yaws(question, block)) for block in blocks])
+    return np.concatenate([_count_targets(question, block, _legal_yaws(question, block)) for block in blocks])
 
 
-def _most_of_values(question: Question, positions: Array) -> NDArray[np.int64]:
+def _greatest_counts(question: Question, positions: Array) -> NDArray[np.int64]:
     """The same of a redundant joint's values: the most of what is reached with it held at each of its values.
 
     Keep-outs only take away: a place is asked among them where more is reached without them than is known.
     """
     counts = np.zeros((len(positions), question.yaws), np.int64)
     blocked = question.arm.keep_out or question.obstacles.keep_out
-    bare = question._replace(arm=_without_keep_outs(question.arm), obstacles=Obstacles())
+    bare = question._replace(arm=_drop_keep_outs(question.arm), obstacles=Obstacles())
     left = np.arange(len(positions))
     for held, without in zip(each_value(question), each_value(bare), strict=True):
         to_ask, counted = left, reached_counts(without, positions[left])
@@ -123,7 +123,7 @@ def each_value(question: Question) -> Iterator[Question]:
         yield question
     for value in question.values:
         full_arm = HeldArm(question.arm, {question.spare: value})
-        free_arm = _with_held_joint(question.arm, question.spare, value)  # one of many arms: not worth being compiled
+        free_arm = _hold_joint(question.arm, question.spare, value)  # one of many arms: not worth being compiled
         yield question._replace(arm=free_arm, values=(), full_arm=full_arm, solve=ik)
 
 
@@ -141,18 +141,18 @@ def at_value(question: Question, position: Array, turn: float) -> Question:
 
 
 @lru_cache(maxsize=4)
-def _without_keep_outs(arm: Arm) -> Arm:
+def _drop_keep_outs(arm: Arm) -> Arm:
     """The arm without its keep-outs."""
     return replace(arm, keep_out=()) if arm.keep_out else arm
 
 
 @lru_cache(maxsize=256)
-def _with_held_joint(arm: Arm, joint: str, value: float) -> Arm:
+def _hold_joint(arm: Arm, joint: str, value: float) -> Arm:
     """The arm with a joint held: one and the same for each value, so that its solver is prepared once."""
     return lock(arm, {joint: value})
 
 
-def _counted_targets(question: Question, positions: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _count_targets(question: Question, positions: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
     """The same of what is legal (P, N, K); of ways that one branch does not carry, less than all."""
     if not question.ways:
         return np.asarray(legal.sum(axis=1, dtype=np.int64))
@@ -199,7 +199,7 @@ def _by_radius(question: Question, positions: Array) -> NDArray[np.bool_] | None
     p, i, k = np.nonzero(open_)
     for start in range(0, len(p), BLOCK):
         block = slice(start, start + BLOCK)
-        beside = _unturned_targets(question._replace(targets=question.targets[i[block]]), positions[p[block]])
+        beside = _shift_targets(question._replace(targets=question.targets[i[block]]), positions[p[block]])
         turn = turns[k[block]]
         goals = _turn_targets(question.task, beside, turn, np.cos(turn), np.sin(turn))
         legal[p[block], i[block], k[block]] = _any_legal(question, goals)
@@ -210,23 +210,23 @@ def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDAr
     """At which yaws targets (M,) are reached from places (M, 2), by one solve each: (M, K)."""
     legal = np.zeros((len(target), question.yaws), bool)
     near = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
-    goals = _unturned_targets(question._replace(targets=question.targets[target[near]]), place[near])
+    goals = _shift_targets(question._replace(targets=question.targets[target[near]]), place[near])
     left = np.arange(len(near))
     if (parts := columns(question.arm, goals, question.task.name)) is not None:
         edges = [left[:0]]
         for part in parts:
-            legal[near[part.rows]] = _turned_legal(question, part.values, part.valid)
+            legal[near[part.rows]] = _legal_turns(question, part.values, part.valid)
             edges.append(part.rows.start + part.left)
         left = np.concatenate(edges)
     if len(left):
         s, rows = question.solve(question.arm, goals[left], question.task.name), near[left]
-        legal[rows] = _turned_legal(question, list(s.q.transpose(2, 1, 0)), s.valid.T)
+        legal[rows] = _legal_turns(question, list(s.q.transpose(2, 1, 0)), s.valid.T)
         edge = rows[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)]
         legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
     return legal
 
 
-def _turned_legal(question: Question, values: list[Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _legal_turns(question: Question, values: list[Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """At which yaws some branch is within limits: n joints' values at yaw 0 (B, M), valid (B, M) -> (M, K)."""
     arm, K = question.arm, question.yaws
     allowed = valid
@@ -245,7 +245,7 @@ def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> N
     for start in range(0, len(target), at_once):
         block = slice(start, start + at_once)
         m, k = np.nonzero(_within_reach(question, target[block], place[block], turns))
-        beside = _unturned_targets(question._replace(targets=question.targets[target[block]]), place[block])
+        beside = _shift_targets(question._replace(targets=question.targets[target[block]]), place[block])
         goals = _turn_targets(question.task, beside[m], turns[k], cosine[k], sine[k])
         legal[start + m, k] = _any_legal(question, goals)
     return legal
@@ -345,12 +345,10 @@ def free_from(
 
 def targets_from(question: Question, position: Array, turn: float) -> Array:
     """The targets in the frame of an arm at a place (2,), or each from a place (N, 2) of its own, and a yaw."""
-    return _turn_targets(
-        question.task, _unturned_targets(question, position), np.array(turn), np.cos(turn), np.sin(turn)
-    )
+    return _turn_targets(question.task, _shift_targets(question, position), np.array(turn), np.cos(turn), np.sin(turn))
 
 
-def _unturned_targets(question: Question, position: Array) -> Array:
+def _shift_targets(question: Question, position: Array) -> Array:
     """The same of an arm that is not turned."""
     targets = question.targets.copy()
     shift = np.concatenate([position, np.full((*position.shape[:-1], 1), question.z)], axis=-1)

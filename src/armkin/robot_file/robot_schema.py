@@ -82,17 +82,17 @@ def json_schema() -> dict[str, Any]:
     """
     for model in (Pose, Base):  # their defaults stand in the schema, and their own build was deferred
         model.model_rebuild()
-    return with_keep_out(made_from(RobotFile, "armkin robot file", examples=EXAMPLES))
+    return add_keep_out_schema(schema_of_model(RobotFile, "armkin robot file", examples=EXAMPLES))
 
 
 def scene_schema() -> dict[str, Any]:
     """The schema of a scene."""
     from armkin.robot_file.scene_file import Scene
 
-    return with_keep_out(made_from(Scene, "armkin scene"))
+    return add_keep_out_schema(schema_of_model(Scene, "armkin scene"))
 
 
-def with_keep_out(schema: dict[str, Any]) -> dict[str, Any]:
+def add_keep_out_schema(schema: dict[str, Any]) -> dict[str, Any]:
     """A schema whose `keep_out` says what an entry is: the word self, or one of the shapes."""
     made = _tidy_schema(TypeAdapter(keep_out_keys.Entry).json_schema(schema_generator=_Generator))
     schema.setdefault("$defs", {}).update(made.pop("$defs", {}))
@@ -102,7 +102,7 @@ def with_keep_out(schema: dict[str, Any]) -> dict[str, Any]:
     return schema
 
 
-def made_from(model: type[BaseModel], title: str, **more: Any) -> dict[str, Any]:
+def schema_of_model(model: type[BaseModel], title: str, **more: Any) -> dict[str, Any]:
     """The schema of a kind of file; more: keys that stand before those of the model."""
     made = _tidy_schema(model.model_json_schema(schema_generator=_Generator))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **more, **made}

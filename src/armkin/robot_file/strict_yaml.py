@@ -41,7 +41,7 @@ class Kind:
     values: int = MAX_VALUES
 
     @property
-    def empty(self) -> str:
+    def empty_text(self) -> str:
         """What is said of a file without a value."""
         return f"the file is empty; a {self.name} has at least {self.least}"
 
@@ -201,7 +201,7 @@ def _build(events: Iterator[Any], kind: Kind) -> Document:
     for event in events:
         builder.take(event)
     if builder.root is None:
-        raise StrictYamlError(0, kind.empty)
+        raise StrictYamlError(0, kind.empty_text)
     return Document(builder.root, builder.lines)
 
 
@@ -299,7 +299,7 @@ def _read_scalar(event: Any, parent: _Node | None, line: int, kind: Kind) -> Any
         return text
     if text in ("", "~", "null", "Null", "NULL"):
         if parent is None:
-            raise StrictYamlError(0, kind.empty)
+            raise StrictYamlError(0, kind.empty_text)
         if parent.mapping:
             raise StrictYamlError(line, f"{one_line(parent.key or '')} has no value; give one, or leave the key out")
         raise StrictYamlError(line, f"item {len(parent.items) + 1} of a list has no value; give one")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from armkin.board.ports.port import SIM
 from armkin.errors import PortInUseError
-from armkin.user_folders import of_port
+from armkin.user_folders import port_file_stem
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
@@ -125,7 +125,7 @@ def _try_lock(name: str) -> BaseFileLock | None:
 def _lock_path(name: str, end: str) -> str:
     real = name if "://" in name else os.path.realpath(name)
     key = hashlib.sha256(real.encode("utf-8", "surrogateescape")).hexdigest()[:16]
-    return f"{of_port(key)}.{end}"
+    return f"{port_file_stem(key)}.{end}"
 
 
 def _read_pid(name: str) -> int | None:

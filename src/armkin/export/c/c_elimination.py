@@ -139,9 +139,9 @@ def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:
     return {
         "links": np.concatenate([frame_rows(link) for link in pencil.links]),
         "first": _first_factor(slot, ends.factors) if slot != 1 else None,
-        "second": _by_fours(ends.factors[1]) if slot == 0 else None,
-        "N": _by_fours(ends.N) if slot == 1 else None,
-        "recover": _by_fours(ends.recover) if slot == 1 else None,
+        "second": _pad_to_fours(ends.factors[1]) if slot == 0 else None,
+        "N": _pad_to_fours(ends.N) if slot == 1 else None,
+        "recover": _pad_to_fours(ends.recover) if slot == 1 else None,
         "columns": pencil.columns,
         "mix": pencil.mix,
         "K_re": pencil.K_re if pencil.K_re.size else None,
@@ -178,11 +178,11 @@ def _first_factor(slot: int, factors: tuple[Array, ...]) -> Array:
     """The first factor of Q, its matrices transposed: (3, 15, 16) in slot La, (15, 9 * 16) in slot Le."""
     matrices = factors[0].reshape(-1, 15, 15)
     if slot == 0:
-        return _by_fours(matrices.swapaxes(1, 2))
-    return _by_fours(np.moveaxis(matrices, 2, 0)).reshape(15, -1)
+        return _pad_to_fours(matrices.swapaxes(1, 2))
+    return _pad_to_fours(np.moveaxis(matrices, 2, 0)).reshape(15, -1)
 
 
-def _by_fours(rows: Array) -> Array:
+def _pad_to_fours(rows: Array) -> Array:
     """Rows (..., k) with zeros behind, to a length that four divides."""
     return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, -rows.shape[-1] % 4)])
 

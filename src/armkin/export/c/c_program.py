@@ -56,7 +56,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     words = {  # what people have named, as they have: a source may be called arm_ik.c
         "about": _about_text(arm, task, geometry, single),
         "stem": Path(file).stem,
-        "joints_are": in_comment(joints),
+        "joints_are": comment_text(joints),
     }
     fields = {
         "keep_outs": keep_out_tables.declarations(arm) if arm.keep_out else "",
@@ -66,7 +66,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "branches": str(branches),
         "target": str(target_size(task)),
         "goal": str(arm_formulas.goal_size(task)),
-        "target_is": _target_is(task),
+        "target_is": _target_text(task),
         "names": ",\n    ".join(f'"{name}"' for name in names),
         "position": str(task.position),
         "first": "9" if task.orientation == "full" else "0",
@@ -97,7 +97,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         *([keep_out_tables.clearances_code(arm, single), keep_out_tables.free_code(arm)] if arm.keep_out else []),
     ]
     texts = (part_text("header"), "\n".join(parts), golden_test(arm, task, part_text("test"), single, numbered))
-    return Program(*(fill_fields(_named(fill_fields(text, fields), prefix), words) for text in texts))
+    return Program(*(fill_fields(_prefix_names(fill_fields(text, fields), prefix), words) for text in texts))
 
 
 def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry, Redundancy | None, bool]:
@@ -194,7 +194,7 @@ def fill_fields(text: str, fields: dict[str, str]) -> str:
     return re.sub(r"@(\w+)@", lambda match: fields[match[1]], text)
 
 
-def _named(text: str, prefix: str) -> str:
+def _prefix_names(text: str, prefix: str) -> str:
     """Public names begin with the robot's, so that two arms fit into one program."""
     text = re.sub(r"\barm_(fk|jacobian|target|ik|best|names|real|solution|free|pairs)\b", rf"{prefix}_\1", text)
     return re.sub(r"\bARM_(JOINTS|BRANCHES|TARGET)\b", rf"{prefix.upper()}_\1", text)
@@ -255,19 +255,19 @@ def _about_text(arm: Arm, task: Task, geometry: Geometry, single: bool) -> str:
         f"Task {task.name}; {geometry.name}: {geometry.why}.",
         "Lengths in mm, angles in rad. No allocation, no global state; needs libm alone.",
     ]
-    return "\n   ".join(map(in_comment, lines))
+    return "\n   ".join(map(comment_text, lines))
 
 
-def in_comment(text: str) -> str:
+def comment_text(text: str) -> str:
     """A line as a comment of C may hold it: none begins or ends in it, and no trigraph stands there.
 
-    >>> in_comment("reach 2*/3")
+    >>> comment_text("reach 2*/3")
     'reach 2* /3'
     """
     return " ".join(re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", lambda mark: f"{mark[0]} ", text).split())
 
 
-def _target_is(task: Task) -> str:
+def _target_text(task: Task) -> str:
     if task.orientation == "full":
         return "the tool's pose, a 4 x 4 matrix row by row"
     return " ".join(task.labels) + (

@@ -49,7 +49,7 @@ def module(arm: Arm, task_name: str | None = None) -> str:
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form without Python.
     """
     if spare := redundancy(actual_arm(arm), task_name):
-        return _with_one_held(arm, actual_arm(arm), spare)
+        return _module_with_one_held(arm, actual_arm(arm), spare)
     return _module_of_all(arm, task_name, driven=not motors.undriven_joints(arm))
 
 
@@ -75,13 +75,13 @@ def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
         *(map(part_text, js_elimination.METHOD) if geometry.pairs is None else ()),
         solve,
         part_text("poses"),
-        part_text("module").replace("@TARGET@", _target_is(task)),
+        part_text("module").replace("@TARGET@", _target_text(task)),
         *([part_text("pulses")] if driven else []),
     ]
     return "\n".join(parts)
 
 
-def _with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
+def _module_with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
     """The module of an arm with one joint to spare: the redundant joint is held, the module of the others solves."""
     name, task = arm.joint_names[spare.joint], spare.task
     plain = turned is arm and not arm.keep_out  # then it is prepared already
@@ -108,7 +108,7 @@ def _with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
         *_kinematics(turned, task),
         *_keep_outs(arm, turned),
         part_text("poses"),
-        part_text("redundant").replace("@TARGET@", _target_is(task)),
+        part_text("redundant").replace("@TARGET@", _target_text(task)),
         *([part_text("pulses")] if driven else []),
     ]
     return "\n".join(parts)
@@ -146,7 +146,7 @@ def candidates_code(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]
     return _function_text(head, lines), len(miss)
 
 
-def _of_joints(name: str, recorded: recording.Recording) -> str:
+def _joint_function(name: str, recorded: recording.Recording) -> str:
     inputs = [f"q{j}" for j in range(len(recorded.inputs))]
     code = c_and_js_code.write_code(recorded, inputs, c_and_js_code.JAVASCRIPT)
     lines = [f"const {q} = q[{j}];" for j, q in enumerate(inputs)]
@@ -162,9 +162,9 @@ def _function_text(head: str, lines: list[str]) -> str:
 def _kinematics(turned: Arm, task: Task) -> list[str]:
     """The recorded functions of joint values: the tool's pose, the Jacobian, the target that is reached."""
     return [
-        _of_joints("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), turned.n)),
-        _of_joints("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), turned.n)),
-        _of_joints("targetOf", arm_formulas.record_target(turned, task)),
+        _joint_function("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), turned.n)),
+        _joint_function("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), turned.n)),
+        _joint_function("targetOf", arm_formulas.record_target(turned, task)),
     ]
 
 
@@ -274,7 +274,7 @@ def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
         "const KEEP_OUT = {",
         *(f"  {name}: {_js_text(value)}," for name, value in values.items()),
         "};",
-        _of_joints("endsOf", recording.record(lambda q: ends_formula(turned, q), arm.n)),
+        _joint_function("endsOf", recording.record(lambda q: ends_formula(turned, q), arm.n)),
         part_text("keep_out"),
     ]
 
@@ -299,7 +299,7 @@ def _about_text(arm: Arm, task: Task, geometry: Geometry) -> str:
     return "\n// ".join(" ".join(line.split()).replace("<", "\\u003c") for line in lines)
 
 
-def _target_is(task: Task) -> str:
+def _target_text(task: Task) -> str:
     if task.orientation == "full":
         return "the tool's pose, four rows of four [mm]"
     return f"{' '.join(task.labels)} [mm, rad]"

@@ -28,7 +28,7 @@ _MOST = 8  # boundaries on the way: a path along one has thousands, and its chai
 _WAYS = 64  # chains in all, as every boundary may multiply them: what goes through one more boundary comes last
 
 
-def through_boundaries(
+def add_boundary_chains(
     arm: Arm, columns: Columns, chains: list[Chain], fixed: Array | None, tolerance: float
 ) -> list[Chain]:
     """Chains, and those that more of them make where they meet; fixed: (n,) the posture at the start, or None."""
@@ -101,11 +101,11 @@ def _chains_from(s: Array, c: Chain, j: int, postures: Array, tolerance: float) 
     if c.first == j < c.last:
         return [c]
     N = len(s)
-    back = _chains_to(-s[::-1], _reversed_chain(c, N), N - 1 - j, postures, tolerance)
-    return [_reversed_chain(part, N) for part in back]
+    back = _chains_to(-s[::-1], _reverse_chain(c, N), N - 1 - j, postures, tolerance)
+    return [_reverse_chain(part, N) for part in back]
 
 
-def _reversed_chain(c: Chain, N: int) -> Chain:
+def _reverse_chain(c: Chain, N: int) -> Chain:
     """A chain as the way back has it, of N samples."""
     return Chain(c.arm, N - 1 - c.last, c.q[::-1], c.labels[::-1])
 

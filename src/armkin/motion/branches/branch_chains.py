@@ -125,8 +125,8 @@ class Chain:
                 offsets[j] = turns[j] * np.rint((near[j] - value) / turns[j])
                 continue
             legal = choices if ends is None else choices[ends[:, i - self.first] > e - self.first]
-            wanted = near[j] if fixed is None else fixed[j]
-            offsets[j] = legal[np.abs(value + legal - wanted).argmin()]
+            nearest = near[j] if fixed is None else fixed[j]
+            offsets[j] = legal[np.abs(value + legal - nearest).argmin()]
         return np.asarray(self.q[i - self.first : e - self.first + 1] + offsets)
 
 
@@ -138,7 +138,7 @@ def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
     steady = identity.all(axis=1) & (valid[:-1] == valid[1:]).all(axis=1)
     events = np.append(np.flatnonzero(~steady), N - 1)
     open_: dict[int, list[tuple[int, int, int]]] = {int(b): [] for b in np.flatnonzero(valid[0])}  # column -> blocks
-    done: list[list[tuple[int, int, int]]] = []
+    ended: list[list[tuple[int, int, int]]] = []
     begin = 0
     for event in events.tolist():
         for b, blocks in open_.items():
@@ -147,11 +147,11 @@ def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
             break
         partner = columns.partner[event]
         going = {int(partner[b]): blocks for b, blocks in open_.items() if partner[b] >= 0}
-        done += [blocks for b, blocks in open_.items() if partner[b] < 0]
+        ended += [blocks for b, blocks in open_.items() if partner[b] < 0]
         open_ = {int(b): going.get(int(b), []) for b in np.flatnonzero(valid[event + 1])}
         begin = event + 1
-    done += list(open_.values())
-    return [_assemble_chain(arm, columns, blocks) for blocks in done]
+    ended += list(open_.values())
+    return [_assemble_chain(arm, columns, blocks) for blocks in ended]
 
 
 def _assemble_chain(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -> Chain:
@@ -193,7 +193,7 @@ def fewest_runs(chains: list[Chain], N: int, allowed: list[Chain] | None = None)
         if far < i or (far == i and i < N - 1 and runs and runs[-1].last == i):
             i += 1 + int(alive[i + 1 :].argmax())
             continue
-        runs.append(_least_motion(choices, i, far))
+        runs.append(_least_motion_run(choices, i, far))
         if far >= N - 1:
             break
         i = far if any(c.carries(far) > far for c in chains) else far + 1
@@ -210,7 +210,7 @@ def _possible_starts(chains: list[Chain], N: int) -> Bool:
     return alive
 
 
-def _least_motion(choices: list[Chain], i: int, last_sample: int) -> Run:
+def _least_motion_run(choices: list[Chain], i: int, last_sample: int) -> Run:
     """Of the chains that carry from sample i so far the one with the least motion, as a run."""
     best = min((c for c in choices if c.carries(i) == last_sample), key=lambda c: least_time(c, i, last_sample))
     return Run(best, i, last_sample)
@@ -226,7 +226,7 @@ def least_time(chain: Chain, i: int, e: int) -> float:
     return float(seconds.sum())
 
 
-def why_ended(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, float | None, str]:
+def end_reason(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, float | None, str]:
     """Why a run from sample i ends: words, the joint and its limit (or None), what is beyond."""
     e = chain.carries(i)
     beyond = min(max(e + 1, 0), len(columns.s) - 1)

@@ -50,7 +50,7 @@ class Columns:
         parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within_limits[rows])
         return Columns(*parts, self.names, self.complete)
 
-    def padded_to(self, B: int) -> Columns:
+    def pad_to(self, B: int) -> Columns:
         """The same with B columns of branches at least."""
         return Columns(
             self.s,
@@ -66,7 +66,7 @@ class Columns:
     def insert_rows(self, rows: Int, new: Columns) -> Columns:
         """These samples with others before the rows `rows`; the links of both stay, as far as they have any."""
         B = max(self.q.shape[1], new.q.shape[1])
-        wide, new = self.padded_to(B), new.padded_to(B)
+        wide, new = self.pad_to(B), new.pad_to(B)
         links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
         return Columns(
             np.insert(wide.s, rows, new.s),
@@ -164,7 +164,7 @@ class Samples:
 def _concatenate(parts: list[Columns]) -> Columns:
     """Samples of all the parts, one part after another."""
     B = max(part.q.shape[1] for part in parts)
-    wide = [part.padded_to(B) for part in parts]
+    wide = [part.pad_to(B) for part in parts]
     return Columns(
         np.concatenate([part.s for part in wide]),
         np.concatenate([part.q for part in wide]),

@@ -15,14 +15,14 @@ from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find_branches
-from armkin.motion.branches.boundary_chains import through_boundaries
+from armkin.motion.branches.boundary_chains import add_boundary_chains
 from armkin.motion.branches.branch_chains import Chain, Run, chains_of_columns, fewest_runs
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.branches.linked_branches import ENDS, link_branches
 from armkin.motion.branches.route_grid import Way, refine_grid
-from armkin.motion.branches.wrist_turn import ASIDE, has_wrist, through_wrists
-from armkin.motion.branches.wrist_window import with_detours
+from armkin.motion.branches.wrist_turn import ASIDE, add_wrist_chains, has_wrist
+from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
@@ -65,7 +65,7 @@ class CarriedRoute:
     runs: list[Run]
 
     @property
-    def whole(self) -> bool:
+    def in_one_run(self) -> bool:
         """Whether one run carries everything."""
         return len(self.runs) == 1 and self.runs[0].first == 0 and self.runs[0].last == len(self.columns.s) - 1
 
@@ -81,14 +81,14 @@ class CarriedRoute:
     def moving_runs(self) -> list[Run]:
         """The runs that lead anywhere."""
         s = self.columns.s
-        return self.runs if self.whole else [run for run in self.runs if s[run.last] - s[run.first] > ENDS]
+        return self.runs if self.in_one_run else [run for run in self.runs if s[run.last] - s[run.first] > ENDS]
 
 
 def route_samples(route: Route, count: int | None = None) -> Array:
     """Where a route is solved first: evenly, and at the ends of its pieces."""
     number = count or int(max(np.clip(np.ceil(route.length / _STEP), *_SAMPLES), route.length / _FARTHEST))
     even = np.linspace(0.0, route.length, max(number, 2))
-    return np.asarray(_well_separated(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
+    return np.asarray(_drop_close_values(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
 
 
 def carry_route(
@@ -110,10 +110,10 @@ def carry_route(
     name = route.task.name
     columns = link_branches(arm, route.targets, route_samples(route, count), task=name, tolerance=tolerance, near=near)
     every_chain = chains_of_columns(arm, columns)
-    every_chain = through_boundaries(arm, columns, every_chain, fixed, tolerance)
+    every_chain = add_boundary_chains(arm, columns, every_chain, fixed, tolerance)
     if route.task.orientation == "full" and has_wrist(arm):
         aside = 0.0 if len(route.given_points[0]) else ASIDE * tolerance  # a curve of points has little tolerance left
-        every_chain = through_wrists(arm, route, columns, every_chain, pace.turn, aside)
+        every_chain = add_wrist_chains(arm, route, columns, every_chain, pace.turn, aside)
     starts = _start_chains(arm, every_chain, fixed)
     if branch is not None:
         labels = find_branches(columns.names, branch)
@@ -176,7 +176,7 @@ def run_stretches(
 ) -> list[Curve | Smoothed]:
     """A run as curves from rest to rest, one between each two stops of the route; s: the route's samples."""
     q = run.chain.run(run.first, run.last, near, fixed)
-    route = with_detours(route, run.chain.windows)
+    route = add_detours(route, run.chain.windows)
     s = s[run.first : run.last + 1]
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
@@ -263,7 +263,7 @@ def _smoothing_cap(arm: Arm, path: Knots, mean: float, tolerance: float) -> Arra
     return np.asarray(12 * tolerance / mean**2 / np.maximum(shift, 1e-12))
 
 
-def _well_separated(s: Array, least: float) -> Array:
+def _drop_close_values(s: Array, least: float) -> Array:
     """Sorted values without those that are closer than `least` to the one before; the last one stays."""
     keep = np.concatenate([[True], np.diff(s) > least])
     separated = s[keep]

@@ -107,7 +107,7 @@ class _Linking:
     def _take_over(self, part: _Linking, steps: Int, group: Int) -> None:
         """Take over what was added to the steps, and their links."""
         B = max(self.columns.q.shape[1], part.columns.q.shape[1])
-        c, p, fresh = self.columns.padded_to(B), part.columns.padded_to(B), part.fresh
+        c, p, fresh = self.columns.pad_to(B), part.columns.pad_to(B), part.fresh
         positions = np.repeat(steps + 1, np.bincount(group[fresh], minlength=len(steps)))
         links = np.append(p.partner, np.full((1, B), -1, np.int16), axis=0)
         # the left end of each step is the second sample of its group
@@ -158,8 +158,8 @@ class _Linking:
         """Leave what no dividing links: steps (M, parts) of singular postures, whose free joints stand anywhere."""
         singular = self.columns.status == Status.SINGULAR
         inside = (singular[:-1] & singular[1:])[steps]
-        many = (self.torn[steps] & inside).sum(axis=1, keepdims=True) > _TORN
-        self.torn[steps[many & inside]] = False
+        mostly_torn = (self.torn[steps] & inside).sum(axis=1, keepdims=True) > _TORN
+        self.torn[steps[mostly_torn & inside]] = False
 
     def _link(self) -> None:
         """Find partners in the open steps."""
@@ -207,7 +207,7 @@ class _Linking:
         c, arm = self.columns, self.arm
         left, right = np.flatnonzero(valid[i]), np.flatnonzero(valid[i + 1])
         D = joint_change(arm, c.q[i, left][:, None], c.q[i + 1, right][None])
-        ok = chord_bound(self.lever, D) <= self.tolerance
+        certified = chord_bound(self.lever, D) <= self.tolerance
         guess = np.zeros((len(left), arm.n))
         if i > 0 and c.s[i] > c.s[i - 1]:
             ratio = (c.s[i + 1] - c.s[i]) / (c.s[i] - c.s[i - 1])
@@ -215,7 +215,7 @@ class _Linking:
                 before = np.flatnonzero(c.partner[i - 1] == b)
                 if len(before):
                     guess[k] = joint_change(arm, c.q[i - 1, before[0]], c.q[i, b]) * min(ratio, 10.0)
-        cost = np.where(ok, np.linalg.norm(D - guess[:, None], axis=2), np.inf)
+        cost = np.where(certified, np.linalg.norm(D - guess[:, None], axis=2), np.inf)
         c.partner[i] = -1
         while np.isfinite(cost).any():
             a, b = np.unravel_index(int(cost.argmin()), cost.shape)

@@ -178,7 +178,7 @@ def _solve_points(arm: Arm, way: Way, points: Array, damping: float, coarser: Kn
             continue
         inside = new & (points > window.begin) & (points < window.end)
         if inside.any():
-            values[inside] = window.joints(arm, route, points[inside], window.copy_of(arm, guess[inside[new]][0]))
+            values[inside] = window.joints(arm, route, points[inside], window.turns_to_copy(arm, guess[inside[new]][0]))
     return values
 
 
@@ -256,9 +256,9 @@ def _deviations(arm: Arm, route: Route, path: Knots, intervals: Int, lever: Arra
     d0, d1, chord, largest = d0 * h, d1 * h, end - start, np.zeros(len(intervals))
     for f in (0.25, 0.75):
         q = start + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
-        wanted = route.targets(path.s[intervals] + f * h)
-        wanted = wanted[:, :3, 3] if route.task.orientation == "full" else wanted[:, : route.task.position]
-        offsets = (position(arm, q.T)[:, : wanted.shape[1]] - wanted).T
+        targets = route.targets(path.s[intervals] + f * h)
+        targets = targets[:, :3, 3] if route.task.orientation == "full" else targets[:, : route.task.position]
+        offsets = (position(arm, q.T)[:, : targets.shape[1]] - targets).T
         largest = np.maximum(largest, np.sqrt((offsets**2).sum(axis=0)))
     # h, h^2 and h^3 times the greatest q', q'' and q''' of each joint
     first = np.maximum(np.maximum(np.abs(d0), np.abs(d1)), np.abs(3 * chord - d0 - d1))

@@ -22,7 +22,7 @@ from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import LEAST_LEVER, joint_change
 from armkin.motion.branches.solve_on_route import correct_to_route
-from armkin.motion.branches.wrist_window import Window, with_detours
+from armkin.motion.branches.wrist_window import Window, add_detours
 from armkin.motion.tool_path.route import Detour
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def check_wrist(arm: Arm) -> None:
         )
 
 
-def through_wrists(
+def add_wrist_chains(
     arm: Arm, route: Route, columns: Columns, chains: list[Chain], turn: float, tip_offset: float
 ) -> list[Chain]:
     """Chains, and those that go on with the wrist flipped behind a singularity.
@@ -73,8 +73,8 @@ def through_wrists(
             for j in _straight_samples(arm, c, near):
                 if c.windows and s[j] <= c.windows[-1].end:
                     continue
-                for other in chains:
-                    joined = _chain_through_window(arm, route, s, c, other, j, (turn, tip_offset))
+                for next_chain in chains:
+                    joined = _chain_through_window(arm, route, s, c, next_chain, j, (turn, tip_offset))
                     joined_chains += [] if joined is None else [joined]
         all_chains, latest = all_chains + joined_chains, joined_chains
         if not joined_chains or len(all_chains) > _MOST * len(chains):
@@ -176,7 +176,7 @@ def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array
     q = window.joints(arm, route, s)
     if window.detour is None or not len(s):
         return q
-    q = correct_to_route(arm, route.task, q, with_detours(route, (window,)).targets(s), steps=12)
+    q = correct_to_route(arm, route.task, q, add_detours(route, (window,)).targets(s), steps=12)
     bent = np.abs(_wrist_volume(arm, q)) > _TOLD  # nearer to straight joints 4 and 6 go on as they do beside it
     lengths = np.concatenate([[window.begin], s[bent], [window.end]])
     beside = np.concatenate([window.q[:1], q[bent], window.q[1:]])
@@ -211,7 +211,7 @@ def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None
 def _follows_detour(arm: Arm, route: Route, window: Window) -> bool:
     """Whether the joints follow a window's detour, all along."""
     s = np.linspace(window.begin, window.end, _LOOKED)
-    T, goal = fk(arm, _joints_in_window(arm, route, window, s)), with_detours(route, (window,)).targets(s)
+    T, goal = fk(arm, _joints_in_window(arm, route, window, s)), add_detours(route, (window,)).targets(s)
     missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_small_turns(T, goal)).max()
     return bool(missed < _EXACT)
 

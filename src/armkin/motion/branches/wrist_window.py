@@ -57,13 +57,13 @@ class Window:
                 break
         return np.asarray(q + offset)
 
-    def copy_of(self, arm: Arm, q: Array) -> Array:
+    def turns_to_copy(self, arm: Arm, q: Array) -> Array:
         """Whole turns (n,) from a window to the copy that a run is on; q: (n,) of it, somewhere inside."""
         turns = whole_turns(arm)
         return np.asarray(turns * np.rint((q - self.q.mean(axis=0)) / turns))
 
 
-def with_detours(route: Route, windows: tuple[Window, ...]) -> Route:
+def add_detours(route: Route, windows: tuple[Window, ...]) -> Route:
     """A route with the detours of its windows."""
     detours = tuple(window.detour for window in windows if window.detour is not None)
     return replace(route, detours=detours) if detours else route

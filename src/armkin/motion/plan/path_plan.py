@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from armkin.formula.arrays import Array
 from armkin.forward import condition, jacobian
 from armkin.motion.timing.curved_stretch import Curve
-from armkin.motion.timing.limit_jerk import Smoothed, way_of
+from armkin.motion.timing.limit_jerk import Smoothed, joint_way
 from armkin.motion.timing.trajectory import Stretch, Trajectory, group_numbers
 from armkin.motion.tool_path.route import ReducedBlends
 
@@ -250,7 +250,7 @@ class PathPlan:
         """
         stretch, base = self.on_path[number]
         assert isinstance(stretch, Curve | Smoothed)
-        s = way_of(stretch).s
+        s = joint_way(stretch).s
         return base + float(s[0]), base + float(s[-1])
 
     def grid(self, number: int) -> Array:
@@ -264,7 +264,7 @@ class PathPlan:
         """
         stretch, _ = self.on_path[number]
         assert isinstance(stretch, Curve | Smoothed)
-        return way_of(stretch).q
+        return joint_way(stretch).q
 
     @cached_property
     def limits(self) -> dict[str, Array]:

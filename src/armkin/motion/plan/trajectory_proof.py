@@ -111,11 +111,11 @@ def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Trajecto
         if allowed is None:
             escaping = proof.escaping
         allowed = proof.escaping
-        result = _proof_on_trajectory(trajectory, bodies, first, proof, escaping, postures, way)
+        found_proof = _proof_on_trajectory(trajectory, bodies, first, proof, escaping, postures, way)
         if not proof.free:
-            return result
-        if nearest is None or result.mm < nearest.mm:
-            nearest = result
+            return found_proof
+        if nearest is None or found_proof.mm < nearest.mm:
+            nearest = found_proof
     if nearest is None:  # no stretch: the arm stays where it is
         return None
     return TrajectoryProof(**{**vars(nearest), "postures": postures})
@@ -158,11 +158,11 @@ def hit_refusal(trajectory: Trajectory, hit: TrajectoryProof, place: str = "", *
     values = units.joints_out(arm, hit.joints).tolist()
     joints_text = ", ".join(f"{name} = {value:.4g}" for name, value in zip(arm.joint_names, values, strict=True))
     stands = (hit.body, hit.keep_out) in hit.escaping
-    many = f" on the way to waypoint {hit.stretch + 1}" if len(trajectory.stretches) > 1 and not place else ""
+    way_text = f" on the way to waypoint {hit.stretch + 1}" if len(trajectory.stretches) > 1 and not place else ""
     verb = "would go deeper into" if stands else "would hit"
     details = {"body": hit.body, "with": hit.keep_out, "joints": values, **fields}
     return NoSolutionError(
-        f"{hit.body} {verb} {hit.keep_out}{place or many}, at {joints_text}: nothing was moved", **details
+        f"{hit.body} {verb} {hit.keep_out}{place or way_text}, at {joints_text}: nothing was moved", **details
     )
 
 

@@ -96,14 +96,14 @@ class Smoothed:
         return np.asarray(change / self.window)
 
 
-def way_of(stretch: Curve | Smoothed) -> Knots:
+def joint_way(stretch: Curve | Smoothed) -> Knots:
     """The way through joint space of a curve, or of the one that was made smooth."""
     return stretch.path if isinstance(stretch, Curve) else stretch.curve.path
 
 
-def ways_of(stretches: Sequence[Curve | Smoothed]) -> Knots:
+def joint_ways(stretches: Sequence[Curve | Smoothed]) -> Knots:
     """The ways of stretches one after another as one, with a rest between each two."""
-    ways = [way_of(stretch) for stretch in stretches]
+    ways = [joint_way(stretch) for stretch in stretches]
     if len(ways) == 1:
         return ways[0]
     return Knots(*(np.concatenate([getattr(way, part) for way in ways]) for part in ("s", "q", "d")))

@@ -61,7 +61,7 @@ def trapezoid(length: float, speed: float, accel: float) -> Profile:
     1.0
     """
     if length <= 0:
-        return at_rest(0.0)
+        return rest_profile(0.0)
     peak = min(speed, math.sqrt(accel * length))
     ramp = peak / accel
     way = peak * ramp / 2
@@ -81,7 +81,7 @@ def seven_phases(length: float, speed: float, accel: float, jerk: float) -> Prof
     (3.174802, 10.75)
     """
     if length <= 0:
-        return at_rest(0.0)
+        return rest_profile(0.0)
     bend = min(accel / jerk, math.sqrt(speed / jerk))  # of changing acceleration
     rise = bend + speed / (bend * jerk)  # of speeding up, all in all
     cruise = length / speed - rise
@@ -105,6 +105,6 @@ def seven_phases(length: float, speed: float, accel: float, jerk: float) -> Prof
     return Profile(times, np.array(states), signs, length, jerk * bend)
 
 
-def at_rest(seconds: float) -> Profile:
+def rest_profile(seconds: float) -> Profile:
     """A profile that stays where it is for so many seconds."""
     return Profile(np.array([0.0, seconds]), np.zeros((1, 3)), np.zeros(1), 0.0, 0.0)

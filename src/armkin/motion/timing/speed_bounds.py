@@ -28,7 +28,7 @@ class Motion(NamedTuple):
     h: Array  # (M,)
     accel: Array  # (k, M) greatest acceleration
 
-    def excess(self, x0: Array, x1: Array) -> Array:
+    def accel_shares(self, x0: Array, x1: Array) -> Array:
         """Greatest share of the acceleration inside every interval, with x (M,) at its ends: (k, M).
 
         With q'' = l + f (r - l) and x(f) = x + 2 u h f at its fraction f it is u q'(f) + q''(f) x(f).
@@ -41,7 +41,7 @@ class Motion(NamedTuple):
         inside = np.abs(a + f * (b + f * c))
         return np.asarray(np.maximum(np.maximum(inside, np.abs(a)), np.abs(a + b + c)) / self.accel)
 
-    def rush(self, x0: Array, x1: Array, speed: Array) -> Array:
+    def squared_speed_shares(self, x0: Array, x1: Array, speed: Array) -> Array:
         """Greatest share of the joints' speeds (n, M) inside every interval, squared: (M,).
 
         (q'(f))^2 x(f) is greatest at an end, which its cap holds, or where its derivative, a quadratic, is zero.
@@ -122,8 +122,8 @@ class Fastest:
         self.cap[:-1][intervals] = left
         forth, m = forward_step(h, slope, level), len(h)
         a, b = (np.concatenate(terms, axis=1) for terms in zip(backward_step(*forth), forth, strict=True))
-        both = least_of(a, b, np.concatenate([self.cap[1:][intervals][::-1], left]))
-        return both.part(0, m), both.part(m, 2 * m)
+        pruned = least_of(a, b, np.concatenate([self.cap[1:][intervals][::-1], left]))
+        return pruned.part(0, m), pruned.part(m, 2 * m)
 
 
 def interval_parts(intervals: int) -> list[slice]:

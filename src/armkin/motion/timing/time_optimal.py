@@ -156,7 +156,7 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
                 return law.x
             if round_ < _ROUNDS - 1:
                 bad, x = np.flatnonzero(worst > _LITTLE), law.x
-                law.lower_speeds(_with_neighbours(bad, len(worst)))
+                law.lower_speeds(_add_neighbours(bad, len(worst)))
                 gone = law.x != x
                 moved = np.flatnonzero(gone[1:] | gone[:-1] | (worst > _LITTLE))
         begins = np.concatenate([[0], path.rests + 1])  # each part between two rests slows down for itself
@@ -167,8 +167,8 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
 def _lower_law(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, share: bool) -> Array:
     """Greatest shares of the limits in some intervals (k,); where one is above 1, the law is given less there."""
     motion, x0, x1 = limits.motion_in(intervals), law.x[intervals], law.x[intervals + 1]
-    over = motion.excess(x0, x1)
-    rush = motion.rush(x0, x1, np.minimum(speed[intervals], speed[intervals + 1]).T)
+    over = motion.accel_shares(x0, x1)
+    rush = motion.squared_speed_shares(x0, x1, np.minimum(speed[intervals], speed[intervals + 1]).T)
     worst = np.maximum(over.max(axis=0), rush)
     if share:
         law.share[:, intervals] /= np.where(over > _LITTLE, over, 1.0)
@@ -179,7 +179,7 @@ def _lower_law(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, sha
     return np.asarray(worst)
 
 
-def _with_neighbours(intervals: Int, count: int) -> Int:
+def _add_neighbours(intervals: Int, count: int) -> Int:
     """Intervals (k,), and those next to them, of so many."""
     near = np.zeros(count + 2, bool)
     for k in (0, 1, 2):

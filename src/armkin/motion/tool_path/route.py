@@ -181,7 +181,7 @@ def join_pieces(
         else:
             first, middle, last, radius_kept = blend(task, before, piece, radius, side)
             if wish is None:
-                middle = replace(middle, dense=_given_corner(middle, piece.first.p))
+                middle = replace(middle, dense=_dense_of_corner(middle, piece.first.p))
             else:
                 reduced.note(wish, radius_kept)
             made[-1:] = [p for p in (first, middle, last) if p is last or p.length > SMALL]
@@ -204,7 +204,7 @@ def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wish: float | N
     return radius if radius > 0 and angle <= sharpest and both_move(last_piece, piece) else 0.0
 
 
-def _given_corner(piece: Piece, corner: Array) -> Dense:
+def _dense_of_corner(piece: Piece, corner: Array) -> Dense:
     """A blend that has a given corner to pass in its middle."""
     none = np.zeros(0)
     return Dense(np.array([piece.length / 2]), corner[None], none, none, none, none, none)
