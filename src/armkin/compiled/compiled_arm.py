@@ -355,7 +355,7 @@ class _CompiledTask:
             values[solved, :wide] = np.take_along_axis(found_values, order, axis=1)
 
     def _solve_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
-        """As `_solved`, for an elimination: block by block, in no more columns than the batch needs."""
+        """As `_solve_rows`, for an elimination: block by block, in no more columns than the batch needs."""
         batch = Results(len(target), 0, self.n)
         for start in range(0, max(len(target), 1), BLOCK):
             rows = slice(start, min(start + BLOCK, len(target)))
