@@ -7,7 +7,7 @@ joint, where the axes are within a few degrees of parallel) and A_i's origin on 
 
 with commanded joint values c. beta is Hayati's: without it a parallel axis could not tilt about the normal's direction
 (Hayati and Mirmirani, Improving the absolute positioning accuracy of robot manipulators, 1985). The set is complete but
-not minimal; the prior of `fit` decides between corrections that do the same.
+not minimal; the prior of `fit_corrections` decides between corrections that do the same.
 """
 
 from __future__ import annotations

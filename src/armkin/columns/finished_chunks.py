@@ -172,6 +172,6 @@ class Parts:
             ) from None
 
 
-def digest(data: bytes) -> str:
+def digest(content: bytes) -> str:
     """What tells inputs apart."""
-    return hashlib.sha256(data).hexdigest()
+    return hashlib.sha256(content).hexdigest()

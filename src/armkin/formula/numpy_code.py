@@ -121,7 +121,7 @@ def write_numpy(recording: Recording, scalar: bool = False) -> tuple[Run, list[B
 
 
 def _functions(recording: Recording, scalar: bool) -> dict[str, Any]:
-    """What the written lines call, by name; scalar: see `write`."""
+    """What the written lines call, by name; scalar: see `write_numpy`."""
     functions: dict[str, Any] = {"where": _where_into, "add": np.add, "subtract": np.subtract, "positive": np.positive}
     functions |= {op: partial(_flip, axis) for op, axis in FLIPS.items()}
     if scalar:

@@ -1,7 +1,7 @@
 """The arm: a robot file as frozen arrays.
 
 arm.py          `Arm`, one chain of constant links for all conventions
-build_arm.py    `load`, `build`: DH tables and screws become that chain
+build_arm.py    `load_arm`, `arm_of_file`: DH tables and screws become that chain
 joint_chain.py  chains reversed, flipped, shortened
 rotation.py     matrices, roll pitch yaw, quaternions, rigid transforms
 limits.py       joint limits

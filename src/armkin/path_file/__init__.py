@@ -171,9 +171,9 @@ def _tuples_to_lists(value: Any) -> Any:
     return [_tuples_to_lists(part) for part in value] if isinstance(value, list | tuple) else value
 
 
-def _is_yaml(data: bytes) -> bool:
+def _is_yaml(encoded: bytes) -> bool:
     """Whether the first line that says something has a colon: a mapping's key."""
-    for line in data[:4096].splitlines():
+    for line in encoded[:4096].splitlines():
         text = line.strip()
         if text and not text.startswith(b"#"):
             return b":" in text

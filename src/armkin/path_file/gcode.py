@@ -82,7 +82,7 @@ class _Program:
                 return
 
     def _plain_line(self, g: str | None, early: str | None, *words: str | None) -> bool:
-        """Do a line of G0 or G1, F, X, Y, Z, E alone as `_line` does, sooner; False: `_line` has to."""
+        """Do a line of G0 or G1, F, X, Y, Z, E alone as `_do_line` does, sooner; False: `_do_line` has to."""
         *axes, e, late = words
         motion = self.motion if g is None else float(g)
         if motion is None or motion > 1 or not (early is None or late is None):

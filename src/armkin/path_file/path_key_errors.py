@@ -97,14 +97,14 @@ def _length_text(names: list[str], error: Any) -> str:
 _WORDS: dict[str, Words] = {  # pydantic's kind of error -> what is said of it
     "extra_forbidden": _unknown_text,
     "missing": _missing_text,
-    "problem": lambda names, one: str(one["msg"]),
+    "problem": lambda names, error: str(error["msg"]),
     "greater_than": _bound_text("above", "gt"),
     "greater_than_equal": _bound_text("at least", "ge"),
     "less_than_equal": _bound_text("at most", "le"),
     "less_than": _bound_text("below", "lt"),
     "too_short": _length_text,
     "too_long": _length_text,
-    "finite_number": lambda names, one: "must be a finite number",
+    "finite_number": lambda names, error: "must be a finite number",
 }
 
 

@@ -99,7 +99,7 @@ def json_schema() -> dict[str, Any]:
     return robot_schema.json_schema()
 
 
-def _validate(data: dict[str, Any]) -> RobotFile:
+def _validate(keys: dict[str, Any]) -> RobotFile:
     if not RobotFile.__pydantic_complete__:
         # Looking for pydantic's plugins reads the metadata of every installed package, which takes
         # longer than all the rest of a robot file; nothing here is for them to observe.
@@ -112,7 +112,7 @@ def _validate(data: dict[str, Any]) -> RobotFile:
                 del os.environ["PYDANTIC_DISABLE_PLUGINS"]
             else:
                 os.environ["PYDANTIC_DISABLE_PLUGINS"] = before
-    return RobotFile.model_validate(data)
+    return RobotFile.model_validate(keys)
 
 
 def _with_line(name: str, line: int, text: str) -> str:
@@ -128,11 +128,11 @@ def _invalid_error(name: str, problems: list[tuple[int, str]]) -> RobotFileError
     return RobotFileError(message, file=name, line=problems[0][0] or None, problems=list(lines))
 
 
-def _place_text(path: strict_yaml.Path, data: dict[str, Any]) -> str:
+def _place_text(path: strict_yaml.Path, keys: dict[str, Any]) -> str:
     """The place in words: ``joint q2: dh.alpha: ``."""
     words: list[str] = []
     if len(path) > 1 and path[0] in ("joints", "motors") and isinstance(path[1], int):
-        item = data[path[0]][path[1]]
+        item = keys[path[0]][path[1]]
         name = item.get("name") if isinstance(item, dict) else None
         kind = str(path[0])[:-1]
         named = isinstance(name, str) and 0 < len(name) <= 40 and name.isprintable()

@@ -139,16 +139,16 @@ class _Linking:
         f = np.arange(1, parts) / parts
         lengths = (c.s[steps, None] + h[steps, None] * f).ravel()
         columns = self.samples.solve_at(lengths, examine=not quick)
-        self.where = where = np.repeat(steps + 1, parts - 1)
-        self.fresh = np.insert(self.fresh, where, True)
+        self.where = rows = np.repeat(steps + 1, parts - 1)
+        self.fresh = np.insert(self.fresh, rows, True)
         self.added += len(lengths)
-        self.columns = c.insert_rows(where, columns)
+        self.columns = c.insert_rows(rows, columns)
         fresh = np.zeros(len(c.s) - 1, bool)
         fresh[steps] = True
-        self.open = np.insert(fresh, where, True)
-        self.torn = np.insert(self.torn & ~fresh, where, False)
-        self.both = np.insert(self.both & ~fresh, where, False)
-        self.crossing = np.insert(self.crossing & ~fresh, where, False)
+        self.open = np.insert(fresh, rows, True)
+        self.torn = np.insert(self.torn & ~fresh, rows, False)
+        self.both = np.insert(self.both & ~fresh, rows, False)
+        self.crossing = np.insert(self.crossing & ~fresh, rows, False)
         begins = np.flatnonzero(fresh) + (parts - 1) * np.arange(len(steps))  # of the divided steps
         self._link()
         self._give_up(begins[:, None] + np.arange(parts))

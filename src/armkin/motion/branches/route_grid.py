@@ -58,28 +58,28 @@ def refine_grid(arm: Arm, way: Way, number: int, tolerance: float | None, exact:
     """
     route = way.route
     exact = exact and len(route.spans) > 0 and not way.windows
-    where, breaks = _initial_grid(arm, way, number, _FEWEST if exact else _EACH[0])
+    points, breaks = _initial_grid(arm, way, number, _FEWEST if exact else _EACH[0])
     if exact:
-        where, breaks = _grade_grid(where, breaks)
-    resting = _nearest_indices(where[breaks], way.stops)
-    most = _TIMES * len(where)
+        points, breaks = _grade_grid(points, breaks)
+    resting = _nearest_indices(points[breaks], way.stops)
+    most = _TIMES * len(points)
     for damping in DAMPING:
         solved, before = None, None
         for _ in range(_ROUNDS):
-            values = _solve_points(arm, way, where, damping, solved)
+            values = _solve_points(arm, way, points, damping, solved)
             rests = breaks[resting]
-            exact_path = exact_cubics(arm, route, where, values, rests, solved) if exact else None
+            exact_path = exact_cubics(arm, route, points, values, rests, solved) if exact else None
             if exact and exact_path is None:
                 return refine_grid(arm, way, number, tolerance, exact=False)
-            path = solved = exact_path or knots_of_samples(where, values, breaks.tolist(), rests.tolist())
+            path = solved = exact_path or knots_of_samples(points, values, breaks.tolist(), rests.tolist())
             if tolerance is None:
                 return path, np.zeros(len(path.h))
             deviations = interval_deviations(arm, route, path, before)
             before = path, deviations
             needed = _excess_lengths(arm, path, deviations, tolerance, exact)
-            if needed.max() <= 1.0 or len(where) > most:
+            if needed.max() <= 1.0 or len(points) > most:
                 break
-            where, breaks = _divide_intervals(where, breaks, _part_counts(needed, exact))
+            points, breaks = _divide_intervals(points, breaks, _part_counts(needed, exact))
         if np.delete(deviations, path.rests).max() <= tolerance:
             break
     return path, deviations
@@ -117,11 +117,11 @@ def _initial_grid(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, 
     level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
     ends = np.interp(edges, grid, level)
     begin = np.cumsum(count) - count
-    where = np.append(np.interp(divide_spans(ends, count), level, grid), b)
-    where[begin] = edges[:-1]
+    points = np.append(np.interp(divide_spans(ends, count), level, grid), b)
+    points[begin] = edges[:-1]
     fine = route.spans
-    inside = np.diff(np.searchsorted(fine, where))
-    return _divide_intervals(where, begin[1:], np.where(inside > 1, inside + 1, 1))
+    inside = np.diff(np.searchsorted(fine, points))
+    return _divide_intervals(points, begin[1:], np.where(inside > 1, inside + 1, 1))
 
 
 def _excess_lengths(arm: Arm, path: Knots, distance: Array, tolerance: float, exact: bool) -> Array:
@@ -164,21 +164,23 @@ def _divide_intervals(points: Array, breaks: Int, parts: Int) -> tuple[Array, In
 def _solve_points(arm: Arm, way: Way, points: Array, damping: float, coarser: Knots | None) -> Array:
     """Joint values at the points, exact to the inverse kinematics; coarser: a grid whose points are among them."""
     route, windows = way.route, way.windows
-    values, new = np.empty((len(points), arm.n), order="F"), np.ones(len(points), bool)  # long runs of numbers
+    values, unsolved = np.empty((len(points), arm.n), order="F"), np.ones(len(points), bool)  # long runs of numbers
     if coarser is not None:
         positions = np.searchsorted(points, coarser.s)
-        values[positions], new[positions] = coarser.q, False
+        values[positions], unsolved[positions] = coarser.q, False
     if coarser is None or windows:
-        guess = np.stack([np.interp(points[new], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
+        guess = np.stack([np.interp(points[unsolved], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
     else:  # they are nearer than chords of samples
-        guess, _ = coarser.evaluate(points[new])
-    values[new] = correct_to_route(arm, route.task, guess, route.targets(points[new]), damping)
+        guess, _ = coarser.evaluate(points[unsolved])
+    values[unsolved] = correct_to_route(arm, route.task, guess, route.targets(points[unsolved]), damping)
     for window in windows:
         if window.detour is not None:  # the route is detoured itself
             continue
-        inside = new & (points > window.begin) & (points < window.end)
+        inside = unsolved & (points > window.begin) & (points < window.end)
         if inside.any():
-            values[inside] = window.joints(arm, route, points[inside], window.turns_to_copy(arm, guess[inside[new]][0]))
+            values[inside] = window.joints(
+                arm, route, points[inside], window.turns_to_copy(arm, guess[inside[unsolved]][0])
+            )
     return values
 
 

@@ -227,9 +227,9 @@ def _window_between(arm: Arm, route: Route, lengths: Array, start: Array, end: A
     q = np.stack([start, start + joint_change(arm, start, end)])
     slopes = []
     for s, posture in zip(lengths.tolist(), q, strict=True):
-        both = np.clip([s - _STEP, s + _STEP], 0.0, route.length)
-        exact = correct_to_route(arm, route.task, np.stack([posture, posture]), route.targets(both), steps=12)
-        slopes.append((exact[1] - exact[0]) / (both[1] - both[0]))
+        neighbours = np.clip([s - _STEP, s + _STEP], 0.0, route.length)
+        exact = correct_to_route(arm, route.task, np.stack([posture, posture]), route.targets(neighbours), steps=12)
+        slopes.append((exact[1] - exact[0]) / (neighbours[1] - neighbours[0]))
     window = Window(float(lengths[0]), float(lengths[1]), q, np.array(slopes), np.inf)
     s = np.linspace(window.begin, window.end, _LOOKED)
     T, target = fk(arm, window.joints(arm, route, s)), route.targets(s)
