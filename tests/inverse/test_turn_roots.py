@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.inverse.redundant.boundaries import boundaries, places
+from armkin.inverse.redundant.boundaries import boundaries, boundary_angles
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
 from armkin.model.arm import Arm, from_links
 
@@ -63,7 +63,7 @@ def test_where_a_joint_stands_on_a_limit_there_is_a_place() -> None:
                 arm = class_arm(np.random.default_rng(100 + seed), limits)
                 of = boundaries(arm)
                 assert of is not None
-                [values], _ = places(of, armkin.fk(arm, q)[None])
+                [values], _ = boundary_angles(of, armkin.fk(arm, q)[None])
                 assert np.abs(np.remainder(values - q[6] + np.pi, 2 * np.pi) - np.pi).min() < 1e-7
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.inverse.singular.legal_postures import followed
+from armkin.inverse.singular.legal_postures import follow_self_motion
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.keep_out.clearance import hits_nothing
 
@@ -30,7 +30,7 @@ def test_the_nearest_free_posture_of_a_self_motion_is_the_branch(arm: armkin.Arm
     best = solutions.q[solutions.best]
     assert hits_nothing(arm, best[None]).all()
     assert np.abs(armkin.fk(arm, best) - T).max() < 1e-6
-    every = followed(arm, task_for(arm), JOINTS, T)
+    every = follow_self_motion(arm, task_for(arm), JOINTS, T)
     turned = np.abs((every - JOINTS + np.pi) % (2 * np.pi) - np.pi).sum(axis=1)
     hit = ~hits_nothing(arm, every)
     nearest = np.rad2deg(turned[~hit].min())
@@ -48,7 +48,7 @@ def test_without_keep_outs_the_nearest_posture_stays() -> None:
 def test_the_whole_of_a_self_motion_is_followed() -> None:
     arm = armkin.load("ur5e")
     T = armkin.fk(arm, JOINTS)
-    passed = followed(arm, task_for(arm), JOINTS, T)
+    passed = follow_self_motion(arm, task_for(arm), JOINTS, T)
     assert np.abs(armkin.fk(arm, passed)[:, :3, 3] - T[:3, 3]).max() < 1e-6
     turns = np.sort(passed[:, 3] % (2 * np.pi))
     assert np.rad2deg(np.diff(turns).max()) < 0.1  # a whole turn of the fourth joint

@@ -240,7 +240,7 @@ class _CompiledTask:
         single = arrays.is_single(targets)
         shown = array.reshape(target.shape), rounding
         rounding, most = target_rounding.of_targets(self.arm, self.task, target, shown, single, stated, lead)
-        rows = near_itself.standing(self.arm, self.task, target, near_rows, most)
+        rows = near_itself.solved_by_near(self.arm, self.task, target, near_rows, most)
         if len(rows):
             self._solve_by_python(batch, rows, target, near_rows.reshape(-1, self.n), most - SOLUTION)
         self._finish(batch, target)

@@ -217,7 +217,7 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     for rows in arrays.slices(len(count), arrays.CHUNK):
         pack_branches(rows_of(batch, rows), count[rows])
     if examine:
-        doubt[near_itself.take(goals, batch, near_itself.reached(arm, task, target, position(arm, near)))] = True
+        doubt[near_itself.take(goals, batch, near_itself.at_tip(arm, task, target, position(arm, near)))] = True
     doubted = np.flatnonzero(doubt)
     if examine and len(doubted):
         candidates = q[doubted] if guesses is None else np.concatenate([q[doubted], guesses[doubted]], axis=1)

@@ -125,7 +125,7 @@ def ik(
 def _request_with_solver(request: choose_branch.Request, task: str, *, compiled: bool) -> choose_branch.Request:
     """The same where position first fits the arm; compiled: by machine code, which is built if it is not there yet."""
     from armkin.inverse import choose_branch
-    from armkin.inverse.redundant.position_first import check as position_first_is_for
+    from armkin.inverse.redundant.position_first import check_arm as position_first_is_for
 
     if request.position_first:
         position_first_is_for(choose_branch.locked_arm(request), task)

@@ -100,7 +100,7 @@ def _motor_json(motor: Motor, file: RobotFile) -> dict[str, Any]:
 
 def _solving_json(arm: Arm, name: str | None) -> Solving:
     """The task and its solver, or why there is none."""
-    from armkin.inverse.redundant.families import described
+    from armkin.inverse.redundant.families import method_of_families
     from armkin.inverse.solvers.redundant import redundancy
     from armkin.inverse.tasks.choose_task import task_for
     from armkin.model.arm import actual_arm
@@ -119,7 +119,7 @@ def _solving_json(arm: Arm, name: str | None) -> Solving:
         "ik_refuses": None,
     }
     if spare := redundancy(actual_arm(arm), task.name):
-        method, why, complete = described(arm, spare)
+        method, why, complete = method_of_families(arm, spare)
         solving["redundant"] = arm.joint_names[spare.joint]
         solving["solver"] = {"method": method, "why": why, "complete": complete}
         return solving

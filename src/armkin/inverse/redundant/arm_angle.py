@@ -127,7 +127,7 @@ def _angles(of: ArmAngle, R: Array, psi: Array) -> Array:
     return np.stack([np.arctan2(s, c), np.arctan2(r, -z2), t3])
 
 
-def _joints(of: ArmAngle, t: Array, flip: Array) -> Array:
+def _joint_values(of: ArmAngle, t: Array, flip: Array) -> Array:
     """Joint values (3, 2, ...) of shoulder and wrist: of the first half, or where flip of t + pi, -t, t + pi."""
     second_half = np.stack([t[0] + np.pi, -t[1], t[2] + np.pi])
     return np.asarray(np.where(flip, second_half, t) - of.offset.reshape(3, 2, *[1] * (t.ndim - 2)))
@@ -140,16 +140,16 @@ def _roots(a: Array, b: Array, c: Array) -> Array:
     return np.stack([middle - apart, middle + apart], axis=1)
 
 
-def _turning(R: Array) -> tuple[Array, Array, Array]:
+def _turning_rate(R: Array) -> tuple[Array, Array, Array]:
     """a, b, c (M,): the last joint turns at the rate (a cos(psi) + b sin(psi) + c) / (R31^2 + R32^2)."""
     x, y = R[:, 2, 0, 1], -R[:, 2, 1, 1]
     return x[0] * y[2] - y[0] * x[2], y[0] * x[1] - x[0] * y[1], x[1] * y[2] - y[1] * x[2]
 
 
-def _places(of: ArmAngle, R: Array, near: Array) -> Array:
+def _special_angles(of: ArmAngle, R: Array, near: Array) -> Array:
     """Values of psi (M, K), sorted, where a joint may stand on a limit or at near (M, n), or the last one turns back,
     and some between."""
-    turning = _turning(R)
+    turning = _turning_rate(R)
     angles = [_roots(turning[0], turning[1], -turning[2])]
     for k, joints in enumerate(JOINTS):
         e = R[:, :, :, k]
@@ -182,7 +182,7 @@ class _Samples(NamedTuple):
 def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     """Those of circles M; near: (M, n)."""
     arm = of.arm
-    psi = _places(of, circles.R, near)
+    psi = _special_angles(of, circles.R, near)
     M, K = psi.shape
     ends = np.concatenate([psi, psi[:, :1] + TURN], axis=1)
     psi = np.empty((M, 2 * K + 1))
@@ -192,7 +192,7 @@ def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     cost = np.broadcast_to(np.abs(elbow - near[:, 3])[:, None, None, None], (M, 2, 2, 2 * K)).copy()
     legal = np.broadcast_to(np.broadcast_to(reached, M)[:, None, None, None], cost.shape).copy()
     for half in range(2):
-        q = _joints(of, t, np.array(half == 1))
+        q = _joint_values(of, t, np.array(half == 1))
         for k, joints in enumerate(JOINTS):
             halves = (slice(None), half) if k == 0 else (slice(None), slice(None), half)
             for i, joint in enumerate(joints):
@@ -201,7 +201,7 @@ def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
                 moved, fits = np.abs(value - close), np.broadcast_to(within, (M, 2 * K))
                 cost[halves] += moved[:, None]
                 legal[halves] &= fits[:, None]
-    a, b, c = (x[:, None] for x in _turning(circles.R))
+    a, b, c = (x[:, None] for x in _turning_rate(circles.R))
     middle = psi[:, 1::2]
     up = (a * np.cos(middle) + b * np.sin(middle) + c >= 0.0) | (np.hypot(a, b) + np.abs(c) < tol.NO_SIZE)
     # a piece shorter than rounding tells nothing: it is as the one before it
@@ -242,7 +242,7 @@ class Turning(NamedTuple):
         place[self.circles.row, self.circles.half] = np.arange(len(self.circles.row))
         circle = place[pieces.row, pieces.branch // 4]
         t = _angles(self.of, self.circles.R[..., circle], parameter)
-        q = _joints(self.of, t, np.stack([pieces.branch // 2 % 2 == 1, pieces.branch % 2 == 1]))
+        q = _joint_values(self.of, t, np.stack([pieces.branch // 2 % 2 == 1, pieces.branch % 2 == 1]))
         row = np.stack([*q[:, 0], self.circles.q4[circle], *q[:, 1]], axis=1)
         return nearest_row(self.of.arm, row, self.near[pieces.row])
 

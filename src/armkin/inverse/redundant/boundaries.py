@@ -154,7 +154,7 @@ def _shoulder(held: _Held, e0: Array, e3: Array, cosine: float) -> Complex:
     return np.asarray(value)
 
 
-def _limits(arm: Arm, j: int) -> list[float]:
+def _limits_of_joint(arm: Arm, j: int) -> list[float]:
     """The limits of joint j that it may come to."""
     lower, upper = float(arm.lower[j]), float(arm.upper[j])
     return [lower, upper] if upper - lower < 2 * np.pi else []
@@ -163,7 +163,7 @@ def _limits(arm: Arm, j: int) -> list[float]:
 def _equations(of: Boundaries, target: Array) -> Complex:
     """Values of all polynomials at samples (F, S, M)."""
     held = _Held(of, target, sampled_at(DEGREE))
-    R, limits = of.link[:, :3, :3], [_limits(of.arm, j) for j in range(6)]
+    R, limits = of.link[:, :3, :3], [_limits_of_joint(of.arm, j) for j in range(6)]
     axis1, axis5 = R[0] @ Z, R[5].T @ Z
     to, h = held.before5(of.upper, of.fore), held.to[2]
     values = [_shoulder(held, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
@@ -180,13 +180,13 @@ def _equations(of: Boundaries, target: Array) -> Complex:
     return np.stack(values)
 
 
-def places(of: Boundaries, target: Array) -> tuple[Array, Bool]:
+def boundary_angles(of: Boundaries, target: Array) -> tuple[Array, Bool]:
     """Where something may change at targets (S, 4, 4): (S, V), sorted, inf where there are fewer; whether these are all
     (S,)."""
     values = _equations(of, target)
     F, S, M = values.shape
     zeros = roots(values.reshape(-1, M), DEGREE)
-    limits = np.array(_limits(of.arm, 6))
+    limits = np.array(_limits_of_joint(of.arm, 6))
     row = np.concatenate([zeros.which % S, np.repeat(np.arange(S), len(limits))])
     angles = np.concatenate([zeros.at, np.tile(limits, S)])
     angles = np.remainder(angles + np.pi, 2 * np.pi) - np.pi

@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array, Int
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import golden_section, margin
 from armkin.inverse.redundant.other_joints import Follower
-from armkin.inverse.redundant.samples import Changes, Gone, Seen, Turns, beside, value_at
+from armkin.inverse.redundant.samples import Changes, Gone, Summary, Turns, nearest_other, value_at
 
 HALVINGS = 60  # steps to where a branch ends, at most
 SECANTS = 24  # of which the later ones halve
@@ -39,7 +39,7 @@ class _Ends:
         if self.of_limits:
             return margin(self.find.arm, self.find.own(row, branch, value))
         q = self.find.found(row, value)
-        *_, apart = beside(q, branch)
+        *_, apart = nearest_other(q, branch)
         return np.asarray(np.where(np.isnan(q[np.arange(len(ends)), branch, 0]), np.nan, apart))
 
     def between(self, good: Array, bad: Array, before: Array, rooms: tuple[Array, Array, Array]) -> Array:
@@ -120,7 +120,7 @@ def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, A
     return Changes(row, k, branch, sign > 0), ends.reshape(2, -1)
 
 
-def _merged(find: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
+def _merging_ends(find: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
     """Where branches end to be there (G,), in the order of `Gone`, and how far within limits they are then.
 
     Of two that are nearest to each other before both vanish one is asked, if it has joined the other one there.
@@ -142,7 +142,7 @@ def _merged(find: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
         q = find.found(
             changes.row[rows], value[rows] + np.clip(good[rows] - value[rows], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
         )
-        away, _, apart = beside(q, changes.branch[rows])
+        away, _, apart = nearest_other(q, changes.branch[rows])
         mine = q[np.arange(len(rows)), changes.branch[rows]]
         present = ~np.isnan(mine[:, 0])
         middle = margin(find.arm, mine + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away))
@@ -162,13 +162,13 @@ class Places(NamedTuple):
     ends: tuple[Array, Array]  # of these: where the branch ends, and where its limit is crossed
 
 
-def places_of(find: Follower, shown: Seen) -> Places:
+def places_of(find: Follower, shown: Summary) -> Places:
     """All ends of some targets.
 
     Where two branches merge both are legal, or none: one that is not at the next sample is for a stretch.
     """
     t, gone, illegal = shown.t, shown.gone.at, shown.crossed.at
-    merged, room = _merged(find, t, shown.gone)
+    merged, room = _merging_ends(find, t, shown.gone)
     inside, outside = shown.crossed.rooms.T
     # which of the branches that are not legal at the next sample end there, too, and where
     ending = np.isnan(outside)

@@ -36,17 +36,17 @@ class Points(NamedTuple):
         return np.asarray(self.step < tol.PAIR_SETTLED)
 
 
-def onto(find: Follower, row: Int, q: Array, last: Array, enough: float = tol.PAIR_SETTLED) -> Points:
+def onto_curves(find: Follower, row: Int, q: Array, last: Array, enough: float = tol.PAIR_SETTLED) -> Points:
     """Postures q (M, n) moved onto the curves of their targets, across last (M, n): a tangent, or a joint that is held.
 
     The tangents point to where last does. enough: size of a step that is the last one.
     """
     parts = slices(max(len(q), 1), AT_ONCE)
-    return stack_rows([_onto(find, row[part], q[part], last[part], enough) for part in parts])
+    return stack_rows([_move_chunk(find, row[part], q[part], last[part], enough) for part in parts])
 
 
-def _onto(find: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:
-    """As `onto`, of postures that stay in the cache."""
+def _move_chunk(find: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:
+    """As `onto_curves`, of postures that stay in the cache."""
     arm, task, unit = find.arm, find.free.task, radian_or_reach(find.arm)
     target = find.target[row]
     q, tangent, size, going = q.copy(), last.copy(), np.full(len(q), np.inf), np.arange(len(q))

@@ -20,8 +20,8 @@ from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.redundant.curve_points import Points, Ways, onto
-from armkin.inverse.redundant.interval_pieces import turning
+from armkin.inverse.redundant.curve_points import Points, Ways, onto_curves
+from armkin.inverse.redundant.interval_pieces import may_turn_back
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.inverse.solvers.redundant import Redundancy, arm_without, nearly_closed
 
@@ -68,13 +68,13 @@ class Planes(NamedTuple):
 
     def answers(self, row: Int, plane: Int, q: Array) -> tuple[Nodes, Int]:
         """Postures (M, n) moved along their planes (M,) onto curves, each once, and which of them are (K,)."""
-        points = onto(self.find, row, q, self.held(len(q)), tol.SAME_SEED)
+        points = onto_curves(self.find, row, q, self.held(len(q)), tol.SAME_SEED)
         good = np.flatnonzero(points.step < tol.SAME_SEED)
-        good = good[once(self.find, self.place(row[good], plane[good]), points.q[good])]
+        good = good[first_of_equals(self.find, self.place(row[good], plane[good]), points.q[good])]
         return Nodes(row[good], plane[good], rows_of(points, good)), good
 
 
-def answered(find: Follower, whose: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
+def answers_on_planes(find: Follower, whose: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
     """The planes of all targets, and the answers on them; which is whose, by plane and branch (N, V, B), -1: none.
 
     whose: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
@@ -112,7 +112,7 @@ def _answers_between(source: Follower, t: Array, missed: Array) -> tuple[Int, Ar
     tells: of a short curve, whose joint cannot be held where it turns back."""
     width, part = t[1] - t[0], np.arange(1, BETWEEN) / BETWEEN
     misses = np.where(missed <= tol.ACCEPTED, np.nan, -missed)
-    row, k = np.nonzero(turning(misses, np.broadcast_to(t, missed.shape[:2])).any(axis=2))
+    row, k = np.nonzero(may_turn_back(misses, np.broadcast_to(t, missed.shape[:2])).any(axis=2))
     row, values = np.repeat(row, len(part)), (t[k, None] + width * part).ravel()
     q, missed = source.candidates(row, values)
     best = missed.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
@@ -120,11 +120,11 @@ def _answers_between(source: Follower, t: Array, missed: Array) -> tuple[Int, Ar
     row, q = row[best[place]], q[best[place], branch]
     q, miss = newton.correct(source.arm, source.free.task, q, source.target[row])
     good = np.flatnonzero(miss < tol.SAME_SEED)
-    good = good[once(source, row[good], q[good])]
+    good = good[first_of_equals(source, row[good], q[good])]
     return row[good], q[good]
 
 
-def once(find: Follower, group: Int, q: Array) -> Bool:
+def first_of_equals(find: Follower, group: Int, q: Array) -> Bool:
     """Which postures (M, n) of groups (M,) are the first of those that are the same."""
     key = np.cos(q - 0.3) @ np.sqrt(np.arange(2.0, 2.0 + q.shape[1]))
     order = np.lexsort((key, group))
@@ -136,18 +136,18 @@ def once(find: Follower, group: Int, q: Array) -> Bool:
     return unique
 
 
-def missed(find: Follower, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
+def answers_off_curves(find: Follower, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
     """Answers (M, n) of targets (M,) that no curve passes: points of curves, whose targets, the points after them."""
     guide = nearly_closed(find.arm, find.free)
     joint = 2 if guide.joint == 0 else 4  # the shoulder is on the far side of the three joints of a spherical wrist
     if guide is find.free or find.arm.prismatic[joint]:
         return row[:0], points.q[:0]
-    parts = [_missed_at(find, joint, value, points, row, after) for value in VALUES]
+    parts = [_off_curves_at(find, joint, value, points, row, after) for value in VALUES]
     whose, q = (np.concatenate(column) for column in zip(*parts, strict=True))
     return whose, q
 
 
-def _missed_at(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
+def _off_curves_at(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
     """Those with the joint at a value."""
     held_arm = arm_without(find.arm, ((find.arm.joint_names[joint], value),))
     s = find.ik(held_arm, find.target, find.free.task.name, examine=False)

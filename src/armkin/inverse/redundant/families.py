@@ -29,7 +29,7 @@ from armkin.inverse.redundant.curve_starts import PLANES
 from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
 from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion, vertex
 from armkin.inverse.redundant.other_joints import Follower, Ik
-from armkin.inverse.redundant.traced_families import Traced, traced
+from armkin.inverse.redundant.traced_families import Traced, trace_families
 from armkin.inverse.solvers.redundant import Redundancy, moved, nearly_closed
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets
 from armkin.keep_out.clearance import hits_nothing
@@ -73,7 +73,7 @@ def families(
             rows.add(Turning.along(angle_class, *some))
             continue
         follower = Follower(ik, arm, free, *some)
-        for curves in [Followed.along(follower)] if free.by_formula else traced(follower):
+        for curves in [Followed.along(follower)] if free.by_formula else trace_families(follower):
             rows.add(curves)
     rows.add_points(task, goal, not free.by_formula)
     q, interval, legal, branch = rows.stacked()
@@ -81,7 +81,7 @@ def families(
     status = np.where(valid.any(axis=1), np.where(rows.short, Status.BOUNDARY, Status.EXACT), Status.UNREACHABLE)
     names = ik(free.rest, moved(arm, free, goal[:1], np.zeros(1)), task.name, examine=False).names if len(goal) else ()
     names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
-    method, why, _ = described(arm, free)
+    method, why, _ = method_of_families(arm, free)
     batch = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(nears.shape, bool), rows.complete)
     s = as_solutions(Goals(arm, task, goal, nears), close, lead, batch, roundings, (names, method, why))
     return replace(s, interval=interval.reshape(*s.valid.shape, 2))
@@ -100,7 +100,7 @@ def _with_tool_turn(
     turns = arm.upper[r] - arm.lower[r] >= 2 * np.pi
     interval = np.full((*s.valid.shape, 2), np.nan)
     interval[s.valid] = [-np.pi, np.pi] if turns else [arm.lower[r], arm.upper[r]]
-    method, why, _ = described(arm, free)
+    method, why, _ = method_of_families(arm, free)
     return replace(
         s,
         arm=arm,
@@ -115,7 +115,7 @@ def _with_tool_turn(
     )
 
 
-def described(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
+def method_of_families(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     """The method of an arm with a redundant joint, why, and whether it guarantees all families."""
     joint = arm.joint_names[free.joint]
     if free.still:

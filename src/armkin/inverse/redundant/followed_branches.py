@@ -9,11 +9,11 @@ import numpy as np
 from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.redundant.boundaries import boundaries, places
+from armkin.inverse.redundant.boundaries import boundaries, boundary_angles
 from armkin.inverse.redundant.branch_ends import crossed_at, hidden_stretches, number_of, places_of
 from armkin.inverse.redundant.interval_pieces import Pieces, none
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
-from armkin.inverse.redundant.samples import Changes, Runs, Seen, place_between, seen, value_at
+from armkin.inverse.redundant.samples import Changes, Runs, Summary, place_between, summary_of_samples, value_at
 from armkin.inverse.tasks.task import distance
 
 EVEN = 180  # samples of a turn of the redundant joint besides all places where something may change;
@@ -39,12 +39,12 @@ class Followed(NamedTuple):
         parts, short, complete = [none(find.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
         of = boundaries(find.arm) if find.free.joint == find.arm.n - 1 else None
         if of is not None:
-            angles, decided = places(of, find.target)
+            angles, decided = boundary_angles(of, find.target)
             if len(rows := np.flatnonzero(decided)):
                 pieces, short[rows], complete[rows] = _between_places(find.of(rows), angles[rows])
                 parts.append(pieces._replace(row=rows[pieces.row]))
         if len(rows := np.flatnonzero(~complete)):
-            pieces, short[rows] = _sampled(find.of(rows), 1)
+            pieces, short[rows] = _sampled_pieces(find.of(rows), 1)
             parts.append(pieces._replace(row=rows[pieces.row]))
         return cls(find, stack_rows(parts), short, complete)
 
@@ -63,7 +63,7 @@ class Followed(NamedTuple):
 def _between_places(find: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
     """Pieces of those of some targets whose curves change at angles (N, V) alone; which are short (N,), and which
     targets those are (N,)."""
-    shown = seen(find, over_a_turn(EVEN), angles)
+    shown = summary_of_samples(find, over_a_turn(EVEN), angles)
     changes = shown.crossed.at, shown.gone.at
     legal, present = ends = [place_between(shown.t, change, angles) for change in changes]
     crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(shown.crossed.rooms).any(axis=1))
@@ -77,11 +77,11 @@ def _between_places(find: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
     return stack_rows([pieces, without]), shown.short, explained
 
 
-def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
+def _sampled_pieces(find: Follower, finer: int) -> tuple[Pieces, Bool]:
     """Pieces of some targets, and which are short: one of which something may be hidden between samples, or without an
     answer, is asked again: all of a nearly stretched arm lie within a degree."""
-    shown = seen(find, over_a_turn(SAMPLES * finer))
-    pieces, short = _pieces(find, shown), shown.short
+    shown = summary_of_samples(find, over_a_turn(SAMPLES * finer))
+    pieces, short = _all_pieces(find, shown), shown.short
     if finer == 1:
         near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + tol.SOLUTION)
         lost = shown.lost & near_enough
@@ -89,14 +89,14 @@ def _sampled(find: Follower, finer: int) -> tuple[Pieces, Bool]:
             again = np.flatnonzero(asked_again)
             at_once = max(SAMPLES // more, 1)
             for rows in (again[k : k + at_once] for k in range(0, len(again), at_once)):
-                part, part_short = _sampled(find.of(rows), more)
+                part, part_short = _sampled_pieces(find.of(rows), more)
                 unchanged, closer = rows_of(pieces, ~np.isin(pieces.row, rows)), part._replace(row=rows[part.row])
                 pieces = stack_rows([unchanged, closer])
                 short[rows] = part_short
     return pieces, short
 
 
-def _pieces(find: Follower, shown: Seen) -> Pieces:
+def _all_pieces(find: Follower, shown: Summary) -> Pieces:
     """All pieces of the curves of some targets."""
     t, K = shown.t, shown.t.shape[1]
     places = places_of(find, shown)

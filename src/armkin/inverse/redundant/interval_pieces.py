@@ -105,7 +105,7 @@ def within_limits(arm: Arm, j: int, value: Array, room: Array) -> None:
     np.minimum(room, 0.5 * (upper - lower) - away, out=room)
 
 
-def turning(values: Array, t: Array) -> Bool:
+def may_turn_back(values: Array, t: Array) -> Bool:
     """Whether values of one sign at a sample and the next seem to have the other one in between, if they go on as on
     the far sides of both: (N, K, B), at t (N, K) of a turn."""
     width = np.diff(t, axis=1, append=t[:, :1] + 2 * np.pi)[:, :, None]

@@ -99,7 +99,7 @@ class _Move(NamedTuple):
     blocked: Bool  # (M,) a limit takes hold first
 
 
-def _move(box: Box, local: _Local, x: Array, held: Bool) -> _Move:
+def _newton_step(box: Box, local: _Local, x: Array, held: Bool) -> _Move:
     """Newton's step of postures x (M, n), at limits held (M, n), which lets go of one of them where it is to."""
     low, high = x <= box.lower, x >= box.upper
     held &= low | high
@@ -123,7 +123,7 @@ def _move(box: Box, local: _Local, x: Array, held: Bool) -> _Move:
     return _Move(step, tangent.back, pressed, flat, minimum, leaves, pressed.any(axis=1) & ~leaves)
 
 
-def _tried(arm: Arm, box: Box, x: Array, goal: Array, move: _Move, trust: Array) -> tuple[Array, Bool]:
+def _try_step(arm: Arm, box: Box, x: Array, goal: Array, move: _Move, trust: Array) -> tuple[Array, Bool]:
     """Where the steps of at most trust (M,) lead, to the first limit at most; joints (M, n) that come onto one."""
     step = move.step * np.minimum(1.0, trust / np.maximum(np.abs(move.step).max(axis=1), tol.TINY))[:, None]
     room = np.where(step > 0, (box.upper - x) / box.unit, (x - box.lower) / box.unit)
@@ -151,10 +151,10 @@ def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
             break
         x, goal, hold = q[active], target[active], held[active]
         local = _local(arm, box, x, goal)
-        move = _move(box, local, x, hold)
+        move = _newton_step(box, local, x, hold)
         arrived[active[move.rest]] = True
         held[active] = hold
-        trial, hit = _tried(arm, box, x, goal, move, trust[active])
+        trial, hit = _try_step(arm, box, x, goal, move, trust[active])
         T = fk(arm, trial)
         missed = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
         f = 0.5 * (3.0 - np.einsum("mij,mij->m", T[:, :3, :3], goal[:, :3, :3]))

@@ -62,7 +62,7 @@ class Sampled(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _recorded(arm: Arm, free: Redundancy) -> tuple[StraightLineCode, tuple[int, ...]]:
+def _recorded_form(arm: Arm, free: Redundancy) -> tuple[StraightLineCode, tuple[int, ...]]:
     """The closed form of the others with the redundant joint as an argument: of a target's entries and its pair."""
     rest_form = recorded_formula(free.rest, solver(free.rest, free.task.name)[0], free.geometry)
     inputs = 12 if free.task.orientation == "full" else len(free.task.labels)
@@ -105,7 +105,7 @@ class Follower(NamedTuple):
 
     def candidates(self, rows: Int, t: Array) -> tuple[Array, Array]:
         """Of a closed form all branches (M, B, n), real or not, and what they miss (M, B)."""
-        axes = _recorded(self.arm, self.free)[1]
+        axes = _recorded_form(self.arm, self.free)[1]
         columns = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
         missed = np.empty(columns.shape[1:])
         room: list[NDArray[Any]] = []
@@ -120,7 +120,7 @@ class Follower(NamedTuple):
     def _candidates(self, rows: Int, t: Array, room: list[NDArray[Any]]) -> list[Any]:
         """The values of all joints and what they miss, squared, on their own branch axes before targets (M,); the
         workspace that they stand in, room if that is one for as many."""
-        code, _ = _recorded(self.arm, self.free)
+        code, _ = _recorded_form(self.arm, self.free)
         if not room or room[0].shape[-1] != len(t):
             room = code.workspace(len(t))
         goal = [np.asarray(x)[rows] for x in target_entries(self.free.task, self.target)]
@@ -132,7 +132,7 @@ class Follower(NamedTuple):
         """Some of the targets (S,), of a closed form, at all of t (K,) and at more values (S, M), inf where there are
         fewer; by default between those at which more may happen."""
         rows, values = np.repeat(pick, len(t)), np.tile(t, len(pick))
-        axes = _recorded(self.arm, self.free)[1]
+        axes = _recorded_form(self.arm, self.free)[1]
         *columns, missed, _ = self._candidates(rows, values, [])
         if more is None:
             more = _values_between(self.arm, columns, missed, axes, t)
@@ -171,7 +171,7 @@ class Follower(NamedTuple):
     def own(self, rows: Int, branch: Int, t: Array) -> Array:
         """One branch each (M, n), as `found`."""
         *columns, miss, _ = self._candidates(rows, t, [])
-        place = np.unravel_index(branch, _recorded(self.arm, self.free)[1])
+        place = np.unravel_index(branch, _recorded_form(self.arm, self.free)[1])
 
         def picked(values: Array) -> Array:
             axes = values.shape[:-1]
@@ -209,11 +209,11 @@ def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[i
         left = by_target(left)
         np.minimum(room, left, out=room)
         may |= _may_touch(left)
-        crossed += (left < 0) != _next(left < 0)
+        crossed += (left < 0) != _next_sample(left < 0)
     room = np.where(present, room, -np.inf)
-    room = np.maximum(room, _next(room))
-    gone = ~present & ~_next(present)
-    ends = present != _next(present)
+    room = np.maximum(room, _next_sample(room))
+    gone = ~present & ~_next_sample(present)
+    ends = present != _next_sample(present)
     hidden = gone & _may_touch(np.sqrt(by_target(missed)))
     limits = ~gone & ~ends & (may | (crossed > 1)) & (room > -BESIDE)
     often = (limits | (ends & (room > -ASIDE)) | hidden).sum(axis=tuple(range(len(axes))))
@@ -224,14 +224,14 @@ def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[i
     return np.asarray(values.reshape(-1, CLOSER))
 
 
-def _next(x: NDArray[Any]) -> NDArray[Any]:
+def _next_sample(x: NDArray[Any]) -> NDArray[Any]:
     """Of the next sample round the turn."""
     return np.roll(x, -1, axis=-1)
 
 
 def _may_touch(left: Array) -> Bool:
     """Whether what is left (..., K) may come to nothing and back between a sample and the next."""
-    touches, values, K = np.abs(_next(left) - left) > FAST, left.ravel(), left.shape[-1]
+    touches, values, K = np.abs(_next_sample(left) - left) > FAST, left.ravel(), left.shape[-1]
     near = np.flatnonzero(np.abs(values) < NEAR)
     k = near % K
     before, first, second, behind = (values[near - k + (k + offset) % K] for offset in (-1, 0, 1, 2))

@@ -41,7 +41,7 @@ METHOD = "position first"
 Ik = Callable[..., Solutions]
 
 
-def check(arm: Arm, task: str | None) -> None:
+def check_arm(arm: Arm, task: str | None) -> None:
     """Raise UsageError where position first is not for this arm or task."""
     if task != "pose":
         raise UsageError(
@@ -59,7 +59,7 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
     else position; unreachable where there is none. ik: what finds exact answers, called as `armkin.ik` is.
     Raises UsageError for arms of other than 4 or 5 joints, and for a task of another name.
     """
-    check(arm, name)
+    check_arm(arm, name)
     task = task_for(arm, "pose")
     goal, lead, rounding = read_targets(task, targets)
     close = read_near(arm, near, lead)

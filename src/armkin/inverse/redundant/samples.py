@@ -13,7 +13,7 @@ from armkin.formula.array_tuples import stack_rows
 from armkin.formula.arrays import Array, Bool, Int, wrap_angle
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.boundaries import on_both_sides
-from armkin.inverse.redundant.interval_pieces import best_samples, holding_none, runs, turning
+from armkin.inverse.redundant.interval_pieces import best_samples, holding_none, may_turn_back, runs
 from armkin.inverse.redundant.other_joints import Follower, Sampled
 
 AT_A_TIME = 8_000  # samples: they stay in the cache
@@ -86,7 +86,7 @@ class Runs(NamedTuple):
     within: Bool  # whether one of them is legal
 
 
-class Seen(NamedTuple):
+class Summary(NamedTuple):
     """All that samples of N targets show."""
 
     gone: Gone
@@ -100,16 +100,16 @@ class Seen(NamedTuple):
     t: Array  # (N, K) the samples' values of the joint
 
 
-def seen(find: Follower, t: Array, places: Array | None = None) -> Seen:
+def summary_of_samples(find: Follower, t: Array, places: Array | None = None) -> Summary:
     """What samples of all targets along t (K,) show, and others between them; places: all places where something may
     change (N, V), with samples beside each."""
     N = len(find.target)
     at_once = max(AT_A_TIME // len(t), 1)
     parts = (np.arange(k, min(k + at_once, N)) for k in range(0, max(N, 1), at_once))
     if places is None:
-        return stack_rows([_seen(find.sampled(rows, t), rows, False) for rows in parts])
+        return stack_rows([_summarise(find.sampled(rows, t), rows, False) for rows in parts])
     more = on_both_sides(places)
-    return stack_rows([_seen(find.sampled(rows, t, more[rows]), rows, True) for rows in parts])
+    return stack_rows([_summarise(find.sampled(rows, t, more[rows]), rows, True) for rows in parts])
 
 
 def place_between(t: Array, changes: Changes, places: Array) -> Array:
@@ -122,24 +122,24 @@ def place_between(t: Array, changes: Changes, places: Array) -> Array:
         return np.asarray(np.where(ahead <= width, low + ahead, np.inf).min(axis=1, initial=np.inf))
 
 
-def _seen(sampled: Sampled, rows: Int, sure: bool) -> Seen:
+def _summarise(sampled: Sampled, rows: Int, sure: bool) -> Summary:
     """What samples of some targets, rows (S,) of all, show; sure: nothing happens between them that they do not."""
     valid, legal, room = sampled.valid, sampled.legal, sampled.room
     gone, crossed = Changes.of(valid), Changes.of(legal)
     K, every = valid.shape[1], np.arange(len(gone.row))
     last, before = gone.sample(0, K), gone.sample(-1, K)
-    twin, apart = beside(sampled.postures(gone.row, last), gone.branch)[1:]
+    twin, apart = nearest_other(sampled.postures(gone.row, last), gone.branch)[1:]
     postures = sampled.postures(gone.row, before)
-    earlier = np.where(np.isnan(postures[every, gone.branch, 0]), np.nan, beside(postures, gone.branch)[2])
+    earlier = np.where(np.isnan(postures[every, gone.branch, 0]), np.nan, nearest_other(postures, gone.branch)[2])
     cells = gone.row, last, gone.branch
     rooms = [room[crossed.row, crossed.sample(k, K), crossed.branch] for k in (0, 1)]
-    row, k, branch = turns = np.nonzero(np.zeros_like(valid) if sure else turning(room, sampled.t))
+    row, k, branch = turns = np.nonzero(np.zeros_like(valid) if sure else may_turn_back(room, sampled.t))
     hidden: Bool = np.zeros(len(rows), bool)
     if not sure:
         misses = np.where(valid, np.nan, -np.sqrt(sampled.missed))
-        hidden = np.asarray(turning(misses, sampled.t).any(axis=(1, 2)))
+        hidden = np.asarray(may_turn_back(misses, sampled.t).any(axis=(1, 2)))
     present = _runs(sampled, valid, rows)
-    return Seen(
+    return Summary(
         Gone(gone._replace(row=rows[gone.row]), twin, np.stack([apart, earlier], axis=1), room[cells], legal[cells]),
         Crossed(crossed._replace(row=rows[crossed.row]), np.stack(rooms, axis=1)),
         Turns(rows[row], k, branch, np.stack([room[turns], room[row, (k + 1) % K, branch]], axis=1)),
@@ -152,7 +152,7 @@ def _seen(sampled: Sampled, rows: Int, sure: bool) -> Seen:
     )
 
 
-def beside(q: Array, branch: Int) -> tuple[Array, Int, Array]:
+def nearest_other(q: Array, branch: Int) -> tuple[Array, Int, Array]:
     """Of branches (M,) among postures (M, B, n) the nearest other one: how far its joints are (M, n), which one (M,),
     squared (M,)."""
     index = np.arange(len(q))

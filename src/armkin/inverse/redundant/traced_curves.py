@@ -15,8 +15,8 @@ from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.redundant.curve_points import Points, Ways, onto
-from armkin.inverse.redundant.curve_starts import Nodes, answered, missed, once
+from armkin.inverse.redundant.curve_points import Points, Ways, onto_curves
+from armkin.inverse.redundant.curve_starts import Nodes, answers_off_curves, answers_on_planes, first_of_equals
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
@@ -33,7 +33,7 @@ class _Curves:
 
     def __init__(self, find: Follower, whose: Int, q: Array) -> None:
         self.find = find
-        self.planes, self.nodes, grid = answered(find, whose, q)
+        self.planes, self.nodes, grid = answers_on_planes(find, whose, q)
         self.partner = np.full(2 * len(self.nodes.row), -1)
         self.traced = np.zeros(len(self.partner), bool)  # a half that comes to nothing would do so again
         behind = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
@@ -70,7 +70,7 @@ class _Curves:
                 failed[whose[left]] = True
                 break
             middle = rows_of(ways, left).at(find, 0.5)
-            points = onto(find, row[left], middle, ways.chord[left] / size[left, None], tol.SAME_SEED)
+            points = onto_curves(find, row[left], middle, ways.chord[left] / size[left, None], tol.SAME_SEED)
             aside = newton.wrapped_distance(find.arm, points.q, middle)
             good = (points.step < tol.SAME_SEED) & (aside < ASIDE * size[left])
             failed[whose[left[~good]]] = True
@@ -146,7 +146,7 @@ class _Curves:
             added = np.flatnonzero(number < 0)
             if not len(added):
                 break
-            added = added[once(self.find, places[added], arrived.points.q[added])]
+            added = added[first_of_equals(self.find, places[added], arrived.points.q[added])]
             self._add(Nodes(arrived.row[added], arrived.plane[added], rows_of(arrived.points, added)))
         return number
 
@@ -162,7 +162,7 @@ class _Curves:
         passed, going = [(ray[:0], rows_of(current, ray[:0]))], np.arange(len(ray))
         for _ in range(TRIES):
             begin, step = rows_of(current, going), h[going, None]
-            then = onto(find, row[going], begin.q + step * begin.tangent * unit, begin.tangent, tol.SAME_SEED)
+            then = onto_curves(find, row[going], begin.q + step * begin.tangent * unit, begin.tangent, tol.SAME_SEED)
             way = Ways.between(find, begin, then)
             aside = np.sqrt(((way.chord - step * begin.tangent) ** 2).sum(axis=1))
             good = (then.step < tol.SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(find, row[going])
@@ -175,7 +175,7 @@ class _Curves:
             share = np.clip((goal - before[left]) / (depth[left] - before[left]), 0.0, 1.0)
             guess = begin.q[left] + share[:, None] * way.chord[left] * unit
             guess[:, j] = middle[left] + goal
-            landed = onto(find, row[leaving], guess, self.planes.held(len(leaving)))
+            landed = onto_curves(find, row[leaving], guess, self.planes.held(len(leaving)))
             plane[leaving] = np.where(landed.settled, np.where(far, behind[leaving], slab[leaving]), -1)
             inside = good & ~left
             passed.append((going[inside], rows_of(then, inside)))
@@ -214,18 +214,18 @@ class Chains(NamedTuple):
 
 def curves_of(find: Follower) -> Chains:
     """All curves of all targets that an answer is on; of targets with answers that no curve passes, anew from these."""
-    chains = _joined(find, np.zeros(0, np.intp), find.near[:0])
-    row, q = missed(find, chains.points, np.repeat(chains.row, chains.counts), chains.after)
+    chains = _join_curves(find, np.zeros(0, np.intp), find.near[:0])
+    row, q = answers_off_curves(find, chains.points, np.repeat(chains.row, chains.counts), chains.after)
     if not len(row):
         return chains
     again, place = np.unique(row, return_inverse=True)
-    more = _joined(find.of(again), place, q)
+    more = _join_curves(find.of(again), place, q)
     unchanged = chains.curves(np.flatnonzero(~np.isin(chains.row, again)))
     joined = stack_rows([unchanged, more._replace(row=again[more.row])])
     return joined.curves(np.argsort(joined.row, kind="stable"))
 
 
-def _joined(find: Follower, whose: Int, q: Array) -> Chains:
+def _join_curves(find: Follower, whose: Int, q: Array) -> Chains:
     """Curves of all targets that an answer on a plane, or one of q (M, n) of targets whose (M,), is on."""
     curves = _Curves(find, whose, q)
     for _ in range(ROUNDS):
@@ -233,10 +233,10 @@ def _joined(find: Follower, whose: Int, q: Array) -> Chains:
             break
         curves.join_pairs()
         curves.trace()
-    return _chained(curves)
+    return _chain_halves(curves)
 
 
-def _chained(curves: _Curves) -> Chains:
+def _chain_halves(curves: _Curves) -> Chains:
     """Halves that are joined as curves, each in one of its two senses."""
     partner, nodes = curves.partner, curves.nodes
     M = len(partner)

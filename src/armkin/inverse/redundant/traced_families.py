@@ -13,7 +13,7 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
-from armkin.inverse.redundant.curve_points import Points, Ways, onto
+from armkin.inverse.redundant.curve_points import Points, Ways, onto_curves
 from armkin.inverse.redundant.interval_pieces import Pieces, best_samples, holding_none, margin, motion, none, runs
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.traced_curves import Chains, curves_of
@@ -29,7 +29,7 @@ LAST = 2  # steps that take away what is left of a posture
 STEPS = 12  # of the golden section
 
 
-def traced(find: Follower) -> Iterator[Traced]:
+def trace_families(find: Follower) -> Iterator[Traced]:
     """Those of all targets, some at a time."""
     chains = curves_of(find)
     point = np.append(0, np.cumsum(chains.counts))
@@ -98,7 +98,7 @@ class Traced(NamedTuple):
         """Points of the curves at shares (M,) of the way from points (M,) to those after them."""
         ways = rows_of(self.ways, point)
         last = np.where(ways.chord.any(axis=1, keepdims=True), ways.chord, self.points.tangent[point])
-        return onto(self.find, self.row[point], ways.at(self.find, share), last, enough)
+        return onto_curves(self.find, self.row[point], ways.at(self.find, share), last, enough)
 
     def _nodes(self) -> _Nodes:
         """Samples of all curves, and where something changes between them."""
@@ -130,7 +130,7 @@ class Traced(NamedTuple):
     def _crossing(self, point: Int, low: Array) -> tuple[Array, Array]:
         """Shares of the way (M,) at which a limit is crossed, and the postures there: its joint is held on it."""
         arm, ways = self.find.arm, rows_of(self.ways, point)
-        share = _root(lambda t: margin(arm, ways.at(self.find, t)), low, low + 1.0 / PARTS)
+        share = _find_root(lambda t: margin(arm, ways.at(self.find, t)), low, low + 1.0 / PARTS)
         guess = ways.at(self.find, share)
         free = (arm.upper - arm.lower == np.inf) | (~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi))
         low, high = np.where(free, 0.0, arm.lower), np.where(free, 0.0, arm.upper)
@@ -141,7 +141,7 @@ class Traced(NamedTuple):
         held = np.zeros_like(guess)
         held[index, joint] = 1.0
         guess[index, joint] += np.sign(away[index, joint]) * room[index, joint]
-        points = onto(self.find, self.row[point], guess, held)
+        points = onto_curves(self.find, self.row[point], guess, held)
         good = points.settled & (np.abs(points.q - guess).max(axis=1, initial=0.0) < tol.REACH)
         touching = np.flatnonzero(~good)  # it touches its limit alone
         points.q[touching] = self._between(point[touching], share[touching]).q
@@ -150,7 +150,7 @@ class Traced(NamedTuple):
     def _turning(self, point: Int, low: Array) -> tuple[Array, Array]:
         """Shares of the way (M,) at which the joint turns back, and the postures there: by a step along the tangent."""
         j, ways = self.find.free.joint, rows_of(self.ways, point)
-        share = _root(lambda t: ways.slope(t, j), low, low + 1.0 / PARTS)
+        share = _find_root(lambda t: ways.slope(t, j), low, low + 1.0 / PARTS)
         end = self._between(point, share)
         size = np.maximum(np.sqrt((ways.begin**2).sum(axis=1)), tol.TINY)
         bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, tol.TINY))
@@ -161,13 +161,13 @@ class Traced(NamedTuple):
                 tol.REACH * size,
             )
             ahead = end.q + step[:, None] * end.tangent * radian_or_reach(self.find.arm)
-            after = onto(self.find, self.row[point], ahead, end.tangent)
+            after = onto_curves(self.find, self.row[point], ahead, end.tangent)
             bend = np.where(step == 0.0, bend, (after.tangent - end.tangent)[:, j] / np.where(step == 0.0, 1.0, step))
             end = after
         return share, end.q
 
 
-def _root(value: Callable[[Array], Array], lo: Array, hi: Array) -> Array:
+def _find_root(value: Callable[[Array], Array], lo: Array, hi: Array) -> Array:
     """Where values change their sign between lo and hi (M,): regula falsi, the Illinois way."""
     at_lo, at_hi = value(lo), value(hi)
     share, side = 0.5 * (lo + hi), np.zeros(len(lo))

@@ -57,7 +57,7 @@ def _coefficients(degree: int) -> NDArray[np.complex128]:
 
 
 @lru_cache(maxsize=1)
-def _halves() -> Array:
+def _halving_matrices() -> Array:
     """Taylor coefficients of a half about its own middle, of those of the whole: (2, TERMS, TERMS), left and right."""
     halves = np.zeros((2, TERMS, TERMS))
     for i in range(TERMS):
@@ -92,14 +92,14 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
         touches = (ends[:, 0] * ends[:, 1] <= 0.0) | (np.abs(ends).min(axis=1) <= blur)
         simple = np.flatnonzero(single & touches)
         found_which.append(index[simple])
-        found_at.append(angle[simple] + half * _zero(a[simple]))
+        found_at.append(angle[simple] + half * _zero_of_series(a[simple]))
         noise = ~single & (sizes[:, 1:].sum(axis=1) <= TERMS * blur)
         decided[index[noise]] = False
         found_which.append(index[noise])
         found_at.append(angle[noise])
         left = np.flatnonzero(~single & ~noise)
         half *= 0.5
-        a = (a[left] @ _halves()).reshape(-1, TERMS)
+        a = (a[left] @ _halving_matrices()).reshape(-1, TERMS)
         angle = (angle[left] + half * np.array([[-1.0], [1.0]])).ravel()
         index = np.tile(index[left], 2)
         if not len(index):
@@ -108,7 +108,7 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
     return Roots(np.concatenate([*found_which, index]), np.concatenate([*found_at, angle]), decided)
 
 
-def _zero(a: Array) -> Array:
+def _zero_of_series(a: Array) -> Array:
     """Of series (R, TERMS), monotone from -1 to 1, the root (R,)."""
     x = np.zeros(len(a))
     for _ in range(STEPS):

@@ -63,7 +63,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
             first = goal[:, 0] if columns is None else cast("Array", columns[9])
             hits = np.empty(0, np.intp)
             if examine:
-                hits = near_itself.reached(arm, task, goal, position(arm, close) if tip is None else tip, first)
+                hits = near_itself.at_tip(arm, task, goal, position(arm, close) if tip is None else tip, first)
             edge = _keep(Goals(arm, task, goal, near[chunk]), runner.axes, rows_of(batch, chunk), values, close, hits)
             if len(edge.rows):
                 left.append(edge._replace(rows=start + edge.rows))
@@ -88,7 +88,7 @@ def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Array]
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
     targets on an edge.
 
-    hits: `near_itself.reached`, none where that is not asked.
+    hits: `near_itself.at_tip`, none where that is not asked.
     """
     arm = goals.arm
     doubt: Any  # flags
@@ -172,7 +172,7 @@ def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool 
         shape = (*runner.axes, N)
         *values, miss = (np.broadcast_to(column, shape).reshape(B, N) for column in outputs)
         valid: Bool = np.asarray(miss <= tol.ACCEPTED**2)
-        left = np.union1d(_on_edge(doubt, miss, valid), near_itself.reached(arm, task, goal, tip))
+        left = np.union1d(_on_edge(doubt, miss, valid), near_itself.at_tip(arm, task, goal, tip))
         yield Columns(slice(start, start + N), values, miss, valid, left)
 
 

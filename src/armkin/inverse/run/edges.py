@@ -126,7 +126,7 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     outputs = as_rows(runner.in_numbers(target), len(rows))
     tight, (miss, edge, free) = outputs[:, :, :-3], np.moveaxis(outputs[:, :, -3:], 2, 0)
     plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
-    plain[near_itself.reached(arm, task, target, position(arm, near))] = False
+    plain[near_itself.at_tip(arm, task, target, position(arm, near))] = False
     gone = plain & (miss > tol.NEARBY**2)
     doubts = _Doubts(
         rows=rows,
@@ -180,7 +180,7 @@ def examine_targets(
         lacking = (None, None) if unsettled is None else (unsettled[rows], unsettled[rows] & ~batch.complete[rows])
         decision = components.examine(subset, rows_of(seeds, part), more, *lacking)
         if decision.surface.any():
-            decision = surfaces.swept(subset, decision)
+            decision = surfaces.list_swept(subset, decision)
         batch = write_branches(goals.arm, batch, rows, decision.q, decision.valid, decision.label, subset.near)
         batch.status[rows], batch.free[rows] = decision.status, decision.free
         batch.complete[rows] &= ~decision.again

@@ -195,7 +195,7 @@ class _Groups:
         """Which candidates are one with these, whose component is not known."""
         at, (arm, task, target, _), sigma = self.at, self.goals, self.lost.sigma
         self.place[k, b] = len(self.component) + np.arange(len(k))
-        one, away = high_order_roots.alike(arm, task, at.q, k, b, sigma, at.size, target)
+        one, away = high_order_roots.equal_candidates(arm, task, at.q, k, b, sigma, at.size, target)
         self.edge[k, b] = (one & self.valid[k] & (away > tol.SAME)).any(axis=1) | (sigma[k, b] < tol.DOUBLE)
         self.component = np.concatenate([self.component, one])
 

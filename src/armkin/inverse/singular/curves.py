@@ -80,7 +80,7 @@ class Curves:
         return step
 
 
-def directions(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Bool]:
+def curve_directions(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Bool]:
     """Directions (M, n) of curves through postures q (M, n), moving joints (M, n); which are crossings (M,)."""
     _, V, second, _ = _onto_curve(arm, task, q, joints, target)
     return V[:, :, 0], np.asarray(second < tol.CROSSING)
@@ -134,18 +134,18 @@ def share_circuit(arm: Arm, task: Task, q: Array, joints: Bool, postures: Array,
         same[k, c] = side[0] == side[1]
         compared = compared & ~is_linkage[:, None]
     curve, column = np.nonzero(compared)
-    ahead, crossing = directions(arm, task, q, joints, target)
+    ahead, crossing = curve_directions(arm, task, q, joints, target)
     met = crossing[curve]
     if len(open_ := np.flatnonzero(~met)):
         rows, place = np.unique(curve[open_], return_inverse=True)
         twice = np.tile(rows, 2)
         walk = Curves(arm, task, q[twice], joints[twice], target[twice], np.concatenate([ahead[rows], -ahead[rows]]))
-        met[open_] = _met(arm, walk, place, postures[curve, column][open_])
+        met[open_] = _met_postures(arm, walk, place, postures[curve, column][open_])
     same[curve, column] = met
     return same
 
 
-def _met(arm: Arm, walk: Curves, curve: Int, posture: Array) -> Bool:
+def _met_postures(arm: Arm, walk: Curves, curve: Int, posture: Array) -> Bool:
     """Which postures (P, n) the curve-th of these curves meet, until each has met all of its own: (P,).
 
     The second half of `walk` are the same curves the other way: they tell nothing more once the first half has closed.

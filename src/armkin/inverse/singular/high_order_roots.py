@@ -20,7 +20,7 @@ BESIDE = 0.1  # of the distance between two: as far as a posture beside the one 
 ROOT = 0.03  # of that distance: an exact root's next Newton step is shorter, that of a point off one of order 16 longer
 
 
-def joined(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array, target: Array) -> Bool:
+def solves_between(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array, target: Array) -> Bool:
     """Whether a posture between q (M, n) and q + way (M, n), in scaled units, solves the target: (M,).
 
     miss, sigma: (M,) residual and smallest singular value of the one whose Newton step, their quotient, is longer.
@@ -38,7 +38,7 @@ def joined(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array
     return np.asarray(solves)
 
 
-def alike(
+def equal_candidates(
     arm: Arm, task: Task, q: Array, k: Int, b: Int, sigma: Array, size: Array, target: Array
 ) -> tuple[Bool, Array]:
     """Which candidates are one with the b-th of their target, and how far they are from it: (k, M).
@@ -55,7 +55,7 @@ def alike(
         first, second = (k[row], b[row]), (k[row], column)
         longer = size[second] * sigma[first] > size[first] * sigma[second]
         miss, weakest = (np.where(longer, values[second], values[first]) for values in (size, sigma))
-        further = joined(arm, task, start, way, miss, weakest, target[k[row]])
+        further = solves_between(arm, task, start, way, miss, weakest, target[k[row]])
         same[row, column] = further
         for i in np.unique(row[further]):  # and those that rounding alone parts from these
             postures, members = q[k[i]], np.flatnonzero(same[i])

@@ -48,7 +48,7 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
         label = batch.branch[k, batch.valid[k]].astype(np.int64)
-        decision = surfaces.swept(beside, components.examine(beside, Seeds.of(q[None], label), surfaces.no_more))
+        decision = surfaces.list_swept(beside, components.examine(beside, Seeds.of(q[None], label), surfaces.no_more))
         _, inside = nearest_row(arm, np.nan_to_num(decision.q[0]), near[k])
         if not (inside & decision.valid[0]).any():
             continue
@@ -87,7 +87,7 @@ def with_free_postures(goals: Goals, batch: Batch) -> Batch:
     arm, task, target, near = goals
     good = hits_nothing(arm, batch.q) & batch.within
     for k, b in np.argwhere((batch.status == Status.SINGULAR)[:, None] & batch.valid & ~good):
-        on_it = followed(arm, task, batch.q[k, b], target[k])
+        on_it = follow_self_motion(arm, task, batch.q[k, b], target[k])
         rows, inside = nearest_row(arm, on_it, near[k])
         free = np.flatnonzero(inside)
         free = free[hits_nothing(arm, rows[free])]
@@ -98,7 +98,7 @@ def with_free_postures(goals: Goals, batch: Batch) -> Batch:
     return batch
 
 
-def followed(arm: Arm, task: Task, q: Array, target: Array) -> Array:
+def follow_self_motion(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """Postures (M, n) of the self-motion through q (n,), as far as it is followed; none where it rests.
 
     Where several directions are lost, those along each of them.

@@ -17,7 +17,7 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN, Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular.self_motions import STEP, follow, null_directions, on_surface, pushed
+from armkin.inverse.singular.self_motions import STEP, null_directions, on_surface, pull_back, push_along
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -134,14 +134,14 @@ def _steps_out(
         meeting, push = np.concatenate([meeting, rows[more]]), np.concatenate([push, further])
     if not len(meeting):
         return meeting, push, rests
-    postures, size, grown = pushed(arm, task, q[meeting], np.full(len(meeting), 10 * STEP), push, target[meeting])
+    postures, size, grown = push_along(arm, task, q[meeting], np.full(len(meeting), 10 * STEP), push, target[meeting])
     rests[meeting[grown <= tol.GROWTH]] = False
     unit, way = radian_or_reach(arm), newton.difference(arm, postures, q[meeting])
     good = np.flatnonzero((size <= most[meeting]) & (np.abs(way).max(axis=1) > 3 * STEP))
     good = good[newton.null_space(arm, task, postures[good], target[meeting[good]])[2] == 1]
     # the way there is a self-motion's, too: half way it is beside the chord by no more than a curve is
     start = q[meeting[good]] + 0.5 * way[good] * unit
-    between, size = follow(arm, task, start, target[meeting[good]])
+    between, size = pull_back(arm, task, start, target[meeting[good]])
     beside = np.abs(newton.difference(arm, between, start)).max(axis=1)
     good = good[(size <= tol.SOLUTION) & (beside < BOW * np.abs(way[good]).max(axis=1))]
     return meeting[good], postures[good], rests

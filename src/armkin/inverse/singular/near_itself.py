@@ -16,7 +16,7 @@ from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.high_order_roots import BESIDE
-from armkin.inverse.singular.self_motions import follow
+from armkin.inverse.singular.self_motions import pull_back
 from armkin.inverse.tasks.task import Task
 from armkin.model import limits
 from armkin.model.arm import Arm
@@ -28,7 +28,7 @@ COARSE = 1e4 * ROOM  # and to a pose that is rounded where its rotation does not
 ROUNDED = 1.001 * tol.SOLUTION  # residual that solves a rounded target, if it is more
 
 
-def reached(
+def at_tip(
     arm: Arm, task: Task, target: Array, tip: Array, first: Array | None = None, room: Array | None = None
 ) -> Int:
     """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`.
@@ -49,14 +49,14 @@ def reached(
 def take(goals: Goals, batch: Batch, rows: Int) -> Int:
     """Put `near` in place of the branch that it is one with; returns the targets that have to be examined.
 
-    goals, batch: N targets and their branches; rows: those of `reached`. Two are one if the posture between them solves
+    goals, batch: N targets and their branches; rows: those of `at_tip`. Two are one if the posture between them solves
     the target, too. Where there is no such branch, or another one close by, `near` still solves the target.
     """
-    left = [_taken(goals, batch, rows[start : start + AT_ONCE]) for start in range(0, len(rows), AT_ONCE)]
+    left = [_take_chunk(goals, batch, rows[start : start + AT_ONCE]) for start in range(0, len(rows), AT_ONCE)]
     return np.concatenate(left) if left else rows
 
 
-def _taken(goals: Goals, batch: Batch, rows: Int) -> Int:
+def _take_chunk(goals: Goals, batch: Batch, rows: Int) -> Int:
     arm, task = goals.arm, goals.task
     rows = rows[~limits.outside_limits(arm, goals.near[rows]).any(axis=1)]
     if not len(rows):
@@ -81,7 +81,7 @@ def _taken(goals: Goals, batch: Batch, rows: Int) -> Int:
     return np.asarray(rows[solves & ~stays])
 
 
-def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> Int:
+def solved_by_near(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> Int:
     """Which targets (N, ...) are solved by `near` (n,) or (N, n), within limits, to within most (N,) [reaches, rad].
 
     Of those that are known better than to `SOLUTION` there are none: of these `take` has decided.
@@ -90,19 +90,19 @@ def standing(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> I
     if not rounded.any():
         return np.flatnonzero(rounded)
     close = np.broadcast_to(near, (len(target), arm.n))
-    rows = reached(arm, task, target, position(arm, near), room=np.where(rounded, most, -1.0))
+    rows = at_tip(arm, task, target, position(arm, near), room=np.where(rounded, most, -1.0))
     rows = rows[~limits.outside_limits(arm, close[rows]).any(axis=1)]
     return np.asarray(rows[newton.misses(arm, task, close[rows], target[rows]) <= most[rows]])
 
 
 def stand(goals: Goals, batch: Batch, most: Array) -> Batch:
-    """The same branches, with `near` among them where it solves a rounded target: see `standing`.
+    """The same branches, with `near` among them where it solves a rounded target: see `solved_by_near`.
 
     In place of the branch that it is one with to within the rounding; else beside the others. Where there are no
     others, the target is a boundary.
     """
     arm, task, target, near = goals
-    rows = standing(arm, task, target, near, most)
+    rows = solved_by_near(arm, task, target, near, most)
     if not len(rows):
         return batch
     way = newton.difference(arm, batch.q[rows], near[rows, None])
@@ -112,7 +112,7 @@ def stand(goals: Goals, batch: Batch, most: Array) -> Batch:
     for tried, steps in (nearest, 0), (away < np.inf, 0), (away < np.inf, 6):  # in the last the component may bend
         k, b = np.nonzero(tried & (away < np.inf) & ~same.any(axis=1, keepdims=True))
         halfway = near[rows[k]] + 0.5 * way[k, b] * radian_or_reach(arm)
-        beside, size = follow(arm, task, halfway, target[rows[k]], steps)
+        beside, size = pull_back(arm, task, halfway, target[rows[k]], steps)
         moved = newton.wrapped_distance(arm, beside, halfway)
         same[k, b] = (size <= most[rows[k]]) & (moved <= BESIDE * away[k, b])
     place, stays = np.where(same, away, np.inf).argmin(axis=1), same.any(axis=1)

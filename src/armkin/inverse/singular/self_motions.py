@@ -71,7 +71,7 @@ def _grows_from(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, tar
     way = newton.difference(arm, landed, q)
     near = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(way).max(axis=1) < tol.CLOSE_BY))
     miss, joined = newton.misses(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
-    joined[near] = high_order_roots.joined(arm, task, q[near], way[near], miss, sigma[near], goal[near])
+    joined[near] = high_order_roots.solves_between(arm, task, q[near], way[near], miss, sigma[near], goal[near])
     return np.asarray(joined.reshape(2, -1).any(axis=0))
 
 
@@ -145,17 +145,17 @@ def _both_ways(arm: Arm, way: Array) -> Array:
     return ways
 
 
-def follow(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tuple[Array, Array]:
+def pull_back(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tuple[Array, Array]:
     """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
     return newton.correct(arm, task, q, target, steps=steps, least=tol.WEAK, patience=1, stalled=tol.STALLED)
 
 
-def pushed(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Array, Array, Array]:
+def push_along(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Array, Array, Array]:
     """Postures (M, n), a step (M,) away along push (M, n), pulled back: they, what they miss, and how much more than
     q that is a step's length; infinite for those that fell back.
     """
     unit = radian_or_reach(arm)
-    landed, size = follow(arm, task, q + step[:, None] * push * unit, target)
+    landed, size = pull_back(arm, task, q + step[:, None] * push * unit, target)
     far = (np.abs(landed - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
     return landed, size, np.where(far, size - newton.misses(arm, task, q, target), np.inf) / step
 
@@ -185,13 +185,13 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     # Most candidates fall back at once. Where several directions are lost, a short step is drawn back to the meeting.
     several = nullity[row] > 1
     first = np.where(several, 10 * STEP, STEP)
-    _, _, grown = pushed(arm, task, q[row], first, push, target[row])
+    _, _, grown = push_along(arm, task, q[row], first, push, target[row])
     going = np.flatnonzero(grown <= tol.GROWTH)
     # of those that lose one direction most do not stay on a longer way
     alone = ~several[going] & (grown[going] * first[going] > tol.CLOSED)
     if alone.any():
         tried = going[alone]
-        _, _, grown = pushed(arm, task, q[row[tried]], 10 * first[tried], push[tried], target[row[tried]])
+        _, _, grown = push_along(arm, task, q[row[tried]], 10 * first[tried], push[tried], target[row[tried]])
         alone[alone] = ~(grown <= tol.GROWTH)
         going = going[~alone]
     if not len(going):
@@ -201,7 +201,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     # rests at a double root comes half the way back in each
     ways = np.multiply.outer(STEPS[:, 0], [[1.0, 0.6], [-1.0, -0.6]])[..., None, None]
     start = q[row] + ways * push * unit
-    landed, size = follow(arm, task, start.reshape(-1, arm.n), np.concatenate([target[row]] * 8), steps=20)
+    landed, size = pull_back(arm, task, start.reshape(-1, arm.n), np.concatenate([target[row]] * 8), steps=20)
     away, size = (landed.reshape(start.shape)[:, :, 0] - q[row]) / unit, size.reshape(start.shape[:4])
     grown = size.max(axis=(1, 2)) - newton.misses(arm, task, q, target)[row]  # (2, m)
     short, long = (grown <= tol.GROWTH * STEPS) & _equally_long(away, push)
@@ -224,7 +224,7 @@ def on_surface(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: A
     if len(more):
         more_rows, further = null_directions(arm.n, V[more], nullity[more])
         row, push = np.concatenate([row, more[more_rows]]), np.concatenate([push, further])
-    landed, size = follow(arm, task, q[row] + 10 * STEP * push * radian_or_reach(arm), target[row])
+    landed, size = pull_back(arm, task, q[row] + 10 * STEP * push * radian_or_reach(arm), target[row])
     lost = newton.null_space(arm, task, landed, target[row])[2]
     away = np.abs(newton.difference(arm, landed, q[row])).max(axis=1)
     surface = np.zeros(len(q), bool)

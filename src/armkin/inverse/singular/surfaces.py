@@ -23,7 +23,7 @@ from armkin.model.lock_joints import lock
 Pair = tuple[int, int, float]  # joints about one line, and the way of the first for a turn of the second
 
 
-def swept(goals: Goals, decision: Examined) -> Examined:
+def list_swept(goals: Goals, decision: Examined) -> Examined:
     """The same, surfaces listed by the curves that they are swept from."""
     if goals.task.orientation == "none":  # sums of joint values are those of all joints
         return decision
