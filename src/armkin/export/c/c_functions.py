@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from armkin import forward
 from armkin.export.c import arm_formulas
 from armkin.formula import c_and_js_code, recording
-from armkin.inverse.closed.precision import DOUBLE, SINGLE, recorded_for
+from armkin.inverse.closed.subproblems import DOUBLE, SINGLE, recorded_for
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry

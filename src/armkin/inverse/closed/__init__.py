@@ -1,8 +1,7 @@
 """Closed forms: one geometry a file, each with ``recognise(arm, task) -> Geometry | None``.
 
 geometry.py        what a class provides
-precision.py       how close to an edge, by the numbers that a formula runs in
-subproblems.py     the equations of the closed forms
+subproblems.py     the equations of the closed forms, and how close to an edge they are by the numbers they run in
 candidates.py      a class's candidates with their residuals, from recorded code
 quadratics.py      quadratic expressions of a cosine and a sine
 wrist.py           three axes that meet

@@ -15,8 +15,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry, Truth
 from armkin.inverse.closed.elbow import added_angles
 from armkin.inverse.closed.geometry import ClosedForm
-from armkin.inverse.closed.precision import precision
-from armkin.inverse.closed.subproblems import Candidates, Pair, spin
+from armkin.inverse.closed.subproblems import Candidates, Pair, precision, spin
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm

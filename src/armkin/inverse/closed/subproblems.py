@@ -11,7 +11,9 @@ The caller says which axis by the shape of `signs`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -19,8 +21,44 @@ import numpy as np
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Bool, Entry, Truth
-from armkin.inverse.closed.precision import precision
 from armkin.inverse.numeric import tolerances as tol
+
+
+class Precision(NamedTuple):
+    """Thresholds of `tolerances`, relative to the equation's own size, for the numbers that a formula is recorded for.
+
+    An edge is what is one within the rounding of a pose: in float an arm's own pose with a straight wrist comes out of
+    the forward kinematics some units of the last place beside it.
+    """
+
+    tangent: float
+    sharp: float
+    one_root: float
+    free: float
+    nearly_free: float
+    nearby: float  # squared residual up to which a branch may be one
+
+
+ULPS = 128 * 2.0**-23  # of a float: a pose of six joints is off by ten to a hundred
+DOUBLE = Precision(tol.TANGENT, tol.SHARP, tol.ONE_ROOT, tol.FREE, tol.NEARLY_FREE, tol.NEARBY**2)
+SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)
+
+_current = ContextVar("precision", default=DOUBLE)
+
+
+def precision() -> Precision:
+    """Of the numbers that formulas are evaluated, or recorded, for."""
+    return _current.get()
+
+
+@contextmanager
+def recorded_for(numbers: Precision) -> Iterator[None]:
+    """Formulas inside are recorded for other numbers."""
+    token = _current.set(numbers)
+    try:
+        yield
+    finally:
+        _current.reset(token)
 
 
 class Pair(NamedTuple):

@@ -18,8 +18,15 @@ from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
 from armkin.inverse.closed.elbow import ThreeLink
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.precision import precision
-from armkin.inverse.closed.subproblems import Candidates, Prefer, distance2, linear, rotation_between, walked_back
+from armkin.inverse.closed.subproblems import (
+    Candidates,
+    Prefer,
+    distance2,
+    linear,
+    precision,
+    rotation_between,
+    walked_back,
+)
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm

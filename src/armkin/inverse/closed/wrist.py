@@ -6,8 +6,17 @@ import numpy as np
 
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
-from armkin.inverse.closed.precision import precision
-from armkin.inverse.closed.subproblems import Doubt, Pair, Prefer, distance2, linear, rotation_between, signs, spin
+from armkin.inverse.closed.subproblems import (
+    Doubt,
+    Pair,
+    Prefer,
+    distance2,
+    linear,
+    precision,
+    rotation_between,
+    signs,
+    spin,
+)
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.joint_chain import is_parallel
 from armkin.model.rotation import inverse

@@ -208,18 +208,10 @@ class _Nodes(NamedTuple):
 
         best_at, last = first + best, first + length
         pieces = Pieces(
-            row=row[curve],
-            branch=branch[curve],
-            legal=legal,
-            a=a,
-            b=b,
-            first=parameter(first),
-            last=parameter(last),
-            low=parameter(np.maximum(best_at - 1, first)),
-            at=parameter(best_at),
-            high=parameter(np.minimum(best_at + 1, last)),
-            start=q[node[curve, best_at % K]],
-        )
+            row=row[curve], branch=branch[curve], legal=legal, a=a, b=b, first=parameter(first), last=parameter(last),
+            low=parameter(np.maximum(best_at - 1, first)), at=parameter(best_at),
+            high=parameter(np.minimum(best_at + 1, last)), start=q[node[curve, best_at % K]],
+        )  # fmt: skip
         exact, allowed = curves.at(pieces, pieces.at)
         inside = (best > 0) & (best < length) & (allowed | ~legal)
         return pieces._replace(start=np.where(inside[:, None], exact, pieces.start))

@@ -303,10 +303,6 @@ def _values(coefficients: Array, s: Array) -> Array:
     return out
 
 
-def _residual_size(g: Array, s: Array) -> Array:
-    return np.asarray(np.linalg.norm(_values(g, s), axis=-1))
-
-
 def _ends_of_components(g: Array) -> tuple[Array, Bool]:
     """Where |g| (NODES, M, k) first exceeds `SOLUTION`, as a share of the span, and whether it does, (2, M): below 0
     and above."""
@@ -322,7 +318,7 @@ def _ends_of_components(g: Array) -> tuple[Array, Bool]:
     low, high = POINTS[np.maximum(first - 1, 0)], POINTS[first]
     for _ in range(2 if len(some) else 0):
         between = low + FINER * (high - low)
-        beyond = _residual_size(g[:, some], between[1:]) > tol.SOLUTION
+        beyond = np.linalg.norm(_values(g[:, some], between[1:]), axis=2) > tol.SOLUTION
         beyond[-1] = True
         first = beyond.argmax(axis=0)
         low, high = between[first, np.arange(len(some))], between[first + 1, np.arange(len(some))]
