@@ -26,8 +26,8 @@ class _Ends:
     of_limits: a limit is crossed there; else the branch merges with another one, and both vanish.
     """
 
-    def __init__(self, find: Follower, row: Int, branch: Int, of_limits: bool) -> None:
-        self.find, self.row, self.branch, self.of_limits = find, row, branch, of_limits
+    def __init__(self, follower: Follower, row: Int, branch: Int, of_limits: bool) -> None:
+        self.follower, self.row, self.branch, self.of_limits = follower, row, branch, of_limits
 
     def rooms(self, ends: Int, value: Array) -> Array:
         """How good ends (M,) are at values (M,): positive where they are, linear about the end, nan where the branch is
@@ -37,8 +37,8 @@ class _Ends:
         """
         row, branch = self.row[ends], self.branch[ends]
         if self.of_limits:
-            return margin(self.find.arm, self.find.own(row, branch, value))
-        q = self.find.found(row, value)
+            return margin(self.follower.arm, self.follower.own(row, branch, value))
+        q = self.follower.found(row, value)
         *_, apart = nearest_other(q, branch)
         return np.asarray(np.where(np.isnan(q[np.arange(len(ends)), branch, 0]), np.nan, apart))
 
@@ -83,20 +83,22 @@ class _Ends:
         return value
 
 
-def crossed_at(find: Follower, changes: Changes, value: Array) -> Array:
+def crossed_at(follower: Follower, changes: Changes, value: Array) -> Array:
     """Where limits are crossed (M,), known but for the rounding of their polynomials: a secant step in the joints."""
-    near, far = (margin(find.arm, find.own(changes.row, changes.branch, value + h)) for h in (0.0, tol.BESIDE_CROSSING))
+    near, far = (
+        margin(follower.arm, follower.own(changes.row, changes.branch, value + h)) for h in (0.0, tol.BESIDE_CROSSING)
+    )
     with np.errstate(invalid="ignore", divide="ignore"):
         step = near * tol.BESIDE_CROSSING / (near - far)
         return np.asarray(np.where(np.abs(step) < tol.BESIDE_CROSSING, value + step, value))
 
 
-def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, Array]:
+def hidden_stretches(follower: Follower, t: Array, turns: Turns) -> tuple[Changes, Array]:
     """Stretches (S,) that lie between two samples: legal ones (set_before: no), and such as are not between legal ones
     (yes); where both begin and end (2, S)."""
     row, k, branch, room = turns
     sign = np.sign(room[:, 0])
-    rows = _Ends(find, row, branch, True)
+    rows = _Ends(follower, row, branch, True)
     every = np.arange(len(row))
 
     def depth(value: Array) -> Array:
@@ -109,7 +111,7 @@ def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, A
     hidden = np.flatnonzero(top > 0)
     row, k, branch = row[hidden], k[hidden], branch[hidden]
     sign, peak, top = sign[hidden], peak[hidden], top[hidden]
-    near = _Ends(find, np.tile(row, 2), np.tile(branch, 2), True)
+    near = _Ends(follower, np.tile(row, 2), np.tile(branch, 2), True)
     at_sample = room[hidden].T.ravel()
     outer, inner = np.concatenate([begin[hidden], end[hidden]]), np.tile(peak, 2)
     inside = np.tile(sign < 0, 2)  # the stretch is the legal one
@@ -120,7 +122,7 @@ def hidden_stretches(find: Follower, t: Array, turns: Turns) -> tuple[Changes, A
     return Changes(row, k, branch, sign > 0), ends.reshape(2, -1)
 
 
-def _merging_ends(find: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
+def _merging_ends(follower: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
     """Where branches end to be there (G,), in the order of `Gone`, and how far within limits they are then.
 
     Of two that are nearest to each other before both vanish one is asked, if it has joined the other one there.
@@ -134,18 +136,18 @@ def _merging_ends(find: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
     value, room, joined = np.empty(len(every)), np.empty(len(every)), np.zeros(len(every), bool)
     leaders = np.flatnonzero(first == every)
     while len(leaders):
-        ends = _Ends(find, changes.row[leaders], changes.branch[leaders], False)
+        ends = _Ends(follower, changes.row[leaders], changes.branch[leaders], False)
         rooms = gone.apart[leaders, 0], np.full(len(leaders), np.nan), gone.apart[leaders, 1]
         value[leaders] = ends.between(good[leaders], changes.value(1, t)[leaders], changes.value(-1, t)[leaders], rooms)
         rows = np.flatnonzero(~joined & np.isin(first, leaders))
         value[rows] = value[first[rows]]
-        q = find.found(
+        q = follower.found(
             changes.row[rows], value[rows] + np.clip(good[rows] - value[rows], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
         )
         away, _, apart = nearest_other(q, changes.branch[rows])
         mine = q[np.arange(len(rows)), changes.branch[rows]]
         present = ~np.isnan(mine[:, 0])
-        middle = margin(find.arm, mine + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away))
+        middle = margin(follower.arm, mine + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away))
         room[rows] = np.where(present, middle, gone.room[rows])
         joined[rows] = (first[rows] == rows) | (present & (apart <= tol.JOINED * gone.apart[rows, 0]))
         leaders = rows[~joined[rows]]
@@ -162,13 +164,13 @@ class Places(NamedTuple):
     ends: tuple[Array, Array]  # of these: where the branch ends, and where its limit is crossed
 
 
-def places_of(find: Follower, shown: Summary) -> Places:
+def places_of(follower: Follower, shown: Summary) -> Places:
     """All ends of some targets.
 
     Where two branches merge both are legal, or none: one that is not at the next sample is for a stretch.
     """
     t, gone, illegal = shown.t, shown.gone.at, shown.crossed.at
-    merged, room = _merging_ends(find, t, shown.gone)
+    merged, room = _merging_ends(follower, t, shown.gone)
     inside, outside = shown.crossed.rooms.T
     # which of the branches that are not legal at the next sample end there, too, and where
     ending = np.isnan(outside)
@@ -192,7 +194,7 @@ def places_of(find: Follower, shown: Summary) -> Places:
         np.concatenate([outside[~to_end], shown.gone.room[lone]]),
         np.full(len(row), np.nan),
     )
-    crossed = _Ends(find, row, branch, True).between(good, bad, good, rooms)
+    crossed = _Ends(follower, row, branch, True).between(good, bad, good, rooms)
     legal[~to_end] = crossed[: len(crossing.row)]
     return Places(merged, legal, short, (merged[lone], crossed[len(crossing.row) :]))
 

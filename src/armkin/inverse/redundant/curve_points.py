@@ -36,19 +36,19 @@ class Points(NamedTuple):
         return np.asarray(self.step < tol.PAIR_SETTLED)
 
 
-def onto_curves(find: Follower, row: Int, q: Array, last: Array, enough: float = tol.PAIR_SETTLED) -> Points:
+def onto_curves(follower: Follower, row: Int, q: Array, last: Array, enough: float = tol.PAIR_SETTLED) -> Points:
     """Postures q (M, n) moved onto the curves of their targets, across last (M, n): a tangent, or a joint that is held.
 
     The tangents point to where last does. enough: size of a step that is the last one.
     """
     parts = slices(max(len(q), 1), AT_ONCE)
-    return stack_rows([_move_chunk(find, row[part], q[part], last[part], enough) for part in parts])
+    return stack_rows([_move_chunk(follower, row[part], q[part], last[part], enough) for part in parts])
 
 
-def _move_chunk(find: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:
+def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:
     """As `onto_curves`, of postures that stay in the cache."""
-    arm, task, unit = find.arm, find.free.task, radian_or_reach(find.arm)
-    target = find.target[row]
+    arm, task, unit = follower.arm, follower.free.task, radian_or_reach(follower.arm)
+    target = follower.target[row]
     q, tangent, size, going = q.copy(), last.copy(), np.full(len(q), np.inf), np.arange(len(q))
     for _ in range(NEWTON):
         if not len(going):
@@ -78,18 +78,18 @@ class Ways(NamedTuple):
     end: Array
 
     @classmethod
-    def between(cls, find: Follower, a: Points, b: Points) -> Ways:
+    def between(cls, follower: Follower, a: Points, b: Points) -> Ways:
         """Those between points, which follow an arc of a circle to the sixth order."""
-        chord = newton.difference(find.arm, b.q, a.q)
+        chord = newton.difference(follower.arm, b.q, a.q)
         cosine = np.maximum((a.tangent * b.tangent).sum(axis=1), -1.0)
         size = 2.0 * np.sqrt((chord * chord).sum(axis=1)) / (1.0 + np.sqrt(0.5 * (1.0 + cosine)))
         return cls(a.q, chord, size[:, None] * a.tangent, size[:, None] * b.tangent)
 
-    def at(self, find: Follower, share: Array | float) -> Array:
+    def at(self, follower: Follower, share: Array | float) -> Array:
         """Postures at shares (M,) of the way, or all at one."""
         u = np.asarray(share)[..., None]
         offset = self.chord * (u * u * (3.0 - 2.0 * u)) + (self.begin * (1.0 - u) - self.end * u) * (u * (1.0 - u))
-        return np.asarray(self.q + offset * radian_or_reach(find.arm))
+        return np.asarray(self.q + offset * radian_or_reach(follower.arm))
 
     def slope(self, share: Array | float, j: int) -> Array:
         """How joint j changes there (M,)."""
@@ -97,6 +97,8 @@ class Ways(NamedTuple):
         ends = self.begin[:, j] * (1.0 - u) * (1.0 - 3.0 * u) + self.end[:, j] * u * (3.0 * u - 2.0)
         return np.asarray(6.0 * u * (1.0 - u) * self.chord[:, j] + ends)
 
-    def follow(self, find: Follower, row: Int) -> Bool:
+    def follow(self, follower: Follower, row: Int) -> Bool:
         """Which lie on the curves of their targets row (M,), as their middles tell."""
-        return newton.misses(find.arm, find.free.task, self.at(find, 0.5), find.target[row]) < tol.ROUGHLY
+        return (
+            newton.misses(follower.arm, follower.free.task, self.at(follower, 0.5), follower.target[row]) < tol.ROUGHLY
+        )

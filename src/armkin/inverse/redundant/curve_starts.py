@@ -51,14 +51,14 @@ class Nodes(NamedTuple):
 class Planes(NamedTuple):
     """Values of a joint that are answered: (N, V), inf behind the last ones, and how many of each target (N,)."""
 
-    find: Follower
+    follower: Follower
     guide: Redundancy  # that joint, and the others
     values: Array
     counts: Int
 
     def held(self, count: int) -> Array:
         """Directions (M, n) in which that joint alone moves."""
-        directions = np.zeros((count, self.find.arm.n))
+        directions = np.zeros((count, self.follower.arm.n))
         directions[:, self.guide.joint] = 1.0
         return directions
 
@@ -68,22 +68,22 @@ class Planes(NamedTuple):
 
     def answers(self, row: Int, plane: Int, q: Array) -> tuple[Nodes, Int]:
         """Postures (M, n) moved along their planes (M,) onto curves, each once, and which of them are (K,)."""
-        points = onto_curves(self.find, row, q, self.held(len(q)), tol.SAME_SEED)
+        points = onto_curves(self.follower, row, q, self.held(len(q)), tol.SAME_SEED)
         good = np.flatnonzero(points.step < tol.SAME_SEED)
-        good = good[first_of_equals(self.find, self.place(row[good], plane[good]), points.q[good])]
+        good = good[first_of_equals(self.follower, self.place(row[good], plane[good]), points.q[good])]
         return Nodes(row[good], plane[good], rows_of(points, good)), good
 
 
-def answers_on_planes(find: Follower, whose: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
+def answers_on_planes(follower: Follower, whose: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
     """The planes of all targets, and the answers on them; which is whose, by plane and branch (N, V, B), -1: none.
 
     whose: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
     """
-    guide, even, N = nearly_closed(find.arm, find.free), over_a_turn(PLANES), len(find.target)
+    guide, even, N = nearly_closed(follower.arm, follower.free), over_a_turn(PLANES), len(follower.target)
     row, t = np.repeat(np.arange(N), PLANES), np.tile(even, N)
-    source = find._replace(free=guide)
-    if guide is find.free:
-        q = find.found(row, t)
+    source = follower._replace(free=guide)
+    if guide is follower.free:
+        q = follower.found(row, t)
         near, extra = ~np.isnan(q[:, :, 0]), q[:0, 0]
     else:
         q, missed = source.candidates(row, t)
@@ -95,7 +95,7 @@ def answers_on_planes(find: Follower, whose: Int, postures: Array) -> tuple[Plan
     order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
     plane = np.empty_like(row)
     plane[order] = numbers_within(count)
-    planes = Planes(find, guide, np.full((N, int(count.max(initial=PLANES))), np.inf), count)
+    planes = Planes(follower, guide, np.full((N, int(count.max(initial=PLANES))), np.inf), count)
     planes.values[row, plane] = t
     sample, branch = np.nonzero(near)
     last = np.arange(N * PLANES, len(row))  # those between are answers already, of no branch
@@ -124,7 +124,7 @@ def _answers_between(source: Follower, t: Array, missed: Array) -> tuple[Int, Ar
     return row[good], q[good]
 
 
-def first_of_equals(find: Follower, group: Int, q: Array) -> Bool:
+def first_of_equals(follower: Follower, group: Int, q: Array) -> Bool:
     """Which postures (M, n) of groups (M,) are the first of those that are the same."""
     key = np.cos(q - 0.3) @ np.sqrt(np.arange(2.0, 2.0 + q.shape[1]))
     order = np.lexsort((key, group))
@@ -132,43 +132,47 @@ def first_of_equals(find: Follower, group: Int, q: Array) -> Bool:
     near = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
     pairs = np.flatnonzero(near)
     unique = np.ones(len(q), bool)
-    unique[second[pairs[newton.wrapped_distance(find.arm, q[first[pairs]], q[second[pairs]]) < tol.SAME_SEED]]] = False
+    unique[second[pairs[newton.wrapped_distance(follower.arm, q[first[pairs]], q[second[pairs]]) < tol.SAME_SEED]]] = (
+        False
+    )
     return unique
 
 
-def answers_off_curves(find: Follower, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
+def answers_off_curves(follower: Follower, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
     """Answers (M, n) of targets (M,) that no curve passes: points of curves, whose targets, the points after them."""
-    guide = nearly_closed(find.arm, find.free)
+    guide = nearly_closed(follower.arm, follower.free)
     joint = 2 if guide.joint == 0 else 4  # the shoulder is on the far side of the three joints of a spherical wrist
-    if guide is find.free or find.arm.prismatic[joint]:
+    if guide is follower.free or follower.arm.prismatic[joint]:
         return row[:0], points.q[:0]
-    parts = [_off_curves_at(find, joint, value, points, row, after) for value in VALUES]
+    parts = [_off_curves_at(follower, joint, value, points, row, after) for value in VALUES]
     whose, q = (np.concatenate(column) for column in zip(*parts, strict=True))
     return whose, q
 
 
-def _off_curves_at(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
+def _off_curves_at(
+    follower: Follower, joint: int, value: float, points: Points, row: Int, after: Int
+) -> tuple[Int, Array]:
     """Those with the joint at a value."""
-    held_arm = arm_without(find.arm, ((find.arm.joint_names[joint], value),))
-    s = find.ik(held_arm, find.target, find.free.task.name, examine=False)
+    held_arm = arm_without(follower.arm, ((follower.arm.joint_names[joint], value),))
+    s = follower.ik(held_arm, follower.target, follower.free.task.name, examine=False)
     whose, branch = np.nonzero(s.valid)
     q = np.insert(s.q[whose, branch], joint, value, axis=1)
-    crossing, owner = _crossings(find, joint, value, points, row, after)
-    order, count = np.argsort(owner, kind="stable"), np.bincount(owner, minlength=len(find.target))
+    crossing, owner = _crossings(follower, joint, value, points, row, after)
+    order, count = np.argsort(owner, kind="stable"), np.bincount(owner, minlength=len(follower.target))
     place = np.arange(int(count.max(initial=0)))
     pair, k = np.nonzero(place < count[whose, None])
     index = order[(np.cumsum(count) - count)[whose[pair]] + k]
     passed = np.zeros(len(q), bool)
-    passed[pair[newton.wrapped_distance(find.arm, q[pair], crossing[index]) < ON_CURVE]] = True
+    passed[pair[newton.wrapped_distance(follower.arm, q[pair], crossing[index]) < ON_CURVE]] = True
     return whose[~passed], q[~passed]
 
 
-def _crossings(find: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Array, Int]:
+def _crossings(follower: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Array, Int]:
     """Postures (M, n) in which curves have the joint at a value, and of which targets they are (M,)."""
     away, change = wrap_angle(points.q[:, joint] - value), wrap_angle(points.q[after, joint] - points.q[:, joint])
     begins = np.flatnonzero((away * (away + change) <= 0) & (change != 0))
-    ways = Ways.between(find, rows_of(points, begins), rows_of(points, after[begins]))
+    ways = Ways.between(follower, rows_of(points, begins), rows_of(points, after[begins]))
     share = -away[begins] / change[begins]
     for _ in range(SECANTS):
-        share = np.clip(share - wrap_angle(ways.at(find, share)[:, joint] - value) / change[begins], 0.0, 1.0)
-    return ways.at(find, share), row[begins]
+        share = np.clip(share - wrap_angle(ways.at(follower, share)[:, joint] - value) / change[begins], 0.0, 1.0)
+    return ways.at(follower, share), row[begins]

@@ -26,48 +26,48 @@ STEPS = 16  # of the golden section
 class Followed(NamedTuple):
     """`families.Curves` followed along the redundant joint, a turn by samples: it is their parameter."""
 
-    find: Follower
+    follower: Follower
     pieces: Pieces
     short: Bool
     complete: Bool  # (N,) all places are known at which a curve may end
     steps: int = STEPS
 
     @classmethod
-    def along(cls, find: Follower) -> Followed:
+    def along(cls, follower: Follower) -> Followed:
         """Of some targets; in two ways: those of which all places are known where something changes, and others."""
-        N = len(find.target)
-        parts, short, complete = [none(find.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
-        of = boundaries(find.arm) if find.free.joint == find.arm.n - 1 else None
+        N = len(follower.target)
+        parts, short, complete = [none(follower.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
+        of = boundaries(follower.arm) if follower.free.joint == follower.arm.n - 1 else None
         if of is not None:
-            angles, decided = boundary_angles(of, find.target)
+            angles, decided = boundary_angles(of, follower.target)
             if len(rows := np.flatnonzero(decided)):
-                pieces, short[rows], complete[rows] = _between_places(find.of(rows), angles[rows])
+                pieces, short[rows], complete[rows] = _between_places(follower.of(rows), angles[rows])
                 parts.append(pieces._replace(row=rows[pieces.row]))
         if len(rows := np.flatnonzero(~complete)):
-            pieces, short[rows] = _sampled_pieces(find.of(rows), 1)
+            pieces, short[rows] = _sampled_pieces(follower.of(rows), 1)
             parts.append(pieces._replace(row=rows[pieces.row]))
-        return cls(find, stack_rows(parts), short, complete)
+        return cls(follower, stack_rows(parts), short, complete)
 
     def tried(self, pieces: Pieces, near: Array) -> list[Array]:
         """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: where
         near has the joint, and beside that sample."""
-        value = near[:, self.find.free.joint]
+        value = near[:, self.follower.free.joint]
         value = value + np.round((pieces.at - value) / (2 * np.pi)) * 2 * np.pi
         return [np.where((value >= pieces.a) & (value <= pieces.b), value, pieces.at), pieces.low, pieces.high]
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Turning.at`."""
-        return self.find.one(pieces.row, pieces.branch, parameter)
+        return self.follower.one(pieces.row, pieces.branch, parameter)
 
 
-def _between_places(find: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
+def _between_places(follower: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
     """Pieces of those of some targets whose curves change at angles (N, V) alone; which are short (N,), and which
     targets those are (N,)."""
-    shown = summary_of_samples(find, over_a_turn(EVEN), angles)
+    shown = summary_of_samples(follower, over_a_turn(EVEN), angles)
     changes = shown.crossed.at, shown.gone.at
     legal, present = ends = [place_between(shown.t, change, angles) for change in changes]
     crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(shown.crossed.rooms).any(axis=1))
-    legal[crossing] = crossed_at(find, rows_of(changes[0], crossing), legal[crossing])
+    legal[crossing] = crossed_at(follower, rows_of(changes[0], crossing), legal[crossing])
     explained = np.ones(len(angles), bool)
     for change, end in zip(changes, ends, strict=True):
         explained[change.row[np.isinf(end)]] = False
@@ -77,30 +77,32 @@ def _between_places(find: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
     return stack_rows([pieces, without]), shown.short, explained
 
 
-def _sampled_pieces(find: Follower, finer: int) -> tuple[Pieces, Bool]:
+def _sampled_pieces(follower: Follower, finer: int) -> tuple[Pieces, Bool]:
     """Pieces of some targets, and which are short: one of which something may be hidden between samples, or without an
     answer, is asked again: all of a nearly stretched arm lie within a degree."""
-    shown = summary_of_samples(find, over_a_turn(SAMPLES * finer))
-    pieces, short = _all_pieces(find, shown), shown.short
+    shown = summary_of_samples(follower, over_a_turn(SAMPLES * finer))
+    pieces, short = _all_pieces(follower, shown), shown.short
     if finer == 1:
-        near_enough = find.arm.prismatic.any() | (distance(find.arm, find.free.task, find.target) <= 1.0 + tol.SOLUTION)
+        near_enough = follower.arm.prismatic.any() | (
+            distance(follower.arm, follower.free.task, follower.target) <= 1.0 + tol.SOLUTION
+        )
         lost = shown.lost & near_enough
         for more, asked_again in ((CLOSER, shown.hidden & ~lost), (FINER, lost)):
             again = np.flatnonzero(asked_again)
             at_once = max(SAMPLES // more, 1)
             for rows in (again[k : k + at_once] for k in range(0, len(again), at_once)):
-                part, part_short = _sampled_pieces(find.of(rows), more)
+                part, part_short = _sampled_pieces(follower.of(rows), more)
                 unchanged, closer = rows_of(pieces, ~np.isin(pieces.row, rows)), part._replace(row=rows[part.row])
                 pieces = stack_rows([unchanged, closer])
                 short[rows] = part_short
     return pieces, short
 
 
-def _all_pieces(find: Follower, shown: Summary) -> Pieces:
+def _all_pieces(follower: Follower, shown: Summary) -> Pieces:
     """All pieces of the curves of some targets."""
     t, K = shown.t, shown.t.shape[1]
-    places = places_of(find, shown)
-    hidden, stretch = hidden_stretches(find, t, shown.turns)
+    places = places_of(follower, shown)
+    hidden, stretch = hidden_stretches(follower, t, shown.turns)
     gaps = hidden.set_before
     more, short = rows_of(hidden, ~gaps), places.short
     parts = [_of_runs(t, shown.legal, True, shown.crossed.at, places.legal)]
@@ -110,12 +112,12 @@ def _all_pieces(find: Follower, shown: Summary) -> Pieces:
     of &= (np.append(hidden.k, short.sample(0, K)) - present.first[:, None]) % K < present.length[:, None]
     families = _of_runs(t, present, False, shown.gone.at, places.there)
     parts.append(rows_of(families, ~(present.within | of.any(axis=1))))  # without those that hold one of these
-    parts[0] = _without_gaps(find, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
+    parts[0] = _without_gaps(follower, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
     row, branch = np.append(short.row, more.row), np.append(short.branch, more.branch)
     if len(row):
         a, b = np.concatenate([np.sort(places.ends, axis=0), stretch[:, ~gaps]], axis=1)
         middle = 0.5 * (a + b)
-        q, legal = find.one(row, branch, middle)
+        q, legal = follower.one(row, branch, middle)
         parts.append(rows_of(Pieces(row, branch, legal, a, b, a, b, a, middle, b, q), legal))
     return stack_rows(parts)
 
@@ -134,7 +136,7 @@ def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -
     return Pieces(runs.row, runs.branch, np.full(len(centre), legal), a, b, a, b, low, centre, high, runs.start)
 
 
-def _without_gaps(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
+def _without_gaps(follower: Follower, pieces: Pieces, gaps: Changes, ends: Array) -> Pieces:
     """Pieces with gaps taken out that lie within them, from where to where (2, G)."""
     for row, branch, (begin, end) in zip(gaps.row, gaps.branch, ends.T, strict=True):
         turns = 2 * np.pi * np.round((0.5 * (pieces.a + pieces.b) - begin) / (2 * np.pi))
@@ -150,7 +152,7 @@ def _without_gaps(find: Follower, pieces: Pieces, gaps: Changes, ends: Array) ->
                 holds = (a <= piece.at) & (piece.at <= b)
                 centre = np.where(holds, piece.at, 0.5 * (a + b))
                 low, high = (np.clip(piece.low, a, b), np.clip(piece.high, a, b)) if holds else (a, b)
-                start, _ = find.one(piece.row, piece.branch, centre)
+                start, _ = follower.one(piece.row, piece.branch, centre)
                 parts.append(piece._replace(a=a, b=b, first=a, last=b, low=low, at=centre, high=high, start=start))
             pieces = stack_rows(parts)
             break

@@ -100,16 +100,16 @@ class Summary(NamedTuple):
     t: Array  # (N, K) the samples' values of the joint
 
 
-def summary_of_samples(find: Follower, t: Array, places: Array | None = None) -> Summary:
+def summary_of_samples(follower: Follower, t: Array, places: Array | None = None) -> Summary:
     """What samples of all targets along t (K,) show, and others between them; places: all places where something may
     change (N, V), with samples beside each."""
-    N = len(find.target)
+    N = len(follower.target)
     at_once = max(AT_A_TIME // len(t), 1)
     parts = (np.arange(k, min(k + at_once, N)) for k in range(0, max(N, 1), at_once))
     if places is None:
-        return stack_rows([_summarise(find.sampled(rows, t), rows, False) for rows in parts])
+        return stack_rows([_summarise(follower.sampled(rows, t), rows, False) for rows in parts])
     more = on_both_sides(places)
-    return stack_rows([_summarise(find.sampled(rows, t, more[rows]), rows, True) for rows in parts])
+    return stack_rows([_summarise(follower.sampled(rows, t, more[rows]), rows, True) for rows in parts])
 
 
 def place_between(t: Array, changes: Changes, places: Array) -> Array:

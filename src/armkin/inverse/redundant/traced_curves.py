@@ -31,9 +31,9 @@ ROUNDS = 20  # of arcs, each to the next plane
 class _Curves:
     """Nodes of curves, and which halves are joined."""
 
-    def __init__(self, find: Follower, whose: Int, q: Array) -> None:
-        self.find = find
-        self.planes, self.nodes, grid = answers_on_planes(find, whose, q)
+    def __init__(self, follower: Follower, whose: Int, q: Array) -> None:
+        self.follower = follower
+        self.planes, self.nodes, grid = answers_on_planes(follower, whose, q)
         self.partner = np.full(2 * len(self.nodes.row), -1)
         self.traced = np.zeros(len(self.partner), bool)  # a half that comes to nothing would do so again
         behind = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
@@ -51,27 +51,27 @@ class _Curves:
 
     def _join(self, a: Int, b: Int) -> None:
         """Halves a and b (M,) joined by cubics, of which each must do."""
-        find, whose, failed = self.find, np.arange(len(a)), np.zeros(len(a), bool)
+        follower, whose, failed = self.follower, np.arange(len(a)), np.zeros(len(a), bool)
         links: list[tuple[Int, Int, Int]] = []
         for k in range(HALVINGS + 1):
             if not len(a):
                 break
             first, last = self.nodes.leaving(a), self.nodes.leaving(b)
-            ways = Ways.between(find, first, last._replace(tangent=-last.tangent))
+            ways = Ways.between(follower, first, last._replace(tangent=-last.tangent))
             size = np.sqrt((ways.chord**2).sum(axis=1))
             apart = (ways.chord * first.tangent).sum(axis=1) < 0
             apart |= ((ways.chord * last.tangent).sum(axis=1) > 0) | (size > APART)
             row = self.nodes.row[a >> 1]
-            good = ~apart & ways.follow(find, row)
+            good = ~apart & ways.follow(follower, row)
             links.append((a[good], b[good], whose[good]))
             failed[whose[apart]] = True
             left = np.flatnonzero(~good & ~failed[whose])
             if k == HALVINGS:
                 failed[whose[left]] = True
                 break
-            middle = rows_of(ways, left).at(find, 0.5)
-            points = onto_curves(find, row[left], middle, ways.chord[left] / size[left, None], tol.SAME_SEED)
-            aside = newton.wrapped_distance(find.arm, points.q, middle)
+            middle = rows_of(ways, left).at(follower, 0.5)
+            points = onto_curves(follower, row[left], middle, ways.chord[left] / size[left, None], tol.SAME_SEED)
+            aside = newton.wrapped_distance(follower.arm, points.q, middle)
             good = (points.step < tol.SAME_SEED) & (aside < ASIDE * size[left])
             failed[whose[left[~good]]] = True
             left = left[good]
@@ -101,7 +101,7 @@ class _Curves:
         place = first[:, None] + np.arange(max((behind - first).max(initial=0), 1))
         a, b = np.broadcast_to(every[:, None], place.shape), np.minimum(place, len(half) - 1)
         begin, end = self.nodes.leaving(half), self.nodes.leaving(half[b])
-        chord = newton.difference(self.find.arm, end.q, begin.q[:, None])
+        chord = newton.difference(self.follower.arm, end.q, begin.q[:, None])
         along = (chord * (begin.tangent[:, None] - end.tangent)).sum(axis=2)
         cost = 2.0 * np.sqrt((chord * chord).sum(axis=2)) - 0.5 * along
         cost[(along <= 0) | (place >= behind[:, None]) | (a == b)] = np.inf
@@ -141,19 +141,24 @@ class _Curves:
             shared = np.isin(place, places)
             i, k = np.nonzero(places[:, None] == place[shared])
             k = near[shared][k]
-            apart = newton.wrapped_distance(self.find.arm, arrived.points.q[i], self.nodes.points.q[k])
+            apart = newton.wrapped_distance(self.follower.arm, arrived.points.q[i], self.nodes.points.q[k])
             number[i[apart < tol.SAME_SEED]] = k[apart < tol.SAME_SEED]
             added = np.flatnonzero(number < 0)
             if not len(added):
                 break
-            added = added[first_of_equals(self.find, places[added], arrived.points.q[added])]
+            added = added[first_of_equals(self.follower, places[added], arrived.points.q[added])]
             self._add(Nodes(arrived.row[added], arrived.plane[added], rows_of(arrived.points, added)))
         return number
 
     def _steps(self, ray: Int) -> tuple[list[tuple[Int, Points]], Points, Int]:
         """From halves (M,): the points passed on the way, of which rays; those on the plane at the end, and which, -1:
         lost."""
-        find, j, unit, values = self.find, self.planes.guide.joint, radian_or_reach(self.find.arm), self.planes.values
+        follower, j, unit, values = (
+            self.follower,
+            self.planes.guide.joint,
+            radian_or_reach(self.follower.arm),
+            self.planes.values,
+        )
         row, slab, current = self.nodes.row[ray >> 1], self.slab(ray), self.nodes.leaving(ray)
         behind = (slab + 1) % self.planes.counts[row]
         low, h = values[row, slab], np.full(len(ray), LONGEST)
@@ -162,10 +167,12 @@ class _Curves:
         passed, going = [(ray[:0], rows_of(current, ray[:0]))], np.arange(len(ray))
         for _ in range(TRIES):
             begin, step = rows_of(current, going), h[going, None]
-            then = onto_curves(find, row[going], begin.q + step * begin.tangent * unit, begin.tangent, tol.SAME_SEED)
-            way = Ways.between(find, begin, then)
+            then = onto_curves(
+                follower, row[going], begin.q + step * begin.tangent * unit, begin.tangent, tol.SAME_SEED
+            )
+            way = Ways.between(follower, begin, then)
             aside = np.sqrt(((way.chord - step * begin.tangent) ** 2).sum(axis=1))
-            good = (then.step < tol.SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(find, row[going])
+            good = (then.step < tol.SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(follower, row[going])
             h[going] = np.where(good, np.minimum(1.5 * h[going], LONGEST), 0.5 * h[going])
             middle = low[going] + 0.5 * wide[going]
             depth, before = (wrap_angle(points.q[:, j] - middle) for points in (then, begin))
@@ -175,7 +182,7 @@ class _Curves:
             share = np.clip((goal - before[left]) / (depth[left] - before[left]), 0.0, 1.0)
             guess = begin.q[left] + share[:, None] * way.chord[left] * unit
             guess[:, j] = middle[left] + goal
-            landed = onto_curves(find, row[leaving], guess, self.planes.held(len(leaving)))
+            landed = onto_curves(follower, row[leaving], guess, self.planes.held(len(leaving)))
             plane[leaving] = np.where(landed.settled, np.where(far, behind[leaving], slab[leaving]), -1)
             inside = good & ~left
             passed.append((going[inside], rows_of(then, inside)))
@@ -212,22 +219,22 @@ class Chains(NamedTuple):
         return Chains(rows_of(self.points, point), self.row[chosen], count, self.closed[chosen])
 
 
-def curves_of(find: Follower) -> Chains:
+def curves_of(follower: Follower) -> Chains:
     """All curves of all targets that an answer is on; of targets with answers that no curve passes, anew from these."""
-    chains = _join_curves(find, np.zeros(0, np.intp), find.near[:0])
-    row, q = answers_off_curves(find, chains.points, np.repeat(chains.row, chains.counts), chains.after)
+    chains = _join_curves(follower, np.zeros(0, np.intp), follower.near[:0])
+    row, q = answers_off_curves(follower, chains.points, np.repeat(chains.row, chains.counts), chains.after)
     if not len(row):
         return chains
     again, place = np.unique(row, return_inverse=True)
-    more = _join_curves(find.of(again), place, q)
+    more = _join_curves(follower.of(again), place, q)
     unchanged = chains.curves(np.flatnonzero(~np.isin(chains.row, again)))
     joined = stack_rows([unchanged, more._replace(row=again[more.row])])
     return joined.curves(np.argsort(joined.row, kind="stable"))
 
 
-def _join_curves(find: Follower, whose: Int, q: Array) -> Chains:
+def _join_curves(follower: Follower, whose: Int, q: Array) -> Chains:
     """Curves of all targets that an answer on a plane, or one of q (M, n) of targets whose (M,), is on."""
-    curves = _Curves(find, whose, q)
+    curves = _Curves(follower, whose, q)
     for _ in range(ROUNDS):
         if curves.traced[curves.open()].all():
             break

@@ -29,22 +29,22 @@ LAST = 2  # steps that take away what is left of a posture
 STEPS = 12  # of the golden section
 
 
-def trace_families(find: Follower) -> Iterator[Traced]:
+def trace_families(follower: Follower) -> Iterator[Traced]:
     """Those of all targets, some at a time."""
-    chains = curves_of(find)
+    chains = curves_of(follower)
     point = np.append(0, np.cumsum(chains.counts))
-    for k in range(0, len(find.target), AT_ONCE):
+    for k in range(0, len(follower.target), AT_ONCE):
         a, b = np.searchsorted(chains.row, [k, k + AT_ONCE])
         part = slice(a, b)
         points = rows_of(chains.points, slice(point[a], point[b]))
         curves = Chains(points, chains.row[part] - k, chains.counts[part], chains.closed[part])
-        yield Traced.of(find.of(np.arange(k, min(k + AT_ONCE, len(find.target)))), curves)
+        yield Traced.of(follower.of(np.arange(k, min(k + AT_ONCE, len(follower.target)))), curves)
 
 
 class Traced(NamedTuple):
     """`families.Curves` of targets N by tracing: their parameter counts the points of a curve."""
 
-    find: Follower
+    follower: Follower
     points: Points  # of all curves, one after the other
     ways: Ways  # from each point to the one after it
     row: Int  # (P,) whose target
@@ -58,16 +58,18 @@ class Traced(NamedTuple):
     steps: int = STEPS
 
     @classmethod
-    def of(cls, find: Follower, chains: Chains) -> Traced:
+    def of(cls, follower: Follower, chains: Chains) -> Traced:
         """Curves of some targets."""
         points, row, count, _ = chains
-        N, begin, P, after = len(find.target), np.cumsum(count) - count, len(points.step), chains.after
+        N, begin, P, after = len(follower.target), np.cumsum(count) - count, len(points.step), chains.after
         branch = np.arange(len(row)) - np.searchsorted(row, row)
         curve = np.zeros((N, int(branch.max(initial=0)) + 1), np.intp)
         curve[row, branch] = np.arange(len(row))
-        ways = Ways.between(find, points, rows_of(points, after))
+        ways = Ways.between(follower, points, rows_of(points, after))
         flags = np.zeros((2, N), bool)
-        curves = cls(find, points, ways, np.repeat(row, count), begin, count, after, curve, none(find.arm.n), *flags)
+        curves = cls(
+            follower, points, ways, np.repeat(row, count), begin, count, after, curve, none(follower.arm.n), *flags
+        )
         if not P:
             return curves
         extent = np.zeros(N)
@@ -82,29 +84,29 @@ class Traced(NamedTuple):
         floor = np.floor(parameter)
         point = self.begin[curve] + floor.astype(np.intp) % self.counts[curve]
         points = self._between(point, parameter - floor, tol.REACH)  # a cubic's miss squared is left
-        q, legal = nearest_row(self.find.arm, points.q, self.find.near[pieces.row])
+        q, legal = nearest_row(self.follower.arm, points.q, self.follower.near[pieces.row])
         return q, legal & (points.step < tol.REACH)
 
     def settled(self, pieces: Pieces, q: Array) -> Array:
         """Postures (P, n) of pieces, without what `at` leaves, by steps of least norm."""
-        find, q = self.find, q.copy()
+        follower, q = self.follower, q.copy()
         for _ in range(LAST):
-            missing, J = newton.scaled(find.arm, find.free.task, q, find.target[pieces.row])
+            missing, J = newton.scaled(follower.arm, follower.free.task, q, follower.target[pieces.row])
             weight = nudged(np.linalg.solve, J @ J.transpose(0, 2, 1), missing[:, :, None])
-            q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(find.arm)
+            q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(follower.arm)
         return q
 
     def _between(self, point: Int, share: Array, enough: float = tol.PAIR_SETTLED) -> Points:
         """Points of the curves at shares (M,) of the way from points (M,) to those after them."""
         ways = rows_of(self.ways, point)
         last = np.where(ways.chord.any(axis=1, keepdims=True), ways.chord, self.points.tangent[point])
-        return onto_curves(self.find, self.row[point], ways.at(self.find, share), last, enough)
+        return onto_curves(self.follower, self.row[point], ways.at(self.follower, share), last, enough)
 
     def _nodes(self) -> _Nodes:
         """Samples of all curves, and where something changes between them."""
-        arm, j, P = self.find.arm, self.find.free.joint, len(self.row)
+        arm, j, P = self.follower.arm, self.follower.free.joint, len(self.row)
         point, parts = np.repeat(np.arange(P), PARTS), np.arange(PARTS) / PARTS
-        part, samples = np.tile(parts, P), [self.ways.at(self.find, u) for u in parts]
+        part, samples = np.tile(parts, P), [self.ways.at(self.follower, u) for u in parts]
         q = np.stack(samples, axis=1).reshape(-1, arm.n)
         up = (np.stack([self.ways.slope(u, j) for u in parts], axis=1) > 0).ravel()
         alive = self.after[point] != point
@@ -129,9 +131,9 @@ class Traced(NamedTuple):
 
     def _crossing(self, point: Int, low: Array) -> tuple[Array, Array]:
         """Shares of the way (M,) at which a limit is crossed, and the postures there: its joint is held on it."""
-        arm, ways = self.find.arm, rows_of(self.ways, point)
-        share = _find_root(lambda t: margin(arm, ways.at(self.find, t)), low, low + 1.0 / PARTS)
-        guess = ways.at(self.find, share)
+        arm, ways = self.follower.arm, rows_of(self.ways, point)
+        share = _find_root(lambda t: margin(arm, ways.at(self.follower, t)), low, low + 1.0 / PARTS)
+        guess = ways.at(self.follower, share)
         free = (arm.upper - arm.lower == np.inf) | (~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi))
         low, high = np.where(free, 0.0, arm.lower), np.where(free, 0.0, arm.upper)
         away = guess - 0.5 * (low + high)
@@ -141,7 +143,7 @@ class Traced(NamedTuple):
         held = np.zeros_like(guess)
         held[index, joint] = 1.0
         guess[index, joint] += np.sign(away[index, joint]) * room[index, joint]
-        points = onto_curves(self.find, self.row[point], guess, held)
+        points = onto_curves(self.follower, self.row[point], guess, held)
         good = points.settled & (np.abs(points.q - guess).max(axis=1, initial=0.0) < tol.REACH)
         touching = np.flatnonzero(~good)  # it touches its limit alone
         points.q[touching] = self._between(point[touching], share[touching]).q
@@ -149,7 +151,7 @@ class Traced(NamedTuple):
 
     def _turning(self, point: Int, low: Array) -> tuple[Array, Array]:
         """Shares of the way (M,) at which the joint turns back, and the postures there: by a step along the tangent."""
-        j, ways = self.find.free.joint, rows_of(self.ways, point)
+        j, ways = self.follower.free.joint, rows_of(self.ways, point)
         share = _find_root(lambda t: ways.slope(t, j), low, low + 1.0 / PARTS)
         end = self._between(point, share)
         size = np.maximum(np.sqrt((ways.begin**2).sum(axis=1)), tol.TINY)
@@ -160,8 +162,8 @@ class Traced(NamedTuple):
                 -tol.REACH * size,
                 tol.REACH * size,
             )
-            ahead = end.q + step[:, None] * end.tangent * radian_or_reach(self.find.arm)
-            after = onto_curves(self.find, self.row[point], ahead, end.tangent)
+            ahead = end.q + step[:, None] * end.tangent * radian_or_reach(self.follower.arm)
+            after = onto_curves(self.follower, self.row[point], ahead, end.tangent)
             bend = np.where(step == 0.0, bend, (after.tangent - end.tangent)[:, j] / np.where(step == 0.0, 1.0, step))
             end = after
         return share, end.q
@@ -195,13 +197,13 @@ class _Nodes(NamedTuple):
     def of_curves(self, curves: Traced, row: Int, branch: Int) -> Pieces:
         """The pieces of curves (C,), which begin with the posture of their best node."""
         node, value = self._table(curves)
-        near, K = curves.find.near[curves.row[self.at.astype(np.intp)]], node.shape[1]
+        near, K = curves.follower.near[curves.row[self.at.astype(np.intp)]], node.shape[1]
         curve, first, length, legal = self._runs(node)
-        q, fits = nearest_row(curves.find.arm, self.q, near)
-        cost = motion(curves.find.arm, q, near)
+        q, fits = nearest_row(curves.follower.arm, self.q, near)
+        cost = motion(curves.follower.arm, q, near)
         costs = np.concatenate([cost[node], np.where(fits, cost, np.inf)[node]])
         best = best_samples(costs, curve + len(row) * legal, first, length + 1)
-        a, b = _ends(self.q[node, curves.find.free.joint], curve, first, length)
+        a, b = _ends(self.q[node, curves.follower.free.joint], curve, first, length)
 
         def parameter(sample: Int) -> Array:
             return np.asarray(value[curve, sample % K] + curves.counts[curve] * (sample // K))
