@@ -79,7 +79,7 @@ def position(arm: Arm, q: ArrayLike) -> Points:
 
 def point_numbers(arm: Arm) -> Callable[..., tuple[float, ...]]:
     """`position` in plain Python: takes the n joint values of one pose [rad | mm], returns x, y, z [mm]."""
-    return _recorded_code(arm, point_formula).record_now().numbers()
+    return _recorded_code(arm, point_formula).record_now().single_pose_function()
 
 
 def frames(arm: Arm, q: ArrayLike) -> Frames:
@@ -354,7 +354,7 @@ def _run_batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formu
         return results
     turns, code = _slides_and_turns(arm, flat_q), _recorded_of_turns(arm, formula).get(len(flat_q))
     if code is not None and len(flat_q) <= FEW:
-        numbers = code.numbers()
+        numbers = code.single_pose_function()
         for k, inputs in enumerate(turns.T.tolist()):
             flat_out[k] = numbers(*inputs)
         return results

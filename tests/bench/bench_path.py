@@ -68,7 +68,9 @@ def branches(lines: int) -> None:
             dense = np.linspace(0, way.length, 1001)
             columns = link_branches(arm, way.targets, dense[::4], task=None, tolerance=0.05, near=arm.home)
             chains = chains_of_columns(arm, columns)
-            mine = max((columns.s[c.carries(0)] for c in chains if c.first == 0 and c.carries(0) >= 0), default=-1.0)
+            mine = max(
+                (columns.s[c.carries_to(0)] for c in chains if c.first == 0 and c.carries_to(0) >= 0), default=-1.0
+            )
             carried += mine >= way.length - 1e-9
             apart = abs(mine - brute.zoomed(arm, way.targets, dense, 0.05))
             reach_error, differ = max(reach_error, apart), differ + (apart > 0.01)

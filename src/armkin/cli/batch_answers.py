@@ -274,7 +274,7 @@ class _ToFile:
             self._write_file()
         except BaseException as error:
             of_no_use = isinstance(error, UsageError) or not self.parts.has_any
-            if of_no_use and not self.batch.resume and self.parts.held:
+            if of_no_use and not self.batch.resume and self.parts.is_held:
                 self.parts.remove()
             raise
         finally:
@@ -284,7 +284,7 @@ class _ToFile:
         """The pieces that no earlier run has finished; those that one has are counted."""
         for piece in pieces:
             self.count = piece.number + 1
-            about = self.parts.about(piece.number) if self.parts.held and self.batch.resume else None
+            about = self.parts.about(piece.number) if self.parts.is_held and self.batch.resume else None
             if about is None:
                 yield piece
                 continue
@@ -301,10 +301,10 @@ class _ToFile:
     def _keep_piece(self, finished: Done) -> None:
         if finished.problem is not None:
             raise finished.problem
-        if self.first is None and finished.number == 0 and not self.parts.held:
+        if self.first is None and finished.number == 0 and not self.parts.is_held:
             self.first = finished
         elif not finished.stored:
-            if not self.parts.held:
+            if not self.parts.is_held:
                 self.parts.begin()
                 assert self.first is not None
                 self.parts.keep(0, self.first.about(), self.first.data)
@@ -312,7 +312,7 @@ class _ToFile:
         self.tally.add(finished.tally)
 
     def _write_file(self) -> None:
-        held = self.parts.held
+        held = self.parts.is_held
         try:
             with files.write_whole(self.path, "wb") as file:
                 self._put_parts(file)
@@ -328,7 +328,7 @@ class _ToFile:
             self.parts.remove()
 
     def _put_parts(self, file: IO[bytes]) -> None:
-        if self.parts.held:
+        if self.parts.is_held:
             headings = (about["heading"] for i in range(self.count) if (about := self.parts.about(i)) is not None)
             heading: list[str] = next((names for names in headings if names), [])
         else:
@@ -337,7 +337,7 @@ class _ToFile:
         if self.format.name == "csv" and not self.job.as_json:
             file.write((csv_line(heading) + "\n").encode())
         first = self.first
-        if self.parts.held or first is None:
+        if self.parts.is_held or first is None:
             self.format.write_parts(file, lambda: self.parts.open_parts(self.count))
         else:
             self.format.write_parts(file, lambda: [io.BytesIO(first.data)])

@@ -44,7 +44,7 @@ class Parts:
         return any(self.folder.glob("[0-9]*[0-9]"))
 
     @property
-    def held(self) -> bool:
+    def is_held(self) -> bool:
         """Whether this run has the folder."""
         return self._lock is not None
 

@@ -75,7 +75,7 @@ class StraightLineCode:
             np.setbufsize(before)
 
     def run_exactly(self, inputs: Sequence[Any]) -> list[Array]:
-        """The formula's outputs for inputs (N,), to the last digit those of `numbers`, in arrays of their own."""
+        """The outputs for inputs (N,), to the last digit those of `single_pose_function`, in arrays of their own."""
         from armkin.formula import numpy_code
 
         if self._exact is None:
@@ -89,7 +89,7 @@ class StraightLineCode:
 
         return [axes_of(x) for x in self._recording.outputs]
 
-    def numbers(self) -> Callable[..., tuple[Any, ...]]:
+    def single_pose_function(self) -> Callable[..., tuple[Any, ...]]:
         """The formula for one pose in plain Python: takes numbers; an output on branch axes is a tuple of them."""
         if self._run_single is None:
             from armkin.formula import python_code
@@ -99,7 +99,7 @@ class StraightLineCode:
 
     def one_by_one(self, inputs: Sequence[Sequence[float]]) -> list[Array]:
         """The formula's outputs for N poses in plain Python, (N, inputs), as arrays (*branch axes, N)."""
-        numbers = self.numbers()
+        numbers = self.single_pose_function()
         outputs = zip(*(numbers(*pose_inputs) for pose_inputs in inputs), strict=True)
         return [
             np.array(values).reshape(len(inputs), -1).T.reshape(*axes, len(inputs))

@@ -41,7 +41,7 @@ def note_runs(plan: PathPlan, carried: CarriedRoute, near: Array) -> None:
         for window in run.chain.windows:
             if c.s[run.first] <= window.begin and window.end <= c.s[run.last]:
                 plan.passed.append(Passed(base + window.begin, base + window.end, window.turned, window.tip_offset))
-        q = run.chain.run(run.first, run.last, near)
+        q = run.chain.joints(run.first, run.last, near)
         begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
         if end > begin:
             plan.runs.append(PathRun(begin, end, _branch_names(c, run, base), q[0].copy(), q[-1].copy()))
@@ -61,8 +61,8 @@ def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch
     c, ranked, chosen = carried.columns, [], None
     for chain in carried.chains:
         if chain.first == 0:
-            e = chain.carries(0)
-            q = (chain.run(0, e, near) if e >= 0 else chain.q)[0].copy()  # a view would keep the whole chain
+            e = chain.carries_to(0)
+            q = (chain.joints(0, e, near) if e >= 0 else chain.q)[0].copy()  # a view would keep the whole chain
             far = float(c.s[e]) if e >= 0 else 0.0
             why = reason_text(arm, _reconfiguration_at(arm, c, chain, 0, 0.0))
             ranked.append((e, Branch(_branch_name(c, int(chain.labels[0])), q, far, why)))
@@ -86,7 +86,7 @@ def _branch_name(c: Columns, label: int) -> str:
 def _reconfiguration_at(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Reconfiguration:
     """Where and why a run from a sample ends."""
     why, joint, value, beyond = end_reason(c, chain, first)
-    e = max(chain.carries(first), 0)
+    e = max(chain.carries_to(first), 0)
     q = chain.q[min(e + 1, chain.last) - chain.first].copy() if why == "hit" else None
     hit = "" if q is None else hit_text(arm, q)
     return Reconfiguration(

@@ -48,7 +48,7 @@ def chunk_tables(
 
     def missing_chunks() -> Iterator[Chunk]:
         for chunk in chunks:
-            if parts is not None and parts.held and parts.about(chunk.number) is not None:
+            if parts is not None and parts.is_held and parts.about(chunk.number) is not None:
                 kept_numbers.append(chunk.number)
             else:
                 yield chunk
@@ -59,7 +59,7 @@ def chunk_tables(
             yield number, npz.decode_table(parts.read(number))
 
     for number, columns in in_order(engine, work, job, missing_chunks()):
-        if parts is not None and parts.held:
+        if parts is not None and parts.is_held:
             parts.keep(number, {}, npz.encode_table(columns))
         yield number, columns
         yield from read_kept()

@@ -239,14 +239,14 @@ class _Run:
 
         def tables() -> Iterator[Any]:
             for number in range(count):
-                encoded = parts.read(number) if parts.held else npz.encode_table(kept_tables[number])
+                encoded = parts.read(number) if parts.is_held else npz.encode_table(kept_tables[number])
                 yield io.BytesIO(encoded if format.name == "npz" else format.encoded(npz.decode_table(encoded)))
 
         with write_whole(self.out, "wb") as file:
             if format.name == "csv":
                 file.write((",".join(UNITS) + "\n").encode())
             format.write_parts(file, tables)
-        if parts.held:
+        if parts.is_held:
             parts.remove()
 
 

@@ -38,7 +38,7 @@ def pair_tables(arm: Arm) -> Tables:
     solid = sorted({int(form.owner[k]) for k in held.moving})
     shapes = [
         (_KINDS[kind], list(map(float, values)))
-        for kind, values in (solid_shape.numbers() for _, solid_shape in held.obstacles)
+        for kind, values in (solid_shape.c_function() for _, solid_shape in held.obstacles)
     ]
     segment_pairs = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1 + len(shapes) * len(solid)
     return Tables(

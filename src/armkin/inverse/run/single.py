@@ -47,7 +47,7 @@ class OneTarget:
         self.orientation, self.position = definition.orientation, definition.position
         self.shape = (4, 4) if self.orientation == "full" else (len(definition.labels),)
         runner = recorded_formula(arm, definition, geometry)
-        self._run, self._off = runner.code.numbers(), rotation_check().numbers()
+        self._run, self._off = runner.code.single_pose_function(), rotation_check().single_pose_function()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
         self._point, self._home, self._room = point_numbers(arm), arm.home, ROOM * arm.reach
         self._coarse = COARSE * arm.reach if self.orientation == "full" else 0.0

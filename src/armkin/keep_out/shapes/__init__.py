@@ -32,7 +32,7 @@ class Shape(Protocol):
     def triangles(self, size: float) -> Array:
         """Its surface for pictures: (T, 3, 3); size: how far one without end is drawn [mm]."""
 
-    def numbers(self) -> tuple[str, list[float]]:
+    def c_function(self) -> tuple[str, list[float]]:
         """Its function in C and what that is given."""
 
 

@@ -62,7 +62,7 @@ class Box:
         faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
         return self.corners()[[part for a, b, c, d in faces for part in ((a, b, c), (a, c, d))]]
 
-    def numbers(self) -> tuple[str, list[float]]:
+    def c_function(self) -> tuple[str, list[float]]:
         """Its function in C and what that is given."""
         return "box", [*self.centre.tolist(), *self.axes.T.ravel().tolist(), *self.half.tolist()]
 

@@ -41,7 +41,7 @@ class Capsule:
         """A tube with half balls."""
         return tube(self.begin, self.end, self.radius)
 
-    def numbers(self) -> tuple[str, list[float]]:
+    def c_function(self) -> tuple[str, list[float]]:
         """Its function in C and what that is given."""
         return "capsule", [*self.begin.tolist(), *self.end.tolist(), self.radius]
 

@@ -34,7 +34,7 @@ class Floor:
         corners = np.column_stack([corners, np.full(4, self.height)])
         return corners[[[0, 1, 2], [0, 2, 3]]]
 
-    def numbers(self) -> tuple[str, list[float]]:
+    def c_function(self) -> tuple[str, list[float]]:
         """Its function in C and what that is given."""
         return "floor", [self.height]
 

@@ -107,7 +107,7 @@ class Chain:
         """Whether a run from sample i ends because the arm hits something."""
         return self.hit_from is not None and self.hit_from[i - self.first] < self._joint_reach[i - self.first].min()
 
-    def carries(self, i: int) -> int:
+    def carries_to(self, i: int) -> int:
         """Last sample of a run from sample i, i - 1 if there is none."""
         return int(self.reach[i - self.first]) if self.first <= i <= self.last else i - 1
 
@@ -116,7 +116,7 @@ class Chain:
         ends = self._joint_reach[i - self.first]
         return int(ends.argmin()) if ends.min() < len(self.q) else None
 
-    def run(self, i: int, e: int, near: Array, fixed: Array | None = None) -> Array:
+    def joints(self, i: int, e: int, near: Array, fixed: Array | None = None) -> Array:
         """Joint values from sample i to e (e - i + 1, n), the legal copies nearest to `near` at i."""
         offsets, turns = np.zeros(self.arm.n), whole_turns(self.arm)
         for j, (choices, ends) in enumerate(self._copies):
@@ -189,14 +189,14 @@ def fewest_runs(chains: list[Chain], N: int, allowed: list[Chain] | None = None)
     i, alive = 0, _possible_starts(chains, N)
     while i < N:
         choices = allowed if allowed is not None and not runs and i == 0 else chains
-        far = max((chain.carries(i) for chain in choices), default=i - 1)
+        far = max((chain.carries_to(i) for chain in choices), default=i - 1)
         if far < i or (far == i and i < N - 1 and runs and runs[-1].last == i):
             i += 1 + int(alive[i + 1 :].argmax())
             continue
         runs.append(_least_motion_run(choices, i, far))
         if far >= N - 1:
             break
-        i = far if any(c.carries(far) > far for c in chains) else far + 1
+        i = far if any(c.carries_to(far) > far for c in chains) else far + 1
     return runs
 
 
@@ -212,7 +212,7 @@ def _possible_starts(chains: list[Chain], N: int) -> Bool:
 
 def _least_motion_run(choices: list[Chain], i: int, last_sample: int) -> Run:
     """Of the chains that carry from sample i so far the one with the least motion, as a run."""
-    best = min((c for c in choices if c.carries(i) == last_sample), key=lambda c: least_time(c, i, last_sample))
+    best = min((c for c in choices if c.carries_to(i) == last_sample), key=lambda c: least_time(c, i, last_sample))
     return Run(best, i, last_sample)
 
 
@@ -228,7 +228,7 @@ def least_time(chain: Chain, i: int, e: int) -> float:
 
 def end_reason(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, float | None, str]:
     """Why a run from sample i ends: words, the joint and its limit (or None), what is beyond."""
-    e = chain.carries(i)
+    e = chain.carries_to(i)
     beyond = min(max(e + 1, 0), len(columns.s) - 1)
     status = Status(int(columns.status[beyond])).name.lower()
     if chain.ends_by_hit(i):
@@ -238,7 +238,7 @@ def end_reason(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None,
     if joint is not None:
         index = min(max(e + 1, chain.first), chain.last) - chain.first
         # Over or under: compare the copy that carried farthest
-        q = chain.run(i, e, arm.home)[-1] if e >= i else chain.q[max(i - chain.first, 0)]
+        q = chain.joints(i, e, arm.home)[-1] if e >= i else chain.q[max(i - chain.first, 0)]
         value_beyond = q[joint] + chain.q[index, joint] - chain.q[max(index - 1, 0), joint]
         upper = abs(value_beyond - arm.upper[joint]) < abs(value_beyond - arm.lower[joint])
         limit = float(arm.upper[joint] if upper else arm.lower[joint])

@@ -119,7 +119,7 @@ def carry_route(
         labels = find_branches(columns.names, branch)
         starts = [c for c in starts if c.labels[0] in labels]
     end = len(columns.s) - 1
-    complete = [Run(c, 0, end) for c in starts if c.carries(0) == end]
+    complete = [Run(c, 0, end) for c in starts if c.carries_to(0) == end]
     if len(complete) > 1:
         complete = [_fastest_run(arm, route, columns.s, complete, near, pace, fixed)]
     return CarriedRoute(route, columns, every_chain, complete or fewest_runs(every_chain, end + 1, starts))
@@ -153,7 +153,7 @@ def _fastest_run(
 def _approach_time(run: Run, near: Array, fixed: Array | None) -> float:
     """How far the joints are from where the arm comes from, in seconds at least."""
     speed = np.where(np.isnan(run.chain.arm.max_speed), 1.0, run.chain.arm.max_speed)
-    return float((np.abs(run.chain.run(0, run.last, near, fixed)[0] - near) / speed).max())
+    return float((np.abs(run.chain.joints(0, run.last, near, fixed)[0] - near) / speed).max())
 
 
 def _run_time(arm: Arm, route: Route, s: Array, run: Run, near: Array, pace: Pace) -> float:
@@ -175,7 +175,7 @@ def run_stretches(
     grid: int = _GRID,
 ) -> list[Curve | Smoothed]:
     """A run as curves from rest to rest, one between each two stops of the route; s: the route's samples."""
-    q = run.chain.run(run.first, run.last, near, fixed)
+    q = run.chain.joints(run.first, run.last, near, fixed)
     route = add_detours(route, run.chain.windows)
     s = s[run.first : run.last + 1]
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
