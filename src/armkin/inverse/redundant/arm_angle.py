@@ -85,18 +85,18 @@ def _frame(v: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=2)
 
 
-def _circles(of: ArmAngle, target: Array) -> _Circles:
+def _circles(srs: ArmAngle, target: Array) -> _Circles:
     """Those of targets (N, 4, 4)."""
-    L, u, p = of.arm.link, of.upper, of.fore
+    L, u, p = srs.arm.link, srs.upper, srs.fore
     hand = inverse(L[0]) @ target @ inverse(L[7])
-    d = hand[:, :3, :3] @ of.wrist + hand[:, :3, 3] - of.shoulder
+    d = hand[:, :3, :3] @ srs.wrist + hand[:, :3, 3] - srs.shoulder
     far = np.linalg.norm(d, axis=1)
     # far^2 = |upper + Rz(q4) fore|^2 = still + 2 swing cos(q4 - middle)
     a, b = u[0] * p[0] + u[1] * p[1], u[1] * p[0] - u[0] * p[1]
     still, swing = u @ u + p @ p + 2.0 * u[2] * p[2], float(np.hypot(a, b))
     cos = np.clip((far * far - still) / (2.0 * swing), -1.0, 1.0)
     miss = np.abs(far - np.sqrt(np.maximum(still + 2.0 * swing * cos, 0.0)))
-    reached = (miss <= tol.SOLUTION * of.arm.reach) & (far > tol.NO_SIZE * of.arm.reach)
+    reached = (miss <= tol.SOLUTION * srs.arm.reach) & (far > tol.NO_SIZE * srs.arm.reach)
     apart = np.arccos(cos)
     apart = np.where(apart < tol.SAME, 0.0, np.where(apart > np.pi - tol.SAME, np.pi, apart))
     single = (apart == 0.0) | (apart == np.pi)  # the two elbows are the same
@@ -111,12 +111,12 @@ def _circles(of: ArmAngle, target: Array) -> _Circles:
     hand = np.einsum("ekim,mil->eklm", fore, hand[row, :3, :3])
     R = np.stack([upper, hand], axis=3)
     straight = (np.abs(R[0, 2, 2]) + np.hypot(R[1, 2, 2], R[2, 2, 2]) > 1.0 - tol.SHARP).any(axis=0)
-    complete = far > tol.SOLUTION * of.arm.reach
+    complete = far > tol.SOLUTION * srs.arm.reach
     complete[row[straight]] = False
     return _Circles(R, q4, row, half, complete)
 
 
-def _angles(of: ArmAngle, R: Array, psi: Array) -> Array:
+def _angles(srs: ArmAngle, R: Array, psi: Array) -> Array:
     """Angles t (3, 2, M, ...) of shoulder and wrist, their first halves, at psi (M, ...); R: of `_Circles`."""
     parts = R.reshape(3, 3, 3, 2, len(psi), *[1] * (psi.ndim - 1))[:, :, ::2]
     (x0, z0), (x1, z1), (x2, z2) = parts[0] + parts[1] * np.cos(psi) + parts[2] * np.sin(psi)
@@ -127,10 +127,10 @@ def _angles(of: ArmAngle, R: Array, psi: Array) -> Array:
     return np.stack([np.arctan2(s, c), np.arctan2(r, -z2), t3])
 
 
-def _joint_values(of: ArmAngle, t: Array, flip: Array) -> Array:
+def _joint_values(srs: ArmAngle, t: Array, flip: Array) -> Array:
     """Joint values (3, 2, ...) of shoulder and wrist: of the first half, or where flip of t + pi, -t, t + pi."""
     second_half = np.stack([t[0] + np.pi, -t[1], t[2] + np.pi])
-    return np.asarray(np.where(flip, second_half, t) - of.offset.reshape(3, 2, *[1] * (t.ndim - 2)))
+    return np.asarray(np.where(flip, second_half, t) - srs.offset.reshape(3, 2, *[1] * (t.ndim - 2)))
 
 
 def _roots(a: Array, b: Array, c: Array) -> Array:
@@ -146,7 +146,7 @@ def _turning_rate(R: Array) -> tuple[Array, Array, Array]:
     return x[0] * y[2] - y[0] * x[2], y[0] * x[1] - x[0] * y[1], x[1] * y[2] - y[1] * x[2]
 
 
-def _special_angles(of: ArmAngle, R: Array, near: Array) -> Array:
+def _special_angles(srs: ArmAngle, R: Array, near: Array) -> Array:
     """Values of psi (M, K), sorted, where a joint may stand on a limit or at near (M, n), or the last one turns back,
     and some between."""
     turning = _turning_rate(R)
@@ -154,9 +154,9 @@ def _special_angles(of: ArmAngle, R: Array, near: Array) -> Array:
     for k, joints in enumerate(JOINTS):
         e = R[:, :, :, k]
         for i, joint in enumerate(joints):
-            lower, upper = of.arm.lower[joint], of.arm.upper[joint]
+            lower, upper = srs.arm.lower[joint], srs.arm.upper[joint]
             for value in [near[:, joint], *([lower, upper] if upper - lower < TURN else [])]:
-                t = value + of.offset[i, k]
+                t = value + srs.offset[i, k]
                 c, s = np.cos(t), np.sin(t)
                 if i == 1:
                     angles.append(_roots(e[1, 2, 2], e[2, 2, 2], -c - e[0, 2, 2]))
@@ -179,20 +179,20 @@ class _Samples(NamedTuple):
     turned: Array  # (M, 2 K) the last joint, of the first half
 
 
-def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
+def _samples(srs: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     """Those of circles M; near: (M, n)."""
-    arm = of.arm
-    psi = _special_angles(of, circles.R, near)
+    arm = srs.arm
+    psi = _special_angles(srs, circles.R, near)
     M, K = psi.shape
     ends = np.concatenate([psi, psi[:, :1] + TURN], axis=1)
     psi = np.empty((M, 2 * K + 1))
     psi[:, ::2], psi[:, 1::2] = ends, 0.5 * (ends[:, 1:] + ends[:, :-1])
-    t = _angles(of, circles.R, psi[:, :-1])
+    t = _angles(srs, circles.R, psi[:, :-1])
     elbow, reached = nearest_of_joint(arm, 3, circles.q4, near[:, 3])
     cost = np.broadcast_to(np.abs(elbow - near[:, 3])[:, None, None, None], (M, 2, 2, 2 * K)).copy()
     legal = np.broadcast_to(np.broadcast_to(reached, M)[:, None, None, None], cost.shape).copy()
     for half in range(2):
-        q = _joint_values(of, t, np.array(half == 1))
+        q = _joint_values(srs, t, np.array(half == 1))
         for k, joints in enumerate(JOINTS):
             halves = (slice(None), half) if k == 0 else (slice(None), slice(None), half)
             for i, joint in enumerate(joints):
@@ -210,13 +210,13 @@ def _samples(of: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     up = np.take_along_axis(up, before, axis=1)
     between = np.take_along_axis(legal[..., 1::2], before[:, None, None], axis=3)
     point = legal[..., ::2] & wide[:, None, None] & ~between & ~np.roll(between, 1, axis=3)
-    return _Samples(psi, cost, legal, up, between, point, t[2, 1] - of.offset[2, 1])
+    return _Samples(psi, cost, legal, up, between, point, t[2, 1] - srs.offset[2, 1])
 
 
 class Turning(NamedTuple):
     """`families.Curves` of targets (N, 4, 4) by the arm angle: it is their parameter."""
 
-    of: ArmAngle
+    srs: ArmAngle
     circles: _Circles
     near: Array  # (N, n)
     pieces: Pieces
@@ -224,11 +224,11 @@ class Turning(NamedTuple):
     steps: int = STEPS
 
     @classmethod
-    def along(cls, of: ArmAngle, target: Array, near: Array) -> Turning:
+    def along(cls, srs: ArmAngle, target: Array, near: Array) -> Turning:
         """The curves of targets, near (N, n)."""
-        circles = _circles(of, target)
-        pieces = _pieces(of, circles, near[circles.row]) if len(circles.row) else none(of.arm.n)
-        curves = cls(of, circles, near, pieces, np.zeros(len(target), bool))
+        circles = _circles(srs, target)
+        pieces = _pieces(srs, circles, near[circles.row]) if len(circles.row) else none(srs.arm.n)
+        curves = cls(srs, circles, near, pieces, np.zeros(len(target), bool))
         return curves._replace(pieces=pieces._replace(start=curves.at(pieces, pieces.at)[0]))
 
     @property
@@ -241,15 +241,15 @@ class Turning(NamedTuple):
         place = np.zeros((len(self.near), 2), np.intp)
         place[self.circles.row, self.circles.half] = np.arange(len(self.circles.row))
         circle = place[pieces.row, pieces.branch // 4]
-        t = _angles(self.of, self.circles.R[..., circle], parameter)
-        q = _joint_values(self.of, t, np.stack([pieces.branch // 2 % 2 == 1, pieces.branch % 2 == 1]))
+        t = _angles(self.srs, self.circles.R[..., circle], parameter)
+        q = _joint_values(self.srs, t, np.stack([pieces.branch // 2 % 2 == 1, pieces.branch % 2 == 1]))
         row = np.stack([*q[:, 0], self.circles.q4[circle], *q[:, 1]], axis=1)
-        return nearest_row(self.of.arm, row, self.near[pieces.row])
+        return nearest_row(self.srs.arm, row, self.near[pieces.row])
 
 
-def _pieces(of: ArmAngle, circles: _Circles, near: Array) -> Pieces:
+def _pieces(srs: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     """All pieces of circles M, near (M, n); their starts are not filled in."""
-    s = _samples(of, circles, near)
+    s = _samples(srs, circles, near)
     M, K = s.up.shape
     turns = s.up != np.roll(s.up, 1, axis=1)  # the last joint turns back here
     of_curves = np.broadcast_to(turns[:, None, None], s.between.shape).reshape(-1, K)
@@ -282,5 +282,5 @@ def _pieces(of: ArmAngle, circles: _Circles, near: Array) -> Pieces:
         np.minimum(start, end), np.maximum(start, end),
         psi(2 * first), psi(2 * (first + length)),
         psi(np.maximum(best_at - 1, 2 * first)), psi(best_at), psi(np.minimum(best_at + 1, 2 * (first + length))),
-        np.zeros((len(curve), of.arm.n)),
+        np.zeros((len(curve), srs.arm.n)),
     )  # fmt: skip

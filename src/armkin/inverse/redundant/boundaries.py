@@ -103,45 +103,45 @@ def _in_line(L: Array, upper: Array, fore: Array, middle: float) -> float | None
 class _Held:
     """The arm with joint 7 held at t (M,), at targets (S, 4, 4): what is about the wrist, seen behind joint 6."""
 
-    def __init__(self, of: Boundaries, target: Array, t: Complex) -> None:
-        self.of, self.t = of, t
-        self.target = shrink_translations(target, of.arm.reach)
-        base = of.link[0] @ [*of.shoulder, 1.0]
-        shoulder = (of.link[7] @ inverse(self.target) @ base)[:, :3]
-        self.to = self.turned(shoulder) + (of.link[6][:3, 3] - of.wrist)[:, None, None]  # the shoulder
+    def __init__(self, bounds: Boundaries, target: Array, t: Complex) -> None:
+        self.bounds, self.t = bounds, t
+        self.target = shrink_translations(target, bounds.arm.reach)
+        base = bounds.link[0] @ [*bounds.shoulder, 1.0]
+        shoulder = (bounds.link[7] @ inverse(self.target) @ base)[:, :3]
+        self.to = self.turned(shoulder) + (bounds.link[6][:3, 3] - bounds.wrist)[:, None, None]  # the shoulder
         self.far = (self.to * self.to).sum(axis=0)  # squared
-        self.cos = (of.still - self.far) / (2.0 * of.swing)  # of joint 4, from its middle
+        self.cos = (bounds.still - self.far) / (2.0 * bounds.swing)  # of joint 4, from its middle
         self.square = 1.0 - self.cos * self.cos  # of its sine, s
 
     def turned(self, v: Array) -> Complex:
         """Vectors (S, 3) seen behind joint 7, as seen behind joint 6 (3, S, M)."""
         c, s = np.cos(self.t), np.sin(self.t)
         x, y, z = v.T[:, :, None]
-        return np.tensordot(self.of.link[6][:3, :3], np.stack([c * x - s * y, s * x + c * y, z + 0 * c]), 1)
+        return np.tensordot(self.bounds.link[6][:3, :3], np.stack([c * x - s * y, s * x + c * y, z + 0 * c]), 1)
 
     def before5(self, v: Array, origin: Array) -> list[_Rooted]:
         """A vector v (3,) seen before joint 4, less one seen behind it, as seen before joint 5."""
-        c, s = np.cos(self.of.middle), np.sin(self.of.middle)
+        c, s = np.cos(self.bounds.middle), np.sin(self.bounds.middle)
         # Rz(-q4) v = (vx, vy) cos(q4) + (vy, -vx) sin(q4), and q4 is the middle and an angle
         ahead = np.array([[v[0], v[1], 0.0], [v[1], -v[0], 0.0]])
-        R = self.of.link[4][:3, :3].T
+        R = self.bounds.link[4][:3, :3].T
         parts = R @ (Z * v[2] - origin), R @ (c * ahead[0] + s * ahead[1]), R @ (c * ahead[1] - s * ahead[0])
         return [_Rooted(a + b * self.cos, d + 0 * self.cos, self.square) for a, b, d in zip(*parts, strict=True)]
 
 
 def _shoulder(held: _Held, e0: Array, e3: Array, cosine: float) -> Complex:
     """Where e0 (3,), seen before joint 1, and e3 (3,), seen behind joint 3, have an angle's cosine: values (S, M)."""
-    of, (px, py, h), far = held.of, held.to, held.far
-    d = of.link[5][:3, :3].T @ Z  # axis 5, seen behind joint 5
-    to = held.before5(of.upper, of.fore)  # the shoulder from the wrist
-    w = held.before5(of.link[3][:3, :3].T @ e3, np.zeros(3))
+    bounds, (px, py, h), far = held.bounds, held.to, held.far
+    d = bounds.link[5][:3, :3].T @ Z  # axis 5, seen behind joint 5
+    to = held.before5(bounds.upper, bounds.fore)  # the shoulder from the wrist
+    w = held.before5(bounds.link[3][:3, :3].T @ e3, np.zeros(3))
     k = to[2]
     dot = to[0] * w[0] + to[1] * w[1] + to[2] * w[2]
     # w = (a z5 + b to + c z5 x to) / across, and axis 5 is (d2 z6 + (k1 p + g q) / round), q at right angles to p
     a, b, c = w[2] * far - k * dot, dot - k * w[2], w[1] * to[0] - w[0] * to[1]
     across, round6 = k * k * -1.0 + far, px * px + py * py
     k1 = k - h * d[2]
-    nx, ny, nz = held.turned(e0 @ (held.target[:, :3, :3] @ of.link[7][:3, :3].T))
+    nx, ny, nz = held.turned(e0 @ (held.target[:, :3, :3] @ bounds.link[7][:3, :3].T))
     p, q = nx * px + ny * py, ny * px - nx * py
     still = a * (k1 * p + d[2] * nz * round6) + b * ((p + h * nz) * round6)
     still = still + c * (k1 * (-h * q) + d[2] * q * round6) - across * (cosine * round6)
@@ -149,8 +149,8 @@ def _shoulder(held: _Held, e0: Array, e3: Array, cosine: float) -> Complex:
     g2 = k1 * k1 * -1.0 + (d[0] * d[0] + d[1] * d[1]) * round6
     product = still * still - g2 * (moving * moving)
     value = product.product() / (round6 * round6 * across.product())
-    if of.in_line is not None and np.array_equal(e3, Z):  # twice a root there, of branches that are not real
-        value = value / (held.cos - of.in_line) ** 2
+    if bounds.in_line is not None and np.array_equal(e3, Z):  # twice a root there, of branches that are not real
+        value = value / (held.cos - bounds.in_line) ** 2
     return np.asarray(value)
 
 
@@ -160,16 +160,16 @@ def _limits_of_joint(arm: Arm, j: int) -> list[float]:
     return [lower, upper] if upper - lower < 2 * np.pi else []
 
 
-def _equations(of: Boundaries, target: Array) -> Complex:
+def _equations(bounds: Boundaries, target: Array) -> Complex:
     """Values of all polynomials at samples (F, S, M)."""
-    held = _Held(of, target, sampled_at(DEGREE))
-    R, limits = of.link[:, :3, :3], [_limits_of_joint(of.arm, j) for j in range(6)]
+    held = _Held(bounds, target, sampled_at(DEGREE))
+    R, limits = bounds.link[:, :3, :3], [_limits_of_joint(bounds.arm, j) for j in range(6)]
     axis1, axis5 = R[0] @ Z, R[5].T @ Z
-    to, h = held.before5(of.upper, of.fore), held.to[2]
+    to, h = held.before5(bounds.upper, bounds.fore), held.to[2]
     values = [_shoulder(held, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
     values += [_shoulder(held, axis1, Z, float((R[1] @ rotation_about(2, q) @ R[2])[2, 2])) for q in limits[1]]
     values += [_shoulder(held, axis1, rotation_about(2, -q) @ R[2].T @ Z, float(R[1][2, 2])) for q in limits[2]]
-    values += [held.cos - cos for cos in (1.0, -1.0, *(float(np.cos(q - of.middle)) for q in limits[3]))]
+    values += [held.cos - cos for cos in (1.0, -1.0, *(float(np.cos(q - bounds.middle)) for q in limits[3]))]
     for q in limits[4]:  # axis 6 and the line to the shoulder
         x, y, z = rotation_about(2, q) @ R[5] @ Z
         values.append((to[0] * x + to[1] * y + to[2] * z - h).product())
@@ -180,13 +180,13 @@ def _equations(of: Boundaries, target: Array) -> Complex:
     return np.stack(values)
 
 
-def boundary_angles(of: Boundaries, target: Array) -> tuple[Array, Bool]:
+def boundary_angles(bounds: Boundaries, target: Array) -> tuple[Array, Bool]:
     """Where something may change at targets (S, 4, 4): (S, V), sorted, inf where there are fewer; whether these are all
     (S,)."""
-    values = _equations(of, target)
+    values = _equations(bounds, target)
     F, S, M = values.shape
     zeros = roots(values.reshape(-1, M), DEGREE)
-    limits = np.array(_limits_of_joint(of.arm, 6))
+    limits = np.array(_limits_of_joint(bounds.arm, 6))
     row = np.concatenate([zeros.which % S, np.repeat(np.arange(S), len(limits))])
     angles = np.concatenate([zeros.at, np.tile(limits, S)])
     angles = np.remainder(angles + np.pi, 2 * np.pi) - np.pi

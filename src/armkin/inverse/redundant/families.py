@@ -61,16 +61,16 @@ def families(
     goal, lead, defect = read_targets(task, values)
     close = read_near(arm, near, lead)
     nears = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
-    angle_class = arm_angle(arm) if free.joint else None
+    srs = arm_angle(arm) if free.joint else None
     numbers = (flat_targets(task, values)[0], defect)
     roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
     stands = (newton.misses(arm, task, nears, goal) <= most) & ~outside_limits(arm, nears).any(axis=1)
     rows = _Rows(arm, free.joint, nears, stands)
-    chunk = CIRCLES if angle_class else AT_ONCE // SAMPLES if free.by_formula else TRACED
+    chunk = CIRCLES if srs else AT_ONCE // SAMPLES if free.by_formula else TRACED
     for k in range(0, len(goal), chunk):
         some = goal[k : k + chunk], nears[k : k + chunk]
-        if angle_class:
-            rows.add(Turning.along(angle_class, *some))
+        if srs:
+            rows.add(Turning.along(srs, *some))
             continue
         follower = Follower(ik, arm, free, *some)
         for curves in [Followed.along(follower)] if free.by_formula else trace_families(follower):
