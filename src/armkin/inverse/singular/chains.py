@@ -18,8 +18,8 @@ from armkin.model.arm import Arm
 LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect, or half where that fails
 
 
-def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
-    """Which postures others (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
+def whole(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
+    """Which postures peers (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
 
     Those on which the residual grows, and those that leave a shortened span, are followed both ways until they end, or
     close: then `at` tells of the latter, too. Also on which of these (M,) no other curve crosses, and the joints (M, n)
@@ -27,7 +27,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
     """
     rows = np.arange(len(q))
     open_ = ~at.known & at.followed
-    inside = members(at._replace(known=at.known | open_), rows, newton.difference(arm, others, q[:, None]))
+    inside = members(at._replace(known=at.known | open_), rows, newton.difference(arm, peers, q[:, None]))
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
     grown = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
     open_ |= at.known & at.manifold & ~ended & (grown > tol.CLOSED)
@@ -35,32 +35,32 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, others: Array, target: 
     if not len(left):
         return inside, ended, ended & at.alone, at.joints
     joints, least, most, alone = at.joints.copy(), at.least.copy(), at.most.copy(), at.alone.copy()
-    who, span = np.tile(left, 2), np.tile((at.longer * at.span)[left], 2)
-    start, ahead = leaves(arm, at, who, q[who], np.concatenate([at.v[left], -at.v[left]]))
-    done = np.isnan(start[:, 0])
-    going = np.flatnonzero(~done)
+    curve, span = np.tile(left, 2), np.tile((at.longer * at.span)[left], 2)
+    start, ahead = leaves(arm, at, curve, q[curve], np.concatenate([at.v[left], -at.v[left]]))
+    finished = np.isnan(start[:, 0])
+    going = np.flatnonzero(~finished)
     for _ in range(LINKS):
         if not len(going):
             break
-        own, last, way, rows = who[going], start[going], ahead[going], np.arange(len(going))
-        link = stretch(arm, task, last, target[own], span[going])
+        row, last, way, rows = curve[going], start[going], ahead[going], np.arange(len(going))
+        link = stretch(arm, task, last, target[row], span[going])
         good = link.known & (link.second > tol.HIGH)
         span[going] *= np.where(good, link.longer, np.minimum(link.longer, 0.5))
         # `q` itself comes again, ahead, on a curve that closes
-        apart = newton.difference(arm, np.concatenate([others[own], q[own, None]], axis=1), last[:, None])
-        on = members(link, rows, apart) & good[:, None]
-        np.logical_or.at(inside, own, on[:, :-1])
-        home = on[:, -1] & ((apart[:, -1] * link.v).sum(axis=1) * (way * link.v).sum(axis=1) > 0.0)
-        off = newton.difference(arm, last, q[own])
-        np.minimum.at(least, own[good], (off + link.least)[good])
-        np.maximum.at(most, own[good], (off + link.most)[good])
-        np.logical_and.at(alone, own[good], link.alone[good])
-        np.logical_or.at(at.boundary, own[good], link.boundary[good])
-        there, onwards = leaves(arm, link, rows, last, way)
-        start[going[good]], ahead[going[good]] = there[good], onwards[good]
-        done[going] = good & (home | np.isnan(there[:, 0]))
-        going = going[~done[going] & (link.second > tol.HIGH)]
-    extent, ended[left] = (most - least)[left], done.reshape(2, -1).all(axis=0)
+        apart = newton.difference(arm, np.concatenate([peers[row], q[row, None]], axis=1), last[:, None])
+        passed = members(link, rows, apart) & good[:, None]
+        np.logical_or.at(inside, row, passed[:, :-1])
+        home = passed[:, -1] & ((apart[:, -1] * link.v).sum(axis=1) * (way * link.v).sum(axis=1) > 0.0)
+        shift = newton.difference(arm, last, q[row])
+        np.minimum.at(least, row[good], (shift + link.least)[good])
+        np.maximum.at(most, row[good], (shift + link.most)[good])
+        np.logical_and.at(alone, row[good], link.alone[good])
+        np.logical_or.at(at.boundary, row[good], link.boundary[good])
+        onto, onwards = leaves(arm, link, rows, last, way)
+        start[going[good]], ahead[going[good]] = onto[good], onwards[good]
+        finished[going] = good & (home | np.isnan(onto[:, 0]))
+        going = going[~finished[going] & (link.second > tol.HIGH)]
+    extent, ended[left] = (most - least)[left], finished.reshape(2, -1).all(axis=0)
     at.manifold[left] = extent.max(axis=1) >= tol.REACH
     at.known[left], at.boundary[left] = at.manifold[left] | ended[left], at.boundary[left] & ~at.manifold[left]
     joints[left] = at.manifold[left, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])

@@ -42,32 +42,32 @@ def examine(
     and for self-motions that may meet others; unsettled: (K,) targets whose candidates may not be all, of a solver
     that loses singular ones: more are asked for these and for what is singular, as of lost ones for incomplete (K,).
     """
-    found = _settle(goals, seeds, tol.SEED)
-    again = found.again | found.surface | ~(found.valid.any(axis=1) | (found.beyond & (unsettled is None)))
+    state = _settle(goals, seeds, tol.SEED)
+    again = state.again | state.surface | ~(state.valid.any(axis=1) | (state.beyond & (unsettled is None)))
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
-        first, last = found.moved.argmax(axis=1), goals.arm.n - 1 - found.moved[:, ::-1].argmax(axis=1)
-        more_of = again | found.moved.any(axis=1) & (last - first > 2)
+        first, last = state.moved.argmax(axis=1), goals.arm.n - 1 - state.moved[:, ::-1].argmax(axis=1)
+        more_of = again | state.moved.any(axis=1) & (last - first > 2)
     else:
-        more_of = again | unsettled | (found.status != Status.EXACT)
+        more_of = again | unsettled | (state.status != Status.EXACT)
     if not more_of.any():
-        return found._replace(again=again)
+        return state._replace(again=again)
     rows = np.flatnonzero(more_of)
     lost = again if incomplete is None else again | incomplete
-    others, labels, open_ = more(goals.target[rows], goals.near[rows], lost[rows])
+    more_q, labels, open_ = more(goals.target[rows], goals.near[rows], lost[rows])
     if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
-        open_ |= found.surface[rows]
+        open_ |= state.surface[rows]
     if open_.any():
         starts = newton.many_starts(goals.arm, goals.task, goals.target[rows], open_)
-        others, labels = np.concatenate([others, starts], axis=1), np.append(labels, np.zeros(starts.shape[1], int))
-    there = again[rows] | ~np.isnan(others[:, :, 0]).all(axis=1)
-    rows, others = rows[there], others[there]
+        more_q, labels = np.concatenate([more_q, starts], axis=1), np.append(labels, np.zeros(starts.shape[1], int))
+    present = again[rows] | ~np.isnan(more_q[:, :, 0]).all(axis=1)
+    rows, more_q = rows[present], more_q[present]
     if not len(rows):
-        return found._replace(again=again)
-    again[rows] &= ~np.isnan(others[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
-    whose = np.concatenate([found.label[rows], np.broadcast_to(labels, others.shape[:2])], axis=1)
-    second = _settle(goals.of(rows), Seeds.of(np.concatenate([found.q[rows], others], axis=1), whose), tol.HOPELESS)
-    return replace_rows(found, rows, second)._replace(again=again)
+        return state._replace(again=again)
+    again[rows] &= ~np.isnan(more_q[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
+    whose = np.concatenate([state.label[rows], np.broadcast_to(labels, more_q.shape[:2])], axis=1)
+    second = _settle(goals.of(rows), Seeds.of(np.concatenate([state.q[rows], more_q], axis=1), whose), tol.HOPELESS)
+    return replace_rows(state, rows, second)._replace(again=again)
 
 
 class _Candidates(NamedTuple):
@@ -92,19 +92,19 @@ class _Groups:
         self.goals, self.at, self.lost, self.rests = goals, at, lost, rests
         K, M, n = at.q.shape
         self.valid: Bool = np.asarray(at.size <= tol.SOLUTION)
-        on: Bool = np.asarray(at.sure.any(axis=2))
+        on_motion: Bool = np.asarray(at.sure.any(axis=2))
         # where one direction alone is lost, joints that rest there and on a part of the self-motion rest on all of it
         self.resting: Bool = (lost.nullity == 1)[:, :, None] & (np.abs(lost.V[:, :, -1]) < tol.SOLUTION)
         # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
         self.rank = np.maximum(at.size, tol.EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
         self.open: Bool = self.valid & ~at.simple  # those of no group yet
-        self.weak: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLDED) & ~on
-        lost.sigma[on] = 0.0
+        self.weak: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLDED) & ~on_motion
+        lost.sigma[on_motion] = 0.0
         self.asked: Bool = ~(self.open & self.weak)  # what component it is on; pushed: whether pushes move it
-        self.known, self.moves, self.pushed = on.copy(), on.copy(), self.asked.copy()
+        self.known, self.moves, self.pushed = on_motion.copy(), on_motion.copy(), self.asked.copy()
         self.which, self.edge = at.sure.copy(), np.zeros((K, M), bool)
-        self.ended, self.alone = np.zeros((K, M), bool), on.copy()
+        self.ended, self.alone = np.zeros((K, M), bool), on_motion.copy()
         # which candidates are one with each: rows of `component`, the first for those of which that is not known
         self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
         self.chosen, self.curve = at.simple.copy(), np.zeros((K, M, n), bool)
@@ -115,10 +115,10 @@ class _Groups:
         """How far a posture of residual `SOLUTION` may be off the curve through candidates (K, M) [rad, reaches]:
         `SOLUTION` over the second smallest singular value, where that is small."""
         place, S, n = self.lost.place, self.lost.weak.S, self.goals.arm.n
-        out, some = np.zeros(place.shape), place >= 0
+        widths, weak = np.zeros(place.shape), place >= 0
         if S.shape[1] >= n > 1:
-            out[some] = tol.SOLUTION / np.maximum(S[place[some], n - 2], tol.WEAK)
-        return out
+            widths[weak] = tol.SOLUTION / np.maximum(S[place[weak], n - 2], tol.WEAK)
+        return widths
 
     def _plain(self) -> None:
         """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries
@@ -126,97 +126,97 @@ class _Groups:
         """
         self.open &= ~(self.component[self.place] & self.at.simple[:, None]).any(axis=2)  # branches as they stand
         valid, sigma, M = self.open, self.lost.sigma, self.open.shape[1]
-        on: Bool = np.asarray(self.at.sure.any(axis=2))
-        mine, others = valid & ~on, ~np.eye(M, dtype=bool)
+        sure: Bool = np.asarray(self.at.sure.any(axis=2))
+        mine, apart = valid & ~sure, ~np.eye(M, dtype=bool)
         close = np.zeros((len(valid), M, M), bool)
-        k, i, j = np.nonzero(mine[:, :, None] & mine[:, None] & others)
+        k, i, j = np.nonzero(mine[:, :, None] & mine[:, None] & apart)
         away = np.abs(newton.difference(self.goals.arm, self.at.q[k, i], self.at.q[k, j])).max(axis=1, initial=0.0)
         close[k, i, j] = away < tol.CLOSE_BY
         weak = mine & self.weak
-        told = weak & (self.place > 0) & ~self.moves
-        other = weak & ~(told & self.known & (sigma >= tol.SOLUTION))  # may be on a self-motion
-        alone = valid & np.where(on, ~other.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
-        told &= ~np.asarray((weak & (self.moves | ~self.pushed)).any(axis=1) | (on.any(axis=1) & other.any(axis=1)))[
-            :, None
-        ]
-        some = np.flatnonzero(told.any(axis=1))
-        if len(some):
-            mine, known = told[some], self.known[some]
-            one = self.component[self.place[some]] & valid[some, None] & others & mine[:, :, None]
-            mine &= (one == one.swapaxes(1, 2)).all(axis=2) & ~(close[some] & ~mine[:, None]).any(axis=2)
-            mine &= ~(one & (known[:, :, None] != known[:, None])).any(axis=2)
-            mine &= (one.sum(axis=2) < 2) & ~one[:, :, 0]
-            mine &= (~one | mine[:, None]).all(axis=2)
+        decided = weak & (self.place > 0) & ~self.moves
+        doubtful = weak & ~(decided & self.known & (sigma >= tol.SOLUTION))  # may be on a self-motion
+        alone = valid & np.where(sure, ~doubtful.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
+        decided &= ~np.asarray(
+            (weak & (self.moves | ~self.pushed)).any(axis=1) | (sure.any(axis=1) & doubtful.any(axis=1))
+        )[:, None]
+        rows = np.flatnonzero(decided.any(axis=1))
+        if len(rows):
+            mine, certain = decided[rows], self.known[rows]
+            alike = self.component[self.place[rows]] & valid[rows, None] & apart & mine[:, :, None]
+            mine &= (alike == alike.swapaxes(1, 2)).all(axis=2) & ~(close[rows] & ~mine[:, None]).any(axis=2)
+            mine &= ~(alike & (certain[:, :, None] != certain[:, None])).any(axis=2)
+            mine &= (alike.sum(axis=2) < 2) & ~alike[:, :, 0]
+            mine &= (~alike | mine[:, None]).all(axis=2)
             # the most exact of each, the first of those that need no correction: the same in all arithmetics
-            size = np.maximum(self.at.size[some], np.where(known, tol.CLOSED, 0.0))
+            size = np.maximum(self.at.size[rows], np.where(certain, tol.CLOSED, 0.0))
             rank = np.argsort(np.argsort(size, axis=1, kind="stable"), axis=1)
-            leads = mine & ~(one & (rank[:, None] < rank[:, :, None])).any(axis=2)
-            self.chosen[some] |= leads
-            self.double[some] |= (leads & self.edge[some]).any(axis=1)
-            told[some] = mine
+            leads = mine & ~(alike & (rank[:, None] < rank[:, :, None])).any(axis=2)
+            self.chosen[rows] |= leads
+            self.double[rows] |= (leads & self.edge[rows]).any(axis=1)
+            decided[rows] = mine
         self.chosen |= alone
-        self.open &= ~(alone | told)
-        self.curve |= alone[:, :, None] & self.which & on[:, :, None]
-        self.singular |= (alone & on).any(axis=1)
+        self.open &= ~(alone | decided)
+        self.curve |= alone[:, :, None] & self.which & sure[:, :, None]
+        self.singular |= (alone & sure).any(axis=1)
         self.free |= self.curve.any(axis=1)
 
     def _ask(self, k: Int, b: Int) -> None:
         """What components these candidates lie on that lose one direction, if that is not known."""
         (arm, task, target, _), q = self.goals, self.at.q
-        some = ~self.asked[k, b]
-        k, b = k[some], b[some]
+        unasked = ~self.asked[k, b]
+        k, b = k[unasked], b[unasked]
         self.asked[k, b] = True
-        one = self.lost.nullity[k, b] < 2
-        if one.any():
-            i, c = k[one], b[one]
-            at = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
-            on, self.ended[i, c], self.alone[i, c], joints = chains.whole(arm, task, at, q[i, c], q[i], target[i])
-            self.known[i, c], self.moves[i, c], self.which[i, c] = at.known, at.manifold, joints
-            self.edge[i, c] = at.boundary
-            self.place[i, c] = np.where(at.known, len(self.component) + np.arange(len(i)), 0)
-            self.component = np.concatenate([self.component, on])
+        single = self.lost.nullity[k, b] < 2
+        if single.any():
+            i, c = k[single], b[single]
+            local = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
+            along, self.ended[i, c], self.alone[i, c], joints = chains.whole(arm, task, local, q[i, c], q[i], target[i])
+            self.known[i, c], self.moves[i, c], self.which[i, c] = local.known, local.manifold, joints
+            self.edge[i, c] = local.boundary
+            self.place[i, c] = np.where(local.known, len(self.component) + np.arange(len(i)), 0)
+            self.component = np.concatenate([self.component, along])
         self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < tol.MOVING)
         self.rank[k, b] += np.where(self.pushed[k, b] | (b == 0), 0.0, 1.0)  # it may be on a component that is known
 
     def _push(self, k: Int, b: Int) -> None:
         """Whether these candidates move, of which `_ask` did not tell."""
         self._ask(k, b)
-        rest = ~self.pushed[k, b]
-        if rest.any():
-            k, b = k[rest], b[rest]
+        unpushed = ~self.pushed[k, b]
+        if unpushed.any():
+            k, b = k[unpushed], b[unpushed]
             self.pushed[k, b] = True
             lost = np.maximum(self.lost.nullity[k, b], 1)
-            found = self_motions.self_motion(
+            motion = self_motions.self_motion(
                 self.goals.arm, self.goals.task, self.at.q[k, b], self.lost.V[k, b], lost, self.goals.target[k]
             )
-            self.moves[k, b], self.which[k, b] = found
+            self.moves[k, b], self.which[k, b] = motion
 
     def _compare(self, k: Int, b: Int) -> None:
         """Which candidates are one with these, whose component is not known."""
-        at, (arm, task, target, _), sigma = self.at, self.goals, self.lost.sigma
+        candidates, (arm, task, target, _), sigma = self.at, self.goals, self.lost.sigma
         self.place[k, b] = len(self.component) + np.arange(len(k))
-        one, away = high_order_roots.equal_candidates(arm, task, at.q, k, b, sigma, at.size, target)
-        self.edge[k, b] = (one & self.valid[k] & (away > tol.SAME)).any(axis=1) | (sigma[k, b] < tol.DOUBLE)
-        self.component = np.concatenate([self.component, one])
+        alike, away = high_order_roots.equal_candidates(arm, task, candidates.q, k, b, sigma, candidates.size, target)
+        self.edge[k, b] = (alike & self.valid[k] & (away > tol.SAME)).any(axis=1) | (sigma[k, b] < tol.DOUBLE)
+        self.component = np.concatenate([self.component, alike])
 
     def _lead(self, k: Int, b: Int) -> None:
         """One group of each of targets k (m,): those that are one with their b-th candidate (m,)."""
         self._push(k, b)
-        if (some := ~self.known[k, b] & (self.place[k, b] == 0)).any():
-            self._compare(k[some], b[some])
+        if (uncompared := ~self.known[k, b] & (self.place[k, b] == 0)).any():
+            self._compare(k[uncompared], b[uncompared])
         arm, near = self.goals.arm, self.goals.near
         q, label, size = self.at.q, self.at.label, self.at.size
         sure = self.known[k, b]
         exact = np.where(sure[:, None], np.maximum(size[k], tol.CLOSED), size[k])  # of known components as in `_plain`
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
-        one: Bool = np.asarray(self.component[self.place[k, b]])
-        new = ~(one & self.at.simple[k]).any(axis=1)
-        self._inherit(k, b, one)
+        group: Bool = np.asarray(self.component[self.place[k, b]])
+        unlisted = ~(group & self.at.simple[k]).any(axis=1)
+        self._inherit(k, b, group)
         moving, joints = self.moves[k, b], self.which[k, b]
-        one &= self.open[k]
-        on = self._on_motion(k, b, away, one | ~self.open[k]) | (one & (sure & moving)[:, None])
+        group &= self.open[k]
+        on = self._on_motion(k, b, away, group | ~self.open[k]) | (group & (sure & moving)[:, None])
         on[np.arange(len(k)), b] = True
-        mine = on | one  # but what is one with it along a curve beside the self-motion is not on that
+        mine = on | group  # but what is one with it along a curve beside the self-motion is not on that
         self.open[k] &= ~mine
         self.double[k] |= self.edge[k, b]
         self.singular[k] |= moving
@@ -224,36 +224,36 @@ class _Groups:
         # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
         motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
         pick = np.where(moving[:, None], np.where(on, motion, np.inf), np.where(mine, exact, np.inf)).argmin(axis=1)
-        own = np.flatnonzero(label[k, b] == OWN)
-        pick[own] = b[own]
-        self.chosen[k, pick] = new
+        leads = np.flatnonzero(label[k, b] == OWN)
+        pick[leads] = b[leads]
+        self.chosen[k, pick] = unlisted
         self.curve[k, pick] = joints & moving[:, None]
         for array in (self.known, self.moves, self.place, self.ended, self.alone):
             array[k, pick] = array[k, b]
-        if len(own):  # named like the candidate of its group that is closest to it
-            alike = np.where(mine[own] & (label[k[own]] != OWN), motion[own], np.inf)
+        if len(leads):  # named like the candidate of its group that is closest to it
+            alike = np.where(mine[leads] & (label[k[leads]] != OWN), motion[leads], np.inf)
             twin = alike.argmin(axis=1)
-            label[k[own], b[own]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[own], twin])
+            label[k[leads], b[leads]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[leads], twin])
 
-    def _inherit(self, k: Int, b: Int, one: Bool) -> None:
+    def _inherit(self, k: Int, b: Int, alike: Bool) -> None:
         """Components (m, M) that a manifold begun at another of their candidates has as its own are that manifold.
 
         Where a second direction is all but lost the curve through a candidate beside a manifold may leave it.
         """
         thick = self.tube[k, b] > tol.TURNED
-        i, c = np.nonzero(one & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & (self.tube[k] > tol.TURNED))
+        i, c = np.nonzero(alike & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & (self.tube[k] > tol.TURNED))
         self._ask(k[i], c)
-        own = one & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & self.known[k] & self.moves[k]
-        i, c = np.nonzero(own)
+        inherits = alike & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & self.known[k] & self.moves[k]
+        i, c = np.nonzero(inherits)
         back = self.component[self.place[k[i], c], b[i]]
         i, first = np.unique(i[back], return_index=True)
         k, b, c = k[i], b[i], c[back][first]
-        one[i] |= self.component[self.place[k, c]]
+        alike[i] |= self.component[self.place[k, c]]
         for array in (self.moves, self.which, self.ended, self.alone):
             array[k, b] = array[k, c]
 
-    def _on_motion(self, k: Int, b: Int, away: Array, one: Bool) -> Bool:
-        """Which candidates (m, M) lie on the self-motions of those that lead, besides those `one` with them (m, M).
+    def _on_motion(self, k: Int, b: Int, away: Array, group: Bool) -> Bool:
+        """Which candidates (m, M) lie on the self-motions of those that lead, besides those `group` with them (m, M).
 
         Whatever differs in its free joints alone; but where the residual grows along it at all, its points are not
         equal, and the exact ones are listed.
@@ -264,11 +264,11 @@ class _Groups:
         # (two postures of it, each off by as much as a double root)
         moving = self.moves[k, b] & ~self.ended[k, b]  # of others all that is on them is one with them
         mine: Bool = moving[:, None] & (held < 3 * tol.TURNED) & (self.lost.sigma[k] < tol.SOLUTION) & self.open[k]
-        far = mine & ~one & (joints.sum(axis=1) > 2)[:, None]
-        some = np.flatnonzero(far.any(axis=1))
-        if len(some):
-            at, goal = q[k[some], b[some]], target[k[some]]
-            mine[some] &= curves.share_circuit(arm, task, at, joints[some], q[k[some]], far[some], goal)
+        far = mine & ~group & (joints.sum(axis=1) > 2)[:, None]
+        rows = np.flatnonzero(far.any(axis=1))
+        if len(rows):
+            leaders, goal = q[k[rows], b[rows]], target[k[rows]]
+            mine[rows] &= curves.share_circuit(arm, task, leaders, joints[rows], q[k[rows]], far[rows], goal)
             i, c = np.nonzero(far & mine & (self.resting[k] & joints[:, None]).any(axis=2))  # another curve crosses
             self._push(k[i], c)
             rests = self.resting[k[i], c] & ~self.which[k[i], c]
@@ -278,81 +278,81 @@ class _Groups:
     def settled(self, missed: Bool, beyond: Bool) -> Examined:
         """All candidates grouped; missed, beyond: (K,) of which targets a loose one came to nothing, and of which all
         that are near lie beyond a fold."""
-        few = self.valid.shape[1] <= FEW
+        small = self.valid.shape[1] <= FEW
         # those that lose several directions when they lead; of many, those that lose one, too
-        some = ~self.asked & (self.lost.nullity < 2)
-        if some.any() and (few or some.sum() <= AT_ONCE):
-            self._ask(*np.nonzero(some))
-        if few:
-            some = self.open & self.asked & ~self.pushed  # of one target eight in a row take five times as long
-            if 0 < some.sum() <= AT_ONCE:
-                self._push(*np.nonzero(some))
-            some = self.open & self.weak & self.pushed & ~self.known & ~self.moves
-            if some.any():
-                self._compare(*np.nonzero(some))
+        asking = ~self.asked & (self.lost.nullity < 2)
+        if asking.any() and (small or asking.sum() <= AT_ONCE):
+            self._ask(*np.nonzero(asking))
+        if small:
+            asking = self.open & self.asked & ~self.pushed  # of one target eight in a row take five times as long
+            if 0 < asking.sum() <= AT_ONCE:
+                self._push(*np.nonzero(asking))
+            asking = self.open & self.weak & self.pushed & ~self.known & ~self.moves
+            if asking.any():
+                self._compare(*np.nonzero(asking))
             self._plain()
         while self.open.any():
             k = np.flatnonzero(self.open.any(axis=1))
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
         arm, task, target, _ = self.goals
-        q, sigma, chosen, each = self.at.q, self.lost.sigma, self.chosen, np.arange(len(self.open))[:, None]
+        q, sigma, chosen, every = self.at.q, self.lost.sigma, self.chosen, np.arange(len(self.open))[:, None]
         # also beside a self-motion: a root of high order
         moving = np.asarray(self.curve.any(axis=2))
         beside = (chosen & (sigma < tol.HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
         rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | beside)
         if len(rows):
-            goals, at, kept, curve = self.goals.of(rows), q[rows], chosen[rows], self.curve[rows]
-            self_motions.drop_contained(goals, at, sigma[rows], self.resting[rows], kept, curve)
+            goals, postures, stay, curve = self.goals.of(rows), q[rows], chosen[rows], self.curve[rows]
+            self_motions.drop_contained(goals, postures, sigma[rows], self.resting[rows], stay, curve)
             # where two directions are lost several manifolds may have a posture
-            on = (self.known & self.moves)[rows, :, None] & (~self.ended & (self.lost.nullity < 2))[rows, None]
-            on &= self.component[self.place[rows]]
-            self_motions.drop_twins(goals, at, kept, curve, self.ended[rows], on, self.tube[rows])
-            chosen[rows] = kept
+            linked = (self.known & self.moves)[rows, :, None] & (~self.ended & (self.lost.nullity < 2))[rows, None]
+            linked &= self.component[self.place[rows]]
+            self_motions.drop_twins(goals, postures, stay, curve, self.ended[rows], linked, self.tube[rows])
+            chosen[rows] = stay
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
-        there = chosen[each, order]
-        status = np.where(there.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
+        present = chosen[every, order]
+        status = np.where(present.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
         status[self.double] = Status.BOUNDARY
         status[self.singular] = Status.SINGULAR
         surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity > 1) & self.curve.any(axis=2))
         if len(k):
             lost = self.lost.V[k, b], self.lost.nullity[k, b]
             surface[k[self_motions.on_surface(arm, task, q[k, b], *lost, target[k])]] = True
-        listed = np.where(there[:, :, None], q[each, order], np.nan)
-        label = np.where(there, self.at.label[each, order], OWN)
+        listed = np.where(present[:, :, None], q[every, order], np.nan)
+        label = np.where(present, self.at.label[every, order], OWN)
         moved = np.asarray((self.curve & ~self.alone[:, :, None]).any(axis=1))
-        return Examined(listed, there, label, status, self.free, missed, surface, moved, beyond)
+        return Examined(listed, present, label, status, self.free, missed, surface, moved, beyond)
 
 
 def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
     arm, task, target, near = goals
     K, _, n = seeds.q.shape
-    there, each = ~np.isnan(seeds.q).any(axis=2), np.arange(K)[:, None]
-    order = np.argsort(~there, axis=1, kind="stable")[:, : int(there.sum(axis=1).max(initial=0))]
-    q = np.concatenate([near[:, None], seeds.q[each, order]], axis=1)
-    label = np.concatenate([np.full((K, 1), OWN), seeds.label[each, order]], axis=1)
-    sure = np.concatenate([np.zeros((K, 1, n), bool), seeds.sure[each, order]], axis=1)
-    loose = (seeds.loose & there)[each, order]
-    simple = np.concatenate([np.zeros((K, 1), bool), (seeds.simple & there)[each, order]], axis=1)
+    present, every = ~np.isnan(seeds.q).any(axis=2), np.arange(K)[:, None]
+    order = np.argsort(~present, axis=1, kind="stable")[:, : int(present.sum(axis=1).max(initial=0))]
+    q = np.concatenate([near[:, None], seeds.q[every, order]], axis=1)
+    label = np.concatenate([np.full((K, 1), OWN), seeds.label[every, order]], axis=1)
+    sure = np.concatenate([np.zeros((K, 1, n), bool), seeds.sure[every, order]], axis=1)
+    loose = (seeds.loose & present)[every, order]
+    simple = np.concatenate([np.zeros((K, 1), bool), (seeds.simple & present)[every, order]], axis=1)
     flat, goal = q.reshape(-1, n).copy(), np.repeat(np.arange(K), q.shape[1])
-    size, some = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
-    size[some] = newton.misses(arm, task, flat[some], target[goal[some]])
+    size, rows = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
+    size[rows] = newton.misses(arm, task, flat[rows], target[goal[rows]])
     beyond, first = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
     free = np.flatnonzero(~(first | sure.reshape(-1, n).any(axis=1) | (size < tol.CLOSED)))
     if len(free):
-        some = free[size[free] < most]
-        far = some[size[some] > tol.SOLUTION]
+        rows = free[size[free] < most]
+        far = rows[size[rows] > tol.SOLUTION]
         beyond[far] = beyond_folds(arm, task, flat[far], target[goal[far]])
-        some = some[~beyond[some]]
+        rows = rows[~beyond[rows]]
         # towards a root of third order each step goes a third of the way
-        flat[some], size[some] = newton.correct(arm, task, flat[some], target[goal[some]], steps=40, patience=PATIENCE)
+        flat[rows], size[rows] = newton.correct(arm, task, flat[rows], target[goal[rows]], steps=40, patience=PATIENCE)
     q, size = flat.reshape(K, -1, n), size.reshape(K, -1)
     # `near` is taken as it is, or not at all, or is the posture that stands for a self-motion already
     stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)
     q[stands | (size[:, 0] > tol.SOLUTION), 0], size[stands, 0] = np.nan, np.inf
-    missed = (loose & (size[:, 1:] > tol.SOLUTION)).any(axis=1) | (seeds.loose & ~there).any(axis=1)
+    missed = (loose & (size[:, 1:] > tol.SOLUTION)).any(axis=1) | (seeds.loose & ~present).any(axis=1)
     far = beyond.reshape(K, -1)
-    out = far.any(axis=1) & (far | (size > most) | np.isnan(q[..., 0]))[:, 1:].all(axis=1)
+    all_beyond = far.any(axis=1) & (far | (size > most) | np.isnan(q[..., 0]))[:, 1:].all(axis=1)
     rests: Bool = np.zeros(size.shape, bool)
     lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     if (lost.nullity[:, 1:] > 1).any():
@@ -360,5 +360,5 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
         if q.shape[1] > sure.shape[1]:
             sure, simple = (widen_columns(array, q.shape[1]) for array in (sure, simple))
             lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
-    at = _Candidates(q, label, size, sure, simple)
-    return _Groups(goals, at, lost, rests).settled(np.asarray(missed), np.asarray(out))
+    candidates = _Candidates(q, label, size, sure, simple)
+    return _Groups(goals, candidates, lost, rests).settled(np.asarray(missed), np.asarray(all_beyond))

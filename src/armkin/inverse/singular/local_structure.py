@@ -74,42 +74,42 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
     known: the residuals there and the Jacobians' singular values, if they are.
     """
     M, n = q.shape
-    at = known or newton.Linear.at(arm, task, q, target)
-    (r, U, S, V), out = at, _undecided(at)
+    linear = known or newton.Linear.at(arm, task, q, target)
+    (r, U, S, V), curve = linear, _undecided(linear)
     rows = r.shape[1]
     if rows < n:
-        return out
-    w, whole, short = np.zeros((M, n)), out.span.copy(), np.zeros(M, bool)
+        return curve
+    w, full, short = np.zeros((M, n)), curve.span.copy(), np.zeros(M, bool)
     if rows == n > 1:
-        w = _second_order(arm, task, q, target, r, U, S, V, out)
+        w = _second_order(arm, task, q, target, r, U, S, V, curve)
         # first as far as the component goes by the second order, and as far again
-        ends = 2.0 * np.maximum(-out.low, out.high)
-        short = ~out.known & (ends > 0.0) & (2.0 * ends < whole) & (out.second > tol.HIGH)
-        out.span[short], w[~short] = ends[short], 0.0
-    left = np.flatnonzero(~out.known)
+        ends = 2.0 * np.maximum(-curve.low, curve.high)
+        short = ~curve.known & (ends > 0.0) & (2.0 * ends < full) & (curve.second > tol.HIGH)
+        curve.span[short], w[~short] = ends[short], 0.0
+    left = np.flatnonzero(~curve.known)
     for _ in range(SHRINKS + 2):
         if not len(left):
             break
-        on = _follow(arm, task, q, target, U, V, w, out, left)
+        stays = _follow(arm, task, q, target, U, V, w, curve, left)
         # where two directions are all but lost no shorter curve stays at hand; what leaves a span leaves shorter ones
-        left = left[~out.known[left] & (out.second[left] > tol.HIGH) & (short[left] | ~on)]
-        out.span[left] = np.where(short[left], whole[left], out.span[left] / SHRINK)
+        left = left[~curve.known[left] & (curve.second[left] > tol.HIGH) & (short[left] | ~stays)]
+        curve.span[left] = np.where(short[left], full[left], curve.span[left] / SHRINK)
         short[left], w[left] = False, 0.0
-    return out
+    return curve
 
 
 def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array) -> Structure:
     """The curves through postures (M, n) as far as span (M,): known are those that stay at hand."""
-    at = newton.Linear.at(arm, task, q, target)
-    out = _undecided(at)
-    out.span[...] = span
-    out.known[...] = _follow(arm, task, q, target, at.U, at.V, np.zeros(q.shape), out, np.arange(len(q)))
-    return out
+    linear = newton.Linear.at(arm, task, q, target)
+    curve = _undecided(linear)
+    curve.span[...] = span
+    curve.known[...] = _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)))
+    return curve
 
 
-def _undecided(at: newton.Linear) -> Structure:
+def _undecided(linear: newton.Linear) -> Structure:
     """What Jacobians alone tell of their M postures."""
-    r, _, S, V = at
+    r, _, S, V = linear
     M, n = len(r), V.shape[2]
     known, manifold, boundary, followed, alone = np.zeros((5, M), bool)
     joints, (low, high), (least, most) = np.zeros((M, n), bool), np.zeros((2, M)), np.zeros((2, M, n))
@@ -120,32 +120,34 @@ def _undecided(at: newton.Linear) -> Structure:
     return Structure(known, manifold, boundary, joints, *ends, alone, v, second, x, g)
 
 
-def leaves(arm: Arm, at: Structure, rows: Int, q: Array, ahead: Array) -> tuple[Array, Array]:
+def leaves(arm: Arm, structure: Structure, rows: Int, q: Array, ahead: Array) -> tuple[Array, Array]:
     """Where curves through q (m, n), those of rows (m,), leave their spans, and the way there, (m, n).
 
     ahead: (m, n) which way they are followed. nan where a curve comes to an end before.
     """
-    way = np.sign((at.v[rows] * ahead).sum(axis=1))
-    end = np.where(way > 0.0, at.high[rows], -at.low[rows])
-    x = _values(at.x[:, rows], np.multiply.outer([0.9, 1.0], way))
-    open_ = (end >= at.span[rows])[:, None]
+    way = np.sign((structure.v[rows] * ahead).sum(axis=1))
+    end = np.where(way > 0.0, structure.high[rows], -structure.low[rows])
+    x = _values(structure.x[:, rows], np.multiply.outer([0.9, 1.0], way))
+    open_ = (end >= structure.span[rows])[:, None]
     return np.where(open_, q + x[1] * radian_or_reach(arm), np.nan), x[1] - x[0]
 
 
 def _follow(
-    arm: Arm, task: Task, q: Array, target: Array, U: Array, V: Array, w: Array, out: Structure, rows: Int
+    arm: Arm, task: Task, q: Array, target: Array, U: Array, V: Array, w: Array, curve: Structure, rows: Int
 ) -> Bool:
     """Follow the curves of some postures as far as their spans, and write what those tell that stay at hand (m,)."""
     n = q.shape[1]
-    span, u = out.span[rows], U[rows, :, n - 1 :]
-    on, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
+    span, u = curve.span[rows], U[rows, :, n - 1 :]
+    stays, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
     # where another curve is near, that may be the one which Newton's method found
-    on &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH * span + tol.SOLUTION / np.maximum(out.second[rows], tol.TINY))
-    some, out.longer[rows], out.followed[rows] = rows[on], longer, on
-    if len(some):
-        out.x[:, some], out.g[:, some], out.alone[some] = x[:, on], g[:, on], alone[on]
-        _decide(out, some)
-    return on
+    stays &= np.abs(x[0]).max(axis=1) <= 4.0 * (
+        tol.SMOOTH * span + tol.SOLUTION / np.maximum(curve.second[rows], tol.TINY)
+    )
+    held, curve.longer[rows], curve.followed[rows] = rows[stays], longer, stays
+    if len(held):
+        curve.x[:, held], curve.g[:, held], curve.alone[held] = x[:, stays], g[:, stays], alone[stays]
+        _decide(curve, held)
+    return stays
 
 
 def _second_order(
@@ -296,11 +298,11 @@ TO_POWERS, TO_LAST = _POWERS @ _FIT, _FIT[-2:]  # from values at the nodes at on
 
 def _values(coefficients: Array, s: Array) -> Array:
     """Polynomials (NODES, M, k) at s (..., M): (..., M, k), Horner's way."""
-    out = np.zeros((*s.shape, coefficients.shape[2]))
+    values = np.zeros((*s.shape, coefficients.shape[2]))
     for c in coefficients[::-1]:
-        out *= s[..., None]
-        out += c
-    return out
+        values *= s[..., None]
+        values += c
+    return values
 
 
 def _ends_of_components(g: Array) -> tuple[Array, Bool]:
@@ -308,57 +310,57 @@ def _ends_of_components(g: Array) -> tuple[Array, Bool]:
     and above."""
     M = g.shape[1]
     g = np.concatenate([g * ((-1.0) ** EXPONENTS)[:, None, None], g], axis=1)
-    out, ends = np.ones(2 * M), np.zeros(2 * M, bool)
+    shares, ends = np.ones(2 * M), np.zeros(2 * M, bool)
     # the sum of the coefficients' sizes bounds the polynomial on all of the span
-    some = np.flatnonzero(np.linalg.norm(np.abs(g).sum(axis=0), axis=1) > tol.SOLUTION)
-    over: Bool = np.linalg.norm(np.tensordot(POWERS_OF_POINTS, g[:, some], axes=1), axis=2) > tol.SOLUTION
-    first, there = over.argmax(axis=0), over.any(axis=0)
-    some, first = some[there], first[there]
-    ends[some] = True
+    rows = np.flatnonzero(np.linalg.norm(np.abs(g).sum(axis=0), axis=1) > tol.SOLUTION)
+    over: Bool = np.linalg.norm(np.tensordot(POWERS_OF_POINTS, g[:, rows], axes=1), axis=2) > tol.SOLUTION
+    first, passes = over.argmax(axis=0), over.any(axis=0)
+    rows, first = rows[passes], first[passes]
+    ends[rows] = True
     low, high = POINTS[np.maximum(first - 1, 0)], POINTS[first]
-    for _ in range(2 if len(some) else 0):
+    for _ in range(2 if len(rows) else 0):
         between = low + FINER * (high - low)
-        beyond = np.linalg.norm(_values(g[:, some], between[1:]), axis=2) > tol.SOLUTION
+        beyond = np.linalg.norm(_values(g[:, rows], between[1:]), axis=2) > tol.SOLUTION
         beyond[-1] = True
         first = beyond.argmax(axis=0)
-        low, high = between[first, np.arange(len(some))], between[first + 1, np.arange(len(some))]
-    out[some] = low
-    return out.reshape(2, M), ends.reshape(2, M)
+        low, high = between[first, np.arange(len(rows))], between[first + 1, np.arange(len(rows))]
+    shares[rows] = low
+    return shares.reshape(2, M), ends.reshape(2, M)
 
 
-def _decide(out: Structure, rows: Int) -> None:
+def _decide(curve: Structure, rows: Int) -> None:
     """Write what the polynomials of some postures tell: of a component that leaves a shortened span, nothing."""
-    g, x, span = out.g[:, rows], out.x[:, rows], out.span[rows]
+    g, x, span = curve.g[:, rows], curve.x[:, rows], curve.span[rows]
     (low, high), (below, above) = _ends_of_components(g)
     low = -low
     s = low + FINE * (high - low)  # (points, M)
     way = _values(x, s)
-    out.least[rows], out.most[rows] = way.min(axis=0), way.max(axis=0)
-    extent = out.most[rows] - out.least[rows]
+    curve.least[rows], curve.most[rows] = way.min(axis=0), way.max(axis=0)
+    extent = curve.most[rows] - curve.least[rows]
     long = extent.max(axis=1) >= tol.REACH
-    out.known[rows], out.manifold[rows], short = long | (below & above), long, np.flatnonzero(~long)
+    curve.known[rows], curve.manifold[rows], short = long | (below & above), long, np.flatnonzero(~long)
     if len(short):
         slope = _values(g[1:, short] * np.arange(1, NODES)[:, None, None], s[:, short]) / span[short, None]
         steepest = np.linalg.norm(slope, axis=2).argmax(axis=0)
         up = slope[steepest, np.arange(len(short))]
         along = (slope * up).sum(axis=2) / np.maximum(np.linalg.norm(up, axis=1), tol.TINY)
-        out.boundary[rows[short]] = along.min(axis=0) <= tol.SOLUTION
-    out.joints[rows] = long[:, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
-    out.low[rows], out.high[rows] = low * span, high * span
+        curve.boundary[rows[short]] = along.min(axis=0) <= tol.SOLUTION
+    curve.joints[rows] = long[:, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
+    curve.low[rows], curve.high[rows] = low * span, high * span
 
 
-def members(at: Structure, rows: Int, way: Array) -> Bool:
+def members(structure: Structure, rows: Int, way: Array) -> Bool:
     """Which postures, way (m, M, n) [rad, reaches] from those of rows (m,), lie on their components: (m, M).
 
     As far as the curve is known; one that solves its target lies as close to it as the directions that are not lost
     let it.
     """
-    t = (way * at.v[rows, None]).sum(axis=2)  # (m, M)
-    span, slack = at.span[rows], 4.0 * tol.SOLUTION / at.second[rows]
-    x = _values(at.x[:, rows], np.clip(t / span[:, None], -1.0, 1.0).T).swapaxes(0, 1)
-    off = np.abs(way - x).max(axis=2)
-    inside = (t >= (at.low[rows] - slack)[:, None]) & (t <= (at.high[rows] + slack)[:, None])
-    return np.asarray(at.known[rows, None] & inside & (off <= (4.0 * tol.SMOOTH * span + slack)[:, None]))
+    t = (way * structure.v[rows, None]).sum(axis=2)  # (m, M)
+    span, slack = structure.span[rows], 4.0 * tol.SOLUTION / structure.second[rows]
+    x = _values(structure.x[:, rows], np.clip(t / span[:, None], -1.0, 1.0).T).swapaxes(0, 1)
+    beside = np.abs(way - x).max(axis=2)
+    inside = (t >= (structure.low[rows] - slack)[:, None]) & (t <= (structure.high[rows] + slack)[:, None])
+    return np.asarray(structure.known[rows, None] & inside & (beside <= (4.0 * tol.SMOOTH * span + slack)[:, None]))
 
 
 def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
@@ -373,12 +375,12 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     r, J = newton.scaled(arm, task, q, target)
     U, S, V = np.linalg.svd(J)
     u, way = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
-    both = np.concatenate([q + way, q - way])
+    ends = np.concatenate([q + way, q - way])
     goals = np.concatenate([target, target])
-    ahead, behind = np.split(newton.residuals(arm, task, both, goals), 2)
+    ahead, behind = np.split(newton.residuals(arm, task, ends, goals), 2)
     bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
     lost = (u * r).sum(axis=1)
-    rest = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)
+    remainder = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)
     fold = (S[:, -2] > tol.HIGH) & (S[:, -1] < tol.WEAK) & (np.abs(bend) > tol.BENT)
     beyond = (lost * bend > 0.0) & (np.abs(lost) > 10.0 * tol.SOLUTION)
-    return np.asarray(fold & beyond & (rest < tol.FOLD_WAY) & (100.0 * rest**2 < np.abs(lost)))
+    return np.asarray(fold & beyond & (remainder < tol.FOLD_WAY) & (100.0 * remainder**2 < np.abs(lost)))
