@@ -119,10 +119,10 @@ def solve_by(  # noqa: C901 - what is looked at after the closed form, in its or
     """`ik` by a solver, of an arm whose joints move as they are commanded; single: whether the targets were given in
     float32."""
     targets, lead = flat_targets(task, values)
-    close = read_near(arm, near, lead)
-    is_shared = close.ndim == 1 and len(targets) != 1
-    nears = np.broadcast_to(close, (len(targets), arm.n)) if is_shared else close.reshape(-1, arm.n)
-    common = close if close.ndim == 1 else None
+    reference = read_near(arm, near, lead)
+    is_shared = reference.ndim == 1 and len(targets) != 1
+    nears = np.broadcast_to(reference, (len(targets), arm.n)) if is_shared else reference.reshape(-1, arm.n)
+    common = reference if reference.ndim == 1 else None
     if geometry.pairs:
         batch, count, target, shown, left = chunks.solve(arm, task, geometry, targets, nears, common, examine, workers)
         if len(left):
@@ -147,7 +147,7 @@ def solve_by(  # noqa: C901 - what is looked at after the closed form, in its or
         batch.branch[...] = follow_branches(arm, task, batch.q, target)
     names = branch_names(arm, task, geometry, count)
     names += tuple(f"branch {i + 1}" for i in range(count, batch.q.shape[1]))
-    return as_solutions(goals, close, lead, batch, shown, (names, geometry.name, geometry.why))
+    return as_solutions(goals, reference, lead, batch, shown, (names, geometry.name, geometry.why))
 
 
 def columns(
@@ -172,8 +172,8 @@ def isolated_branches(arm: Arm, targets: ArrayLike, task: str | None = None, **m
 
 def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
     """Commanded values as actual ones; what has a wrong shape is left for `ik` to refuse."""
-    close = None if near is None else arrays.real_array(near, "near")
-    return close * arm.ratio if close is not None and close.shape[-1:] == (arm.n,) else close
+    reference = None if near is None else arrays.real_array(near, "near")
+    return reference * arm.ratio if reference is not None and reference.shape[-1:] == (arm.n,) else reference
 
 
 def _as_commanded(arm: Arm, solved: Solutions) -> Solutions:

@@ -99,11 +99,11 @@ def as_solutions(
 ) -> Solutions:
     """The answer of a batch of shape lead; near: (n,) or (*lead, n), as it was given."""
     arm, task, target, _ = goals
-    close = np.broadcast_to(near.copy(), (*lead, arm.n))
+    reference = np.broadcast_to(near.copy(), (*lead, arm.n))
     q, valid, within, branch, status, free, complete, target, rounding = (
         x.reshape((*lead, *x.shape[1:])) for x in (*batch, target, rounding)
     )
-    return Solutions(arm, task, target, close, q, valid, within, branch, status, free, *text, complete, rounding)
+    return Solutions(arm, task, target, reference, q, valid, within, branch, status, free, *text, complete, rounding)
 
 
 def write_branches(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> Batch:

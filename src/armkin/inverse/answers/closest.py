@@ -76,8 +76,8 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
     goal, lead, _ = read_targets(definition, target)
     if lead:
         raise UsageError("closest takes one target at a time; closest_each takes many")
-    close = one_pose(arm, arm.home if near is None else near, "near")
-    return _of_chunk(arm, definition, goal, close[None])[0]
+    reference = one_pose(arm, arm.home if near is None else near, "near")
+    return _of_chunk(arm, definition, goal, reference[None])[0]
 
 
 def closest_each(
@@ -86,9 +86,9 @@ def closest_each(
     """What `closest` says of each of many targets (N, m) or (N, 4, 4); near: (n,) or (N, n)."""
     definition = task_for(arm, task)
     goal, *_ = read_targets(definition, targets)
-    close = np.broadcast_to(arm.home if near is None else np.asarray(near, float), (len(goal), arm.n))
+    reference = np.broadcast_to(arm.home if near is None else np.asarray(near, float), (len(goal), arm.n))
     parts = slices(len(goal), AT_ONCE)
-    return [nearest for part in parts for nearest in _of_chunk(arm, definition, goal[part], close[part])]
+    return [nearest for part in parts for nearest in _of_chunk(arm, definition, goal[part], reference[part])]
 
 
 def closest_from_every_start(arm: Arm, task: Task, target: Array, near: Array) -> Closest:

@@ -174,10 +174,10 @@ def linear(
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
     if disc is None:
         disc = h2 - c * c
-    close = precision()
-    edge = arrays.absolute(disc) < (close.tangent if tangent is None else tangent) * h2
+    thresholds = precision()
+    edge = arrays.absolute(disc) < (thresholds.tangent if tangent is None else tangent) * h2
     root = arrays.sqrt(arrays.maximum(disc, 0.0)) * sign
-    least = close.free * scale * scale
+    least = thresholds.free * scale * scale
     if isinstance(h2, float) and isinstance(least, float):
         free: Truth = (c == c) if h2 < least else False  # the equation says nothing about it, whatever the target
         inverse: Entry = 1.0 / max(h2, least)
@@ -187,7 +187,7 @@ def linear(
     ci, ri = c * inverse, root * inverse
     cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
     sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
-    nearly = h2 < close.nearly_free * scale * scale
+    nearly = h2 < thresholds.nearly_free * scale * scale
     return _with_preferred(Pair(cos, sin), h2 < least, prefer), Doubt(edge | nearly, free)
 
 
@@ -214,17 +214,17 @@ def rotation_between(
     if the target is reached; the pair of a target that is not is then not normalised.
     Returns the pair and doubt: where u or v vanishes, so that the angle is free.
     """
-    close = precision()
-    least = close.free * scale * scale
+    thresholds = precision()
+    least = thresholds.free * scale * scale
     if length2 is not None:
-        free, nearly = length2 < least, length2 < close.nearly_free * scale * scale
+        free, nearly = length2 < least, length2 < thresholds.nearly_free * scale * scale
         inverse = 1.0 / arrays.maximum(length2, least)
         vx, vy = arrays.mul(inverse, vx), arrays.mul(inverse, vy)
     c = arrays.add(arrays.mul(ux, vx), arrays.mul(uy, vy))
     s = arrays.sub(arrays.mul(ux, vy), arrays.mul(uy, vx))
     if length2 is None:
         h2 = arrays.add(arrays.mul(c, c), arrays.mul(s, s))
-        free, nearly = h2 < least * least, h2 < (close.nearly_free * scale * scale) ** 2
+        free, nearly = h2 < least * least, h2 < (thresholds.nearly_free * scale * scale) ** 2
         inverse = 1.0 / arrays.sqrt(arrays.maximum(h2, least * least))
         c, s = c * inverse, s * inverse
     return _with_preferred(Pair(c, s), free, prefer), Doubt(nearly, free)

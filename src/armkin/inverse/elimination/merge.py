@@ -76,10 +76,10 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
         second = first + gap
         step = difference(prismatic, q[second], q[first])
         distance = np.abs(step).max(axis=1)
-        near = np.flatnonzero((distance < tol.EXAMINED) & keep[first] & keep[second])
-        if near.size == 0:
+        examined = np.flatnonzero((distance < tol.EXAMINED) & keep[first] & keep[second])
+        if examined.size == 0:
             continue
-        first, second, step, distance = first[near], second[near], step[near], distance[near]
+        first, second, step, distance = first[examined], second[examined], step[examined], distance[examined]
         target = np.ascontiguousarray(goal[pose[first], :3].transpose(1, 2, 0))
         _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
         blur = np.maximum(tol.HALFWAY, 4 * np.maximum(residual[first], residual[second]))

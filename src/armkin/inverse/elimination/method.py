@@ -114,14 +114,14 @@ def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:
     if not elimination.plans:
         answers, touching, settled = _solve_slides(closed, goal)
         shaken = ~settled
-        near = none()
+        beside = none()
     else:
-        answers, near, touching, settled, shaken = _run_passes(elimination, goal, moved)
+        answers, beside, touching, settled, shaken = _run_passes(elimination, goal, moved)
     answers = rows_of(answers, finite[answers.pose])
     answers, merged = merge_equal(closed.chain, closed.prismatic, goal, answers)
     q, weak = pack_by_pose(answers, count)
     unit = np.where(closed.prismatic, closed.length, 1.0)
-    guesses = best_answers(rows_of(near, (finite & shaken)[near.pose]), count, GUESSES)
+    guesses = best_answers(rows_of(beside, (finite & shaken)[beside.pose]), count, GUESSES)
     return Branches(q * unit, (weak | merged | touching) & finite, settled, shaken & finite, guesses * unit)
 
 
@@ -141,10 +141,10 @@ def _run_passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Ans
             still = np.zeros(open_poses.size, dtype=np.bool_)
             for begin in range(0, open_poses.size, CHUNK):
                 part = open_poses[begin : begin + CHUNK]
-                answers, unsettled, touch, near = run_pass(elimination.loop, pencil, goal[part], number)
+                answers, unsettled, touch, guess = run_pass(elimination.loop, pencil, goal[part], number)
                 parts.append(answers._replace(pose=part[answers.pose]))
                 if number > 0:
-                    guesses.append(near._replace(pose=part[near.pose]))
+                    guesses.append(guess._replace(pose=part[guess.pose]))
                 still[begin : begin + CHUNK] = unsettled
                 touching[part] |= touch
             open_poses = open_poses[still]

@@ -34,10 +34,10 @@ def run_pass(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     # A move of the pose may turn two close real roots into such a pair.
     pair = tol.PAIRED + 10 * np.sqrt(shake)
     maybe = seed.tilt < pair
-    near = moved.residual < tol.STRAY
+    almost = moved.residual < tol.STRAY
     if careful:
-        near = (moved.residual < tol.CLOSE_RESIDUAL) & (seed.tilt < max(pair, tol.STRAY))
-    missed = ~good & ((seed.tilt < tol.UPRIGHT) | near | seed.torn)
+        almost = (moved.residual < tol.CLOSE_RESIDUAL) & (seed.tilt < max(pair, tol.STRAY))
+    missed = ~good & ((seed.tilt < tol.UPRIGHT) | almost | seed.torn)
     touch = good & (seed.tilt > 0) & (seed.tilt < tol.UPRIGHT)
     unsure = good & (seed.tilt > 0) & maybe
     own_root = good & (shake == 0)

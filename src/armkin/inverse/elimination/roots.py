@@ -77,10 +77,10 @@ def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -
         candidates = _part_equal_roots(pencil, candidates, vectors)
     pose, index, x, slant, u, parted = candidates
     middle, defect = _middle_joints(pencil, x, u)
-    near = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
-    if near.size < pose.size:
-        pose, index, slant, parted = pose[near], index[near], slant[near], parted[near]
-        middle, defect = middle[:, near], defect[near]
+    finite = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
+    if finite.size < pose.size:
+        pose, index, slant, parted = pose[finite], index[finite], slant[finite], parted[finite]
+        middle, defect = middle[:, finite], defect[finite]
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)
     q = np.empty((pose.size, 6))
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):

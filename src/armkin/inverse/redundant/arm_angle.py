@@ -196,9 +196,9 @@ def _samples(srs: ArmAngle, circles: _Circles, near: Array) -> _Samples:
         for k, joints in enumerate(JOINTS):
             halves = (slice(None), half) if k == 0 else (slice(None), slice(None), half)
             for i, joint in enumerate(joints):
-                close = near[:, joint, None]
-                value, within = nearest_of_joint(arm, joint, q[i, k], close)
-                moved, fits = np.abs(value - close), np.broadcast_to(within, (M, 2 * K))
+                reference = near[:, joint, None]
+                value, within = nearest_of_joint(arm, joint, q[i, k], reference)
+                moved, fits = np.abs(value - reference), np.broadcast_to(within, (M, 2 * K))
                 cost[halves] += moved[:, None]
                 legal[halves] &= fits[:, None]
     a, b, c = (x[:, None] for x in _turning_rate(circles.R))

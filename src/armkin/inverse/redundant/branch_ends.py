@@ -111,14 +111,14 @@ def hidden_stretches(follower: Follower, t: Array, turns: Turns) -> tuple[Change
     hidden = np.flatnonzero(top > 0)
     row, k, branch = row[hidden], k[hidden], branch[hidden]
     sign, peak, top = sign[hidden], peak[hidden], top[hidden]
-    near = _Ends(follower, np.tile(row, 2), np.tile(branch, 2), True)
+    beside = _Ends(follower, np.tile(row, 2), np.tile(branch, 2), True)
     at_sample = room[hidden].T.ravel()
     outer, inner = np.concatenate([begin[hidden], end[hidden]]), np.tile(peak, 2)
     inside = np.tile(sign < 0, 2)  # the stretch is the legal one
     good, bad = np.where(inside, inner, outer), np.where(inside, outer, inner)
     at_inner = np.tile(-sign * top, 2)
     rooms = np.where(inside, at_inner, at_sample), np.where(inside, at_sample, at_inner)
-    ends = near.between(good, bad, good, (*rooms, np.full(len(good), np.nan)))
+    ends = beside.between(good, bad, good, (*rooms, np.full(len(good), np.nan)))
     return Changes(row, k, branch, sign > 0), ends.reshape(2, -1)
 
 

@@ -84,20 +84,20 @@ def answers_on_planes(follower: Follower, whose: Int, postures: Array) -> tuple[
     source = follower._replace(free=guide)
     if guide is follower.free:
         q = follower.found(row, t)
-        near, extra = ~np.isnan(q[:, :, 0]), q[:0, 0]
+        solving, extra = ~np.isnan(q[:, :, 0]), q[:0, 0]
     else:
         q, missed = source.candidates(row, t)
         more, extra = _answers_between(source, even, missed.reshape(N, PLANES, -1))
         more, extra = np.append(more, whose), np.append(extra, postures, axis=0)
         row, t = np.append(row, more), np.append(t, extra[:, guide.joint])
         beside = source.candidates(more, t[N * PLANES :])
-        q, near = np.append(q, beside[0], axis=0), np.append(missed, beside[1], axis=0) < tol.NEAR
+        q, solving = np.append(q, beside[0], axis=0), np.append(missed, beside[1], axis=0) < tol.NEAR
     order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
     plane = np.empty_like(row)
     plane[order] = numbers_within(count)
     planes = Planes(follower, guide, np.full((N, int(count.max(initial=PLANES))), np.inf), count)
     planes.values[row, plane] = t
-    sample, branch = np.nonzero(near)
+    sample, branch = np.nonzero(solving)
     last = np.arange(N * PLANES, len(row))  # those between are answers already, of no branch
     start = np.append(q[sample, branch], extra, axis=0)
     sample, branch = np.append(sample, last), np.append(branch, np.full(len(last), q.shape[1]))
@@ -129,8 +129,8 @@ def first_of_equals(follower: Follower, group: Int, q: Array) -> Bool:
     key = np.cos(q - 0.3) @ np.sqrt(np.arange(2.0, 2.0 + q.shape[1]))
     order = np.lexsort((key, group))
     first, second = order[:-1], order[1:]
-    near = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
-    pairs = np.flatnonzero(near)
+    close = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
+    pairs = np.flatnonzero(close)
     unique = np.ones(len(q), bool)
     unique[second[pairs[newton.wrapped_distance(follower.arm, q[first[pairs]], q[second[pairs]]) < tol.SAME_SEED]]] = (
         False

@@ -59,8 +59,8 @@ def families(
     task = free.task
     values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
     goal, lead, defect = read_targets(task, values)
-    close = read_near(arm, near, lead)
-    nears = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
+    reference = read_near(arm, near, lead)
+    nears = np.broadcast_to(reference.reshape(-1, arm.n), (len(goal), arm.n))
     srs = arm_angle(arm) if free.joint else None
     numbers = (flat_targets(task, values)[0], defect)
     roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
@@ -83,7 +83,7 @@ def families(
     names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
     method, why, _ = method_of_families(arm, free)
     batch = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(nears.shape, bool), rows.complete)
-    s = as_solutions(Goals(arm, task, goal, nears), close, lead, batch, roundings, (names, method, why))
+    s = as_solutions(Goals(arm, task, goal, nears), reference, lead, batch, roundings, (names, method, why))
     return replace(s, interval=interval.reshape(*s.valid.shape, 2))
 
 
@@ -93,10 +93,10 @@ def _with_tool_turn(
     """The branches of the others, which the redundant joint's motion leaves as they are: each is a family."""
     r = free.joint
     lead = flat_targets(free.task, arrays.real_array(targets, "targets"))[1]
-    close = read_near(arm, near, lead)
-    s = ik(free.rest, targets, free.task.name, near=np.delete(close, r, axis=-1), rounding=rounding)
-    close = np.broadcast_to(close, (*lead, arm.n)).copy()
-    value = np.clip(close[..., r], arm.lower[r], arm.upper[r])[..., None]
+    reference = read_near(arm, near, lead)
+    s = ik(free.rest, targets, free.task.name, near=np.delete(reference, r, axis=-1), rounding=rounding)
+    reference = np.broadcast_to(reference, (*lead, arm.n)).copy()
+    value = np.clip(reference[..., r], arm.lower[r], arm.upper[r])[..., None]
     turns = arm.upper[r] - arm.lower[r] >= 2 * np.pi
     interval = np.full((*s.valid.shape, 2), np.nan)
     interval[s.valid] = [-np.pi, np.pi] if turns else [arm.lower[r], arm.upper[r]]
@@ -105,7 +105,7 @@ def _with_tool_turn(
         s,
         arm=arm,
         task=free.task,
-        near=close,
+        near=reference,
         q=np.insert(s.q, r, np.where(s.valid, value, np.nan), axis=-1),
         status=np.where(s.status == Status.BOUNDARY, np.int8(Status.EXACT), s.status),  # a family moves the joint
         free=np.insert(s.free, r, False, axis=-1),

@@ -62,8 +62,8 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
     check_arm(arm, name)
     task = task_for(arm, "pose")
     goal, lead, rounding = read_targets(task, targets)
-    close = read_near(arm, near, lead)
-    nears = np.broadcast_to(close.reshape(-1, arm.n), (len(goal), arm.n))
+    reference = read_near(arm, near, lead)
+    nears = np.broadcast_to(reference.reshape(-1, arm.n), (len(goal), arm.n))
     lists: list[Array] = []
     for rows in slices(len(goal), AT_ONCE):
         lists += _of_chunk(ik, arm, task, goal[rows], nears[rows])
@@ -84,7 +84,7 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
         batch.status[miss <= tol.SOLUTION] = Status.EXACT
     names = tuple(f"minimum {i + 1}" for i in range(B))
     text = names, METHOD, f"minima of the rotation angle at the position, from {STARTS} postures"
-    s = as_solutions(Goals(arm, task, goal, nears), close, lead, batch, rounding, text)
+    s = as_solutions(Goals(arm, task, goal, nears), reference, lead, batch, rounding, text)
     return replace(s, angle=angle.reshape(s.valid.shape))
 
 

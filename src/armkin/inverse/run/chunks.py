@@ -50,7 +50,7 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
         left: list[Doubted] = []
         for start in range(rows.start, rows.stop, step):
             chunk = slice(start, min(start + step, rows.stop))
-            goal, columns, close = raw[chunk], None, near[chunk] if common is None else common
+            goal, columns, beside = raw[chunk], None, near[chunk] if common is None else common
             if task.orientation == "full":
                 goal, rounding[chunk], columns = read_poses(goal)
             target[chunk] = goal
@@ -63,8 +63,8 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
             first = goal[:, 0] if columns is None else cast("Array", columns[9])
             hits = np.empty(0, np.intp)
             if examine:
-                hits = near_itself.at_tip(arm, task, goal, position(arm, close) if tip is None else tip, first)
-            edge = _keep(Goals(arm, task, goal, near[chunk]), runner.axes, rows_of(batch, chunk), values, close, hits)
+                hits = near_itself.at_tip(arm, task, goal, position(arm, beside) if tip is None else tip, first)
+            edge = _keep(Goals(arm, task, goal, near[chunk]), runner.axes, rows_of(batch, chunk), values, beside, hits)
             if len(edge.rows):
                 left.append(edge._replace(rows=start + edge.rows))
         return left
@@ -101,8 +101,8 @@ def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Array]
     full, legal = bool(valid.all()), np.empty((*axes, arm.n, N))
     for i, value in enumerate(values):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
-        close = float(near[i]) if near.ndim == 1 else near[:, i]
-        value, inside = nearest_copy(value, close, lower, upper, bool(arm.prismatic[i]))
+        reference = float(near[i]) if near.ndim == 1 else near[:, i]
+        value, inside = nearest_copy(value, reference, lower, upper, bool(arm.prismatic[i]))
         legal[..., i, :] = value
         if inside is not True:
             within = (within.reshape(shape) & inside).reshape(B, N)

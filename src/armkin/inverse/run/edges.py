@@ -141,14 +141,14 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     )
     part = np.flatnonzero(doubts.free)
     if len(part):
-        goal, close = target[part], near[part]
-        first, second, solved = _candidates_at_two(runner, goal, close, close + 1.0)
+        goal, reference = target[part], near[part]
+        first, second, solved = _candidates_at_two(runner, goal, reference, reference + 1.0)
         apart = np.abs(first - second)
         changed = ~((apart.max(axis=2) < tol.SAME) | plain[part])
         lost = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
         if len(lost):  # solutions for some values of the free joints alone, or for one
-            shift, single = runner.best_shift(goal[lost], close[lost], changed[lost])
-            best = close[lost] + shift
+            shift, single = runner.best_shift(goal[lost], reference[lost], changed[lost])
+            best = reference[lost] + shift
             first[lost], second[lost], solved = _candidates_at_two(runner, goal[lost], best, best + tol.FOLD_WAY)
             doubts.narrow[part[lost]] = solved[1].any(axis=1)
             single &= ~doubts.narrow[part[lost]]

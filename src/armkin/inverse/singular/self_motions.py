@@ -69,9 +69,9 @@ def _grows_from(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, tar
     q, goal, sigma = np.concatenate([q, q]), np.concatenate([target, target]), np.concatenate([sigma, sigma])
     landed, size = newton.correct(arm, task, q + np.concatenate([apart, ahead]) * unit, goal, steps=6, least=tol.WEAK)
     way = newton.difference(arm, landed, q)
-    near = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(way).max(axis=1) < tol.CLOSE_BY))
-    miss, joined = newton.misses(arm, task, q[near], goal[near]), np.zeros(len(q), bool)
-    joined[near] = high_order_roots.solves_between(arm, task, q[near], way[near], miss, sigma[near], goal[near])
+    close = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(way).max(axis=1) < tol.CLOSE_BY))
+    miss, joined = newton.misses(arm, task, q[close], goal[close]), np.zeros(len(q), bool)
+    joined[close] = high_order_roots.solves_between(arm, task, q[close], way[close], miss, sigma[close], goal[close])
     return np.asarray(joined.reshape(2, -1).any(axis=0))
 
 

@@ -195,9 +195,9 @@ def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, places: int)
     """Seeds (N, B, n) moved onto the arm: the first `places` in their places, then what else they lead to, once."""
     N, B, n = q.shape
     flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
-    close = np.flatnonzero(newton.misses(arm, task, flat, goals) < tol.HOPELESS)
+    hopeful = np.flatnonzero(newton.misses(arm, task, flat, goals) < tol.HOPELESS)
     size = np.full(len(flat), np.inf)
-    flat[close], size[close] = newton.correct(arm, task, flat[close], goals[close], steps=20, patience=4)
+    flat[hopeful], size[hopeful] = newton.correct(arm, task, flat[hopeful], goals[hopeful], steps=20, patience=4)
     flat[size > tol.SOLUTION] = np.nan
     q = _filled_columns(flat.reshape(N, B, n), places)
     for i in range(1, q.shape[1]):
@@ -208,9 +208,9 @@ def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, places: int)
 
 def _has_four_roots(arm: Arm, q: Array) -> Bool:
     """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
-    near = newton.distances(arm, q, q) < tol.APART_ROOTS
+    alike = newton.distances(arm, q, q) < tol.APART_ROOTS
     present = ~np.isnan(q[:, :, 0])
-    return np.asarray((present.sum(axis=1) == 4) & (near.sum(axis=(1, 2)) == 4))
+    return np.asarray((present.sum(axis=1) == 4) & (alike.sum(axis=(1, 2)) == 4))
 
 
 def _filled_columns(q: Array, places: int) -> Array:

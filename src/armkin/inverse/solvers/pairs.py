@@ -107,8 +107,8 @@ def _pairs(arm: Arm, seed: Array, bad: Bool, partners: Int) -> tuple[Int, Int, I
 
 def _merged_branches(arm: Arm, q: Array) -> Bool:
     """Which branches (N, B, n) all but meet another one: (N, B)."""
-    near = newton.distances(arm, q, q) < tol.APART_ROOTS
-    return np.asarray(near.sum(axis=2) > 1)
+    alike = newton.distances(arm, q, q) < tol.APART_ROOTS
+    return np.asarray(alike.sum(axis=2) > 1)
 
 
 def _branch_partners(source: Recorded) -> Int:

@@ -65,12 +65,12 @@ class Task:
 
 def read_near(arm: Arm, near: ArrayLike | None, lead: tuple[int, ...]) -> Array:
     """Joint values to stay close to, (n,) or (*lead, n) [rad | mm]; by default home. Raises UsageError for others."""
-    close = arm.home if near is None else arrays.real_array(near, "near")
-    if close.shape != (arm.n,) and close.shape != (*lead, arm.n):
-        raise UsageError(f"near has shape {close.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
-    if not np.isfinite(close).all():
+    reference = arm.home if near is None else arrays.real_array(near, "near")
+    if reference.shape != (arm.n,) and reference.shape != (*lead, arm.n):
+        raise UsageError(f"near has shape {reference.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
+    if not np.isfinite(reference).all():
         raise UsageError("near holds nan or infinity; every joint value must be finite")
-    return close
+    return reference
 
 
 def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...], Array]:
